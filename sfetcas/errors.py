@@ -1,0 +1,53 @@
+"""Errors and statuses: each carries one sentence that a user can act on."""
+
+from __future__ import annotations
+
+import enum
+
+__all__ = ["SceneError", "SolveError", "Status"]
+
+
+class SceneError(ValueError):
+    """Bad input: one sentence naming what, where, what was found and what is accepted.
+
+    Attributes
+    ----------
+    where : tuple of str
+        Place in the scene, from the outside in: ``("members", "beam", "shape")``.
+    """
+
+    def __init__(self, message: str, where: tuple[str, ...] = ()) -> None:
+        super().__init__(message if not where else f"{'.'.join(where)}: {message}")
+        self.bare = message
+        self.where = where
+
+    def within(self, *outer: str) -> SceneError:
+        """The same error seen from further outside."""
+        return SceneError(self.bare, (*outer, *self.where))
+
+
+class Status(enum.Enum):
+    """How a solve ended; the values are sentences."""
+
+    SOLVED = "solved"
+    SHORT = "solved, but not to the accuracy asked for"
+    INFEASIBLE = "no shape of the members satisfies all supports, joints and motions"
+    UNBOUNDED = "the loads are not held: the energy falls without bound"
+    ITERATIONS = "the solver used up its iterations"
+    FAILED = "the solver stopped before it reached an equilibrium"
+
+
+class SolveError(RuntimeError):
+    """No solution: the status, what was tried and, where there is one, the last iterate.
+
+    Attributes
+    ----------
+    status : Status
+    last : object or None
+        Last iterate as the solver left it; never an answer.
+    """
+
+    def __init__(self, status: Status, detail: str = "", last: object = None) -> None:
+        super().__init__(status.value + (f" ({detail})" if detail else ""))
+        self.status = status
+        self.last = last
