@@ -1,0 +1,113 @@
+"""Following an equilibrium while loads and motions grow together from zero.
+
+Nobody has to prescribe load steps; this is a check, and it costs a few Newton iterations.  The library asks
+which of several equilibria the growing loads lead to: the state is followed from the undeformed scene in as
+few steps as Newton's method allows, the inertia is counted at each of them, and where the state ceases to be
+stable it is left along its escape shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .equations import State
+from .errors import SolveError
+from .model import Loading
+from .newton import Corrected
+from .prepared import Prepared
+from .stability import Stability
+
+__all__ = ["Followed", "follow"]
+
+STEP_ROTATION = 0.6
+"""A step is too long when its corrections turn a node by more than this, rad."""
+
+CONTRACTION = 0.5
+"""... or do not halve from one to the next."""
+
+SHORTEST = 1e-4
+"""Steps below this share of the way done end the search on this branch."""
+
+TINY = 1e-12
+"""The first step is never below this part of the way."""
+
+NARROW = 0.02
+"""The share of the way done at which a stable and an unstable state are near enough to leave between them."""
+
+MOST = 400
+"""Steps tried before giving up."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Where following arrived.
+
+    Attributes
+    ----------
+    state : State
+        State at the end of the way, or where it was lost.
+    stability : Stability
+    reached : bool
+        Whether the end of the way was reached.
+    left : tuple of float
+        Parts of the way at which an unstable equilibrium was left.
+    """
+
+    state: State
+    stability: Stability
+    reached: bool
+    left: tuple[float, ...]
+
+
+def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *, leave: bool = True) -> Followed:
+    """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
+
+    With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.
+    """
+    done, step = 0.0, 0.5
+    left: list[float] = []
+    now = prepared.correct(state, way(0.0))
+    stability = prepared.stability(now)
+    for _ in range(MOST):
+        if done >= 1.0:
+            return Followed(now.state, stability, True, tuple(left))
+        trial = min(1.0, done + step)
+        there = prepared.correct(now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION)
+        if not there.converged:
+            if step > max(SHORTEST * done, TINY):
+                step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
+                continue
+            if not leave:
+                break
+            trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
+            snapped = _left(prepared, now, stability, way(trial))
+            if snapped is None:
+                break
+            now, stability = snapped
+            left.append(done)
+            done, step = trial, 0.1
+            continue
+        after = prepared.stability(there)
+        if after.negative > 0 and leave:
+            if trial - done > NARROW * done:
+                step = 0.5 * (trial - done)
+                continue
+            escaped = _left(prepared, there, after, way(trial))
+            if escaped is None:
+                break
+            there, after = escaped
+            left.append(trial)
+            step = 0.1
+        now, stability, done = there, after, trial
+        step *= 4.0 if there.second < 0.05 else 2.0
+    return Followed(now.state, stability, done >= 1.0, tuple(left))
+
+
+def _left(
+    prepared: Prepared, found: Corrected, stability: Stability, loading: Loading
+) -> tuple[Corrected, Stability] | None:
+    try:
+        return prepared.leave(found.state, stability, loading)
+    except SolveError:
+        return None

@@ -1,0 +1,87 @@
+"""Whether a scene lies in x-y, and if not, the first thing that does not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from .loads import Load, Motion
+from .shapes import CenterLine
+from .structure import Node
+
+__all__ = ["out_of_plane"]
+
+Triple = tuple[float, float, float]
+Finding = tuple[tuple[str, ...], str]
+
+_ROUNDING = 1e-12
+
+
+def out_of_plane(
+    nodes: Mapping[str, Node],
+    lines: Mapping[str, CenterLine],
+    loads: Mapping[str, Load],
+    motions: Mapping[str, Motion],
+    gravity: Triple | None,
+) -> Finding | None:
+    """The place of the first thing out of x-y with what it does there; None where all lies in it."""
+    if gravity is not None and _leaves(gravity):
+        return ("gravity",), "has a z component"
+    findings = (
+        _nodes(nodes),
+        _members(lines),
+        _loads(loads),
+        _motions(motions),
+    )
+    return next((finding for group in findings for finding in group), None)
+
+
+def _nodes(nodes: Mapping[str, Node]) -> Iterator[Finding]:
+    size = max((abs(entry) for node in nodes.values() for entry in node.position[:2]), default=0.0)
+    for name, node in nodes.items():
+        for key in ("position", "start"):
+            point = getattr(node, key)
+            if point is not None and abs(point[2]) > _ROUNDING * size:
+                yield ("nodes", name, key), "has a z component"
+        if node.direction is not None and _leaves(node.direction):
+            yield ("nodes", name, "direction"), "has a z component"
+        if _turns_out(node.axis):
+            yield ("nodes", name, "axis"), "is not along z"
+
+
+def _members(lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    x = np.linspace(0.0, 1.0, 33)
+    for name, line in lines.items():
+        if line.planar:
+            continue
+        if np.abs(line.tangents(x)[:, 2]).max() > _ROUNDING:
+            yield ("members", name, "shape"), "leaves x-y"
+        elif np.abs(line.curvatures(x)[:, 0]).max() * line.length > _ROUNDING:
+            yield ("members", name, "shape"), "twists"
+        else:
+            yield ("members", name, "b2"), "is neither along z nor in x-y"
+
+
+def _loads(loads: Mapping[str, Load]) -> Iterator[Finding]:
+    for name, load in loads.items():
+        if load.type == "moment" and _turns_out(load.vector):
+            yield ("loads", name, "value"), "is not about z"
+        if load.type != "moment" and _leaves(load.vector):
+            yield ("loads", name, "value"), "has a z component"
+
+
+def _motions(motions: Mapping[str, Motion]) -> Iterator[Finding]:
+    for name, motion in motions.items():
+        if motion.displacement is not None and _leaves(motion.displacement):
+            yield ("motions", name, "displacement"), "has a z component"
+        if isinstance(motion.rotation, tuple) and _turns_out(motion.rotation):
+            yield ("motions", name, "rotation"), "is not about z"
+
+
+def _leaves(vector: Triple) -> bool:
+    return abs(vector[2]) > _ROUNDING * max(abs(vector[0]), abs(vector[1]))
+
+
+def _turns_out(vector: Triple) -> bool:
+    return max(abs(vector[0]), abs(vector[1])) > _ROUNDING * abs(vector[2])

@@ -1,0 +1,216 @@
+"""What a state means along the members: positions, rotations, section forces and moments at any place.
+
+Section forces and moments come from equilibrium, not from the derivative of the rotations: the moment at the
+first node of a member is minus the gradient of its energy there, and the rest follows by integrating
+``m' = -r' x n``.  They are therefore as accurate as the positions, of order 2p at the element ends.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from . import interpolation, quaternion
+from .equations import Equations, State
+from .model import Loading
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Fields", "rotations_along", "transferred"]
+
+
+class Fields:
+    """Fields of one state of a model.  All results are in SI units and fixed axes, with three components."""
+
+    def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
+        self.model, self._state, self._loading = equations.model, state, loading
+        self._equations = equations
+        model = self.model
+        self.turned = _turned_tangents(equations, state)
+        reach = self.turned.sum(axis=1)
+        nodal, _ = equations.displacements(state, loading, reach)
+        self._nodal = nodal.reshape(len(model.nodes), -1)
+        self._pull = loading.pull + equations.member_pulls(state.lam, loading)[model.owner][:, None, :]
+        self._start_moments = equations.end_moments(state, loading)
+
+    # -- nodes ----------------------------------------------------------------------------------
+
+    def position(self, node: str) -> Array:
+        """Position of a node, m."""
+        moved = _three(self._nodal[self.model.nodes.index(node)]) * self.model.scales.length
+        return np.asarray(self.model.scene.nodes[node].position, dtype=float) + moved
+
+    def rotation(self, node: str) -> Array | None:
+        """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
+        number = self.model.node_turn[node]
+        return None if number is None else self._state.q[number]
+
+    def reaction(self, node: str) -> tuple[Array, Array]:
+        """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
+        model = self.model
+        force = -_three(self._outer_force(node))
+        moment = np.zeros(3)
+        number = model.node_turn[node]
+        if number is not None:
+            moment[2] -= self._loading.couple[number]
+        for name, member in model.scene.members.items():
+            ends = self.along(name, np.array([0.0, 1.0]), dimensionless=True)
+            if member.nodes[0] == node:
+                force -= ends["force"][0]
+                moment -= ends["moment"][0]
+            if member.nodes[1] == node:
+                force += ends["force"][1]
+                moment += ends["moment"][1]
+        return force * model.scales.force, moment * model.scales.moment
+
+    def _outer_force(self, node: str) -> Array:
+        """Load on the node itself; the resultants of loads along members were put to their first nodes."""
+        model = self.model
+        force = self._loading.force[model.nodes.index(node)].copy()
+        for name, member in model.scene.members.items():
+            if member.nodes[0] == node:
+                force -= self._spread_after(name)[0] + self._points_after(name)[0]
+        return force
+
+    # -- members --------------------------------------------------------------------------------
+
+    def along(self, member: str, x: Array, *, dimensionless: bool = False) -> dict[str, Array]:
+        """Fields at fractions x of a member's length.
+
+        Returns
+        -------
+        dict
+            ``position`` (n, 3) m, ``rotation`` (n, 4) or (n, 1) since the undeformed scene, ``force`` (n, 3) N
+            and ``moment`` (n, 3) N m of what is beyond on what is before, ``curvature`` (n, 3) 1/m about the
+            section's axes b1, b2, b3.
+        """
+        model, element = self.model, self.model.element
+        x = np.asarray(x, dtype=float)
+        part, cuts = model.elements_of(member), model.mesh.cuts[member]
+        e, xi = _located(cuts, x)
+        to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
+        turned, spread = self.turned[part], self._loading.spread[part]
+        rest = model.tangent[part]
+        here = np.einsum("nk,nka->na", to_x, (turned - rest)[e])
+        start, moments = self._element_starts(member)
+        line = model.scene.center_lines[member]
+        position = line.positions(x) + _three(start[e] + here) * model.scales.length
+        beyond = self._spread_after(member)[e] - np.einsum("nk,nka->na", to_x, spread[e])
+        force = _three(beyond + self._points_after(member)[e + 1] - self._constant(member))
+        # m' = -r' x n; the pull at the points is minus the force there.
+        couple = _cross(turned, self._pull[part])
+        moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
+        rotation = rotations_along(model, self._state.q, member, x)
+        frames = self._frames(member, x, rotation)
+        result = {"position": position, "rotation": rotation, "force": force, "moment": moment}
+        if dimensionless:
+            return result
+        result["force"] = force * model.scales.force
+        result["moment"] = moment * model.scales.moment
+        stiffness = model.scene.sections[model.scene.members[member].section].stiffness(x)
+        strain = np.einsum("nij,ni->nj", frames, result["moment"])
+        with np.errstate(invalid="ignore"):
+            strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
+        result["curvature"] = line.curvatures(x) + strain
+        return result
+
+    def _frames(self, member: str, x: Array, rotation: Array) -> Array:
+        """Section axes as columns, (n, 3, 3)."""
+        line = self.model.scene.center_lines[member]
+        if not self.model.space:
+            zero = np.zeros(len(x))
+            vectors = np.stack([zero, zero, rotation[:, 0]], axis=-1)
+            rotation = quaternion.from_rotation_vector(vectors)
+        return quaternion.matrix(quaternion.multiply(rotation, line.quaternions(x)))
+
+    def _constant(self, member: str) -> Array:
+        number = self.model.members.index(member)
+        return self._equations.member_pulls(self._state.lam, self._loading)[number]
+
+    def _spread_after(self, member: str) -> Array:
+        """Distributed load from the start of each element on, then zero, (elements + 1, axes)."""
+        total = self._loading.spread[self.model.elements_of(member)].sum(axis=1)
+        return np.concatenate([np.cumsum(total[::-1], axis=0)[::-1], np.zeros((1, total.shape[1]))])
+
+    def _points_after(self, member: str) -> Array:
+        """Point loads beyond each cut of a member; entry e + 1 holds on element e, (elements + 1, axes)."""
+        model, element = self.model, self.model.element
+        part = model.elements_of(member)
+        spread, after = self._loading.spread[part], self._spread_after(member)
+        inside = np.einsum("jk,eja->eka", element.to_points, spread) / element.weights[:, None]
+        on_element = -(self._loading.pull[part] + inside)[:, 0] - after[1:]
+        return np.concatenate([on_element[:1], on_element])
+
+    @functools.lru_cache(maxsize=None)  # noqa: B019 - lives as long as the fields
+    def _element_starts(self, member: str) -> tuple[Array, Array]:
+        """Displacement and moment at the start of each element of a member (and its end)."""
+        model = self.model
+        part = model.elements_of(member)
+        turned = self.turned[part]
+        first = self._nodal[model.nodes.index(model.scene.members[member].nodes[0])]
+        steps = (turned - model.tangent[part]).sum(axis=1)
+        starts = first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+        gains = _cross(turned, self._pull[part]).sum(axis=1)
+        chain = model.turns[part]
+        # A couple at a cut is a jump of the moment.
+        gains[:-1, 2] -= self._loading.couple[chain[1:, 0]]
+        moment = -self._start_moments[member]
+        moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
+        return starts, moments
+
+
+def _located(cuts: Array, x: Array) -> tuple[Any, Array]:
+    """Element of each fraction, and the place in it."""
+    e = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
+    return e, (x - cuts[e]) / (cuts[e + 1] - cuts[e])
+
+
+def _per_place(xi: Array, rows: Any) -> Array:
+    """Rows of a matrix for places that often repeat."""
+    places, inverse = np.unique(xi, return_inverse=True)
+    return np.asarray(rows(places)[inverse])
+
+
+def _three(a: Array) -> Array:
+    """Vectors (..., 2) or (..., 3) as (..., 3)."""
+    return a if a.shape[-1] == 3 else np.concatenate([a, np.zeros((*a.shape[:-1], 1))], axis=-1)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors in the plane or in space, (..., 3)."""
+    return np.cross(_three(a), _three(b))
+
+
+def _turned_tangents(equations: Equations, state: State) -> Array:
+    """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
+    model, element = equations.model, equations.model.element
+    q = state.q[model.turns]
+    if element.gauss:
+        q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)
+    if model.space:
+        return quaternion.rotate(q / np.linalg.norm(q, axis=-1, keepdims=True), model.tangent)
+    c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
+    t = model.tangent
+    return np.stack([c * t[..., 0] - s * t[..., 1], s * t[..., 0] + c * t[..., 1]], axis=-1)
+
+
+def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
+    """Rotations at fractions x of a member, (n, 4) unit or (n, 1)."""
+    e, xi = _located(model.mesh.cuts[member], x)
+    nodal = q[model.turns[model.elements_of(member)]]
+    rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
+    values = np.einsum("nj,njc->nc", rows, nodal[e])
+    return values / np.linalg.norm(values, axis=-1, keepdims=True) if model.space else values
+
+
+def transferred(source: Any, state: State, target: Any) -> State:
+    """A state of one mesh on another mesh of the same scene."""
+    q = np.zeros((len(target.kind), target.element.components))
+    for name in target.members:
+        q[target.chain(name)] = rotations_along(source, state.q, name, target.along(name))
+    for name, number in target.node_turn.items():
+        if number is not None and source.node_turn[name] is not None:
+            q[number] = state.q[source.node_turn[name]]
+    return State(q, state.y.copy(), state.lam.copy())

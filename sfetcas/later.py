@@ -1,0 +1,68 @@
+"""What later versions bring: keys and values of a scene that are known by name and refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import model_validator
+
+from .errors import SceneError
+from .records import Record
+
+__all__ = ["SPACE_MOMENT", "Staged", "refusal"]
+
+SPACE_MOMENT = "Load.type = moment in space"
+
+_LATER = {
+    "Scene.springs": "springs",
+    "Scene.contacts": "contacts",
+    "Scene.rotating": "rotating axes",
+    "Node.mass": "lumped masses",
+    "Node.inertia": "lumped inertias",
+    "Node.velocity": "velocities",
+    "Member.type = rigid": "rigid members",
+    "Member.type = small": "members of small deformation",
+    "Member.stiffness": "stiffness matrices of members",
+    "Member.mass": "mass matrices of members",
+    "Member.spin": "angular velocities of members",
+    "Load.frame = follower": "follower loads",
+    SPACE_MOMENT: "moments in a space scene",
+    "Analysis.type = path": "paths",
+    "Analysis.type = modes": "modes",
+    "Analysis.type = dynamic": "dynamics",
+    "Analysis.range": "ranges of paths",
+    "Analysis.points": "numbers of points of a path",
+    "Analysis.modes": "modes",
+    "Analysis.end": "time spans",
+    "Analysis.output": "spacings of answers in time",
+    "Analysis.step": "time steps",
+    "Analysis.integrator": "integrators",
+    "Analysis.equilibria = all": "searches for all equilibria",
+    "Expect.time": "expectations at a time",
+    "Expect.crossing": "expectations at a crossing of a path",
+    "Expect.limit_point": "expectations at a limit point",
+    "Expect.bifurcation": "expectations at a bifurcation",
+    "Expect.flutter_point": "expectations at a flutter point",
+    "Expect.equilibrium": "expectations for one of several equilibria",
+}
+"""Each row leaves with the version that brings what it names: ``Record.key`` or ``Record.key = value``."""
+
+
+def refusal(place: str) -> str | None:
+    """The sentence that refuses a row of the table; None where there is no such row."""
+    return f"{_LATER[place]} are not available yet" if place in _LATER else None
+
+
+class Staged(Record):
+    """A record that refuses what later versions bring by name."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_later(cls, values: Any) -> Any:
+        for key, value in values.items() if isinstance(values, Mapping) else ():
+            place = f"{cls.__name__}.{key}"
+            message = refusal(place) or refusal(f"{place} = {value}" if isinstance(value, str) else place)
+            if message:
+                raise SceneError(message, (str(key),))
+        return values

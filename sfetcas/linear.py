@@ -1,0 +1,67 @@
+"""Sparse symmetric linear systems: solutions, and inertia by factorisation.
+
+Small systems go to LAPACK, larger ones to the solvers that come with CasADi; the pattern is analysed once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["SparseSolver"]
+
+DENSE = 150
+"""Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
+
+
+class SparseSolver:
+    """Solutions of ``A x = b`` for matrices of one pattern.
+
+    Parameters
+    ----------
+    n : int
+        Size of the matrix.
+    row, column : ndarray
+        Places of the entries, column by column.
+    plugin : str
+        Linear solver of CasADi for systems that are not small.
+    """
+
+    def __init__(self, n: int, row: Array, column: Array, plugin: str = "csparse") -> None:
+        self.n = n
+        self._places = row * n + column if n <= DENSE else None
+        if self._places is None:
+            self._sparsity = ca.Sparsity(n, n, _pointers(n, column), row.tolist())
+            self._solver = ca.Linsol("newton", plugin, self._sparsity)
+
+    def factor(self, entries: Array) -> None:
+        """Factorise; a singular matrix raises ``LinAlgError`` here or in :meth:`solve`."""
+        if self._places is not None:
+            self._matrix: Any = np.zeros(self.n * self.n)
+            self._matrix[self._places] = entries
+            self._matrix = self._matrix.reshape(self.n, self.n)
+            return
+        self._matrix = ca.DM(self._sparsity, entries)
+        try:
+            self._solver.sfact(self._matrix)
+            self._solver.nfact(self._matrix)
+        except RuntimeError:
+            raise np.linalg.LinAlgError("singular matrix") from None
+
+    def solve(self, b: Array) -> Array:
+        """Solution for the matrix given last; b of shape (n,) or (n, k)."""
+        if self._places is not None:
+            return np.asarray(np.linalg.solve(self._matrix, b))
+        try:
+            x = self._solver.solve(self._matrix, ca.DM(b))
+        except RuntimeError:
+            raise np.linalg.LinAlgError("singular matrix") from None
+        return np.asarray(x.full()).reshape(b.shape)
+
+
+def _pointers(n: int, column: Array) -> list[int]:
+    return np.searchsorted(column, np.arange(n + 1)).tolist()

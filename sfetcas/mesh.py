@@ -1,0 +1,133 @@
+"""Meshes: where the members of a scene are cut into elements, as fractions of their lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .scene import Scene
+from .sections import breaks as kinks
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Mesh", "breaks_of", "first_mesh", "uniform_mesh"]
+
+SAME = 1e-12
+"""Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Element type and cuts.
+
+    Attributes
+    ----------
+    order : int
+        Polynomial order p of all elements.
+    cuts : mapping of str to ndarray (n + 1,)
+        Fractions of the member's length from 0 to 1, rising, n elements.
+    gauss : bool
+        Gauss integration instead of integration at the nodes.
+    """
+
+    order: int
+    cuts: Mapping[str, Array]
+    gauss: bool = False
+
+    @property
+    def elements(self) -> int:
+        """Number of elements of all members."""
+        return sum(len(cuts) - 1 for cuts in self.cuts.values())
+
+    def refined(self, marked: Mapping[str, Array] | None = None) -> Mesh:
+        """The mesh with the marked elements halved (boolean array a member); without marks, all of them."""
+        cuts = {}
+        for name, old in self.cuts.items():
+            chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
+            middles = 0.5 * (old[1:] + old[:-1])
+            cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
+        return Mesh(self.order, cuts, self.gauss)
+
+
+def breaks_of(scene: Scene, member: str) -> Array:
+    """Fractions at which the solution along a member has a kink and an element has to end."""
+    places = [0.0, 1.0, *scene.sections[scene.members[member].section].breaks, *scene.center_lines[member].breaks]
+    for load in scene.loads.values():
+        if load.member == member:
+            places += [] if load.at is None else [load.at]
+            places += [] if load.profile is None else list(kinks(load.profile))
+    places = sorted(places)
+    keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > SAME]
+    return np.array([*keep, 1.0])
+
+
+def _divided(breaks: Array, elements: int) -> Array:
+    """About ``elements`` equal elements with a cut at each break, at least one a stretch."""
+    lengths = np.diff(breaks)
+    counts = np.maximum(1, np.floor(lengths * elements + 0.5).astype(int))
+    while counts.sum() > elements and (counts > 1).any():
+        counts[np.argmin(np.where(counts > 1, lengths / counts, np.inf))] -= 1
+    while counts.sum() < elements:
+        counts[np.argmax(lengths / counts)] += 1
+    stretches = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks, breaks[1:], counts, strict=False)]
+    return np.concatenate([*stretches, [1.0]])
+
+
+def uniform_mesh(scene: Scene, order: int, elements: int | Mapping[str, int], gauss: bool = False) -> Mesh:
+    """Equal elements on each member; one more wherever a load or a kink of the section needs a cut."""
+    counts = elements if isinstance(elements, Mapping) else dict.fromkeys(scene.members, elements)
+    return Mesh(order, {name: _divided(breaks_of(scene, name), counts[name]) for name in scene.members}, gauss)
+
+
+def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
+    """A coarse mesh to begin with.
+
+    No element is expected to turn by more than ``turning`` rad by the unloaded shape, prescribed rotations and
+    end moments.  Under forces far above EI/L^2 a member is straight but for layers as thin as
+    ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
+    """
+    rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
+    moments = sum(abs(load.value[2]) for load in scene.loads.values() if load.type == "moment")
+    most = _largest_force(scene)
+    cuts = {}
+    for name, member in scene.members.items():
+        line = scene.center_lines[name]
+        softest = float(np.nanmin(scene.sections[member.section].stiffness(np.linspace(0.0, 1.0, 5))))
+        expected = line.turning + max(rotations, default=0.0) + moments * line.length / softest
+        count = int(min(max(2.0, np.ceil(expected / turning)), 400.0))
+        layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
+        cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
+    return Mesh(order, cuts)
+
+
+def _largest_force(scene: Scene) -> float:
+    """Bound of the force that loads of factor 1 (or the largest of the steps) can cause in any member."""
+    total = 0.0
+    for load in scene.loads.values():
+        if load.type != "moment":
+            length = scene.center_lines[load.member].length if load.type == "distributed" and load.member else 1.0
+            total += float(np.linalg.norm(load.value)) * length
+    if scene.gravity is not None:
+        x = np.linspace(0.0, 1.0, 5)
+        masses = [
+            float(scene.sections[m.section].mass(x).mean()) * scene.center_lines[n].length
+            for n, m in scene.members.items()
+        ]
+        total += float(np.linalg.norm(scene.gravity)) * sum(masses)
+    return total * max(abs(factor) for factor in scene.analysis.steps)
+
+
+def _graded(cuts: Array, breaks: Array, layer: float) -> Array:
+    """The cuts, and further ones at twice, four times, ... the layer from each break."""
+    places = [cuts]
+    for left, right in zip(breaks, breaks[1:], strict=False):
+        steps = int(np.floor(np.log2(max(0.25 * (right - left) / layer, 0.5)))) + 1
+        distances = np.maximum(layer, 1e-13) * 2.0 ** np.arange(min(steps, 40))
+        places += [left + distances, right - distances]
+    merged = np.unique(np.concatenate(places))
+    # Cuts that nearly meet others would make slivers; breaks stay.
+    sliver = np.diff(merged, prepend=-1.0) < (0.3 * layer if np.isfinite(layer) else SAME)
+    return merged[~sliver | np.isin(merged, breaks)]

@@ -1,0 +1,308 @@
+"""Newton's method on the stationarity equations, and states that satisfy the closings to start from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from . import quaternion
+from .equations import Equations, Point, State
+from .model import Loading, Turn
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Corrected", "correct", "descend", "first_guess", "relative_residual", "restore"]
+
+PROXIMAL = 1e-10
+"""Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
+
+DUAL = 1e-12
+"""Softness of the closings in the matrix (not in the equations), against redundant ones."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """Where Newton's method arrived.
+
+    ``first`` and ``second`` are the largest rotations (rad) of the first two steps: how far the equations were
+    from linear.
+    """
+
+    state: State
+    point: Point
+    converged: bool
+    iterations: int
+    first: float
+    second: float
+    residual: float
+
+
+def relative_residual(equations: Equations, point: Point) -> float:
+    """Largest out-of-balance moment or force over the largest one that was added up, or largest gap."""
+    n = equations.unknowns
+    balance = np.abs(point.residual[:n]).max(initial=0.0) / max(point.size.max(initial=0.0), 1e-30)
+    gap = np.abs(point.residual[n:]).max(initial=0.0)
+    return float(max(balance if np.abs(point.residual[:n]).max(initial=0.0) > 1e-15 else 0.0, gap))
+
+
+def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
+    """The step of all unknowns and multipliers."""
+    entries = point.entries.copy()
+    n, total = equations.turning_unknowns, equations.total
+    diagonal = equations.diagonal
+    entries[diagonal[:n]] += PROXIMAL * weight
+    entries[diagonal[equations.unknowns : total]] -= DUAL
+    equations.solver.factor(entries)
+    return equations.solver.solve(-point.residual)
+
+
+def correct(
+    equations: Equations,
+    state: State,
+    loading: Loading,
+    weight: Array,
+    *,
+    tolerance: float = 1e-12,
+    iterations: int = 12,
+    most: float = np.inf,
+    contraction: float = 1.0,
+) -> Corrected:
+    """Newton's method from a near state down to rounding.
+
+    Parameters
+    ----------
+    weight : ndarray
+        Weight of the proximal term, see :class:`~sfetcas.stability.StabilityTest`.
+    tolerance : float
+        Relative residual that counts as converged; iterations go on while they still gain a factor of 4.
+    most : float
+        Give up when a later step than the first turns any node by more, rad.
+    contraction : float
+        Give up when a step is not shorter than this times the one before.
+    """
+    state = equations.holding(state, loading)
+    point = equations.at(state, loading)
+    residual = relative_residual(equations, point)
+    first = second = last = np.inf
+    count = 0
+    for count in range(iterations):
+        if residual == 0.0:
+            break
+        try:
+            step = newton_step(equations, point, weight)
+        except np.linalg.LinAlgError:
+            break
+        length = float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
+        if not np.isfinite(length):
+            break
+        if count == 0:
+            first = length
+        elif count == 1:
+            second = length
+        if count and residual > tolerance and (length > most or length > contraction * last):
+            return Corrected(state, point, False, count, first, second, residual)
+        last = length
+        trial = equations.moved(state, step)
+        there = equations.at(trial, loading)
+        gained = relative_residual(equations, there)
+        if residual <= tolerance and gained > 0.25 * residual:
+            if gained < residual:
+                state, point, residual = trial, there, gained
+            break
+        state, point, residual = trial, there, gained
+        if not np.isfinite(residual):
+            break
+    second = 0.0 if second == np.inf else second
+    return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+
+
+def descend(equations: Equations, state: State, loading: Loading, weight: Array, *, iterations: int = 30) -> State:
+    """Downhill towards a minimum of the potential on the closings, from any state.
+
+    Newton steps with convex element matrices, so that each points downhill, shortened until the potential (with
+    the gaps, weighted beyond the multipliers) falls by a third of what the step promises.  Forces turn no node
+    by more than 1.2 rad in a step, so that they do not wind a beam up; a moment may roll it up at once.  Stops where steps have become short; the
+    state is meant as a start for IPOPT or Newton's method.
+    """
+    scale = 1.0
+    most = np.inf if np.any(loading.couple) else TURN
+    for _ in range(iterations):
+        point = equations.at(state, loading, convex=True)
+        try:
+            step = newton_step(equations, point, 1e4 * weight)
+        except np.linalg.LinAlgError:
+            return state
+        n = equations.unknowns
+        length = float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
+        if not np.isfinite(length):
+            return state
+        # Slope of the potential alone: the residual without the multipliers' share.
+        lam = state.lam + step[n:]
+        penalty = 2.0 * float(np.abs(lam).max(initial=0.0))
+        gaps = np.abs(point.residual[n:]).sum()
+        slope = float(point.residual[:n] @ step[:n]) + float(state.lam @ point.residual[n:]) - penalty * gaps
+        slope = min(slope, 0.0)
+        before = point.potential + penalty * gaps
+        scale = min(1.0, 4.0 * scale, most / max(length, 1e-30))
+        for _ in range(40):
+            trial = equations.moved(state, np.concatenate([scale * step[:n], scale * step[n:]]))
+            there = equations.at(trial, loading)
+            after = there.potential + penalty * np.abs(there.residual[n:]).sum()
+            if after - before <= 0.3 * (scale - 0.5 * scale**2) * slope + 1e-12 * abs(before):
+                break
+            scale *= 0.5
+        state = trial
+        if scale == 1.0 and length < 0.02:
+            break
+    return state
+
+
+def restore(
+    equations: Equations, state: State, loading: Loading, weight: Array, targets: Array | None = None
+) -> tuple[State, float]:
+    """A state near the given one that satisfies closings, motions and joints, and the gap that is left.
+
+    Each step is the smallest change in the elastic energy of the undeformed scene that closes the linearised
+    gaps, shortened to 0.5 rad.  ``targets`` (nodes * axes, nan where none) are displacements wished for nodes.
+    """
+    state = replace(equations.holding(state, loading), lam=np.zeros(equations.rows))
+    n, rows = equations.unknowns, equations.rows
+    wished = np.flatnonzero(np.isfinite(targets)) if targets is not None else np.array([], dtype=np.intp)
+    if rows == 0 and not len(wished):
+        return state, 0.0
+    metric = equations.elastic_entries()
+    metric[equations.diagonal[: equations.turning_unknowns]] += 0.1 * weight
+    metric[equations.diagonal[equations.turning_unknowns : n]] += 1e-6
+    metric[equations.diagonal[n:]] -= 1e-9
+    coupling = (equations.row >= n) != (equations.column >= n)
+    gap = np.inf
+    for _ in range(60):
+        point = equations.at(state, loading)
+        right = np.concatenate([np.zeros(n), -point.residual[n:]])
+        missing = np.zeros(0)
+        if len(wished):
+            assert targets is not None
+            nodal, jacobian = equations.node_jacobian(state, loading, wished)
+            missing = targets[wished] - nodal
+        gap = float(max(np.abs(point.residual[n:]).max(initial=0.0), np.abs(missing).max(initial=0.0)))
+        if gap < 1e-9:
+            break
+        equations.solver.factor(np.where(coupling, point.entries, metric))
+        if len(wished):
+            border = np.zeros((equations.total, len(wished)))
+            border[:n] = jacobian.T
+            base = equations.solver.solve(np.column_stack([right, border]))
+            schur = border.T @ base[:, 1:] + 1e-9 * np.eye(len(wished))
+            step = base[:, 0] + base[:, 1:] @ np.linalg.solve(schur, missing - border.T @ base[:, 0])
+        else:
+            step = equations.solver.solve(right)
+        step[n:] = 0.0
+        length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
+        state = equations.moved(state, step * min(1.0, 0.5 / max(length, 1e-30)))
+    return state, gap
+
+
+def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[State, float]:
+    """A state to start from, and the gap of the closings that is left.
+
+    The undeformed scene, its rotations carried along by the prescribed ones; straight members bent where the
+    closings would otherwise have no slack (a straight member cannot shorten to first order); then closings,
+    motions and the ``start`` places of nodes satisfied as far as possible.
+    """
+    model = equations.model
+    state = equations.start(loading)
+    if np.any(loading.turn):
+        state = _carried(equations, loading)
+    targets = _wished(equations)
+    if equations.rows and (_no_slack(equations, equations.at(state, loading)) or targets is not None):
+        state = _bent(equations, state, loading)
+    if targets is not None:
+        state, _ = restore(equations, state, loading, weight, targets)
+    state, gap = restore(equations, state, loading, weight)
+    if gap > 1e-6 or targets is not None:
+        return state, gap
+    return descend(equations, state, loading, weight), gap
+
+
+def _wished(equations: Equations) -> Array | None:
+    """Displacements to the ``start`` places, dimensionless, nan where none is given."""
+    model = equations.model
+    axes = model.element.axes
+    targets = np.full((len(model.nodes), axes), np.nan)
+    for i, node in enumerate(model.scene.nodes.values()):
+        if node.start is not None and node.support in ("free", "slider"):
+            targets[i] = (np.asarray(node.start) - np.asarray(node.position))[:axes] / model.scales.length
+    return targets.ravel() if np.isfinite(targets).any() else None
+
+
+def _no_slack(equations: Equations, point: Point) -> bool:
+    """Whether the closings are redundant to first order at this state."""
+    n = equations.unknowns
+    chosen = (equations.row >= n) & (equations.column < n)
+    rows = np.zeros((equations.rows, n))
+    rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
+    sizes = np.linalg.svd(rows, compute_uv=False)
+    return len(sizes) < equations.rows or sizes[-1] < 1e-6 * sizes[0]
+
+
+def _carried(equations: Equations, loading: Loading) -> State:
+    """Prescribed rotation vectors spread over the scene like heat, members being rods."""
+    model = equations.model
+    count = len(model.kind)
+    ends = np.array([model.ends[name] for name in model.members])
+    used, index = np.unique(ends, return_inverse=True)
+    index = index.reshape(ends.shape)
+    laplacian = np.zeros((len(used), len(used)))
+    for a, b in index:
+        laplacian[[a, b, a, b], [a, b, b, a]] += [1.0, 1.0, -1.0, -1.0]
+    held = model.kind[used] == Turn.HELD
+    vectors = loading.turn[used]
+    free = ~held
+    if free.any():
+        matrix = laplacian[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
+        vectors[free] = np.linalg.solve(matrix, -laplacian[np.ix_(free, held)] @ vectors[held])
+    field = np.zeros((count, 3))
+    for (a, b), (i, j), name in zip(ends, index, model.members, strict=True):
+        chain = model.chain(name)
+        part = model.along(name)[:, None]
+        field[chain] = (1.0 - part) * vectors[i] + part * vectors[j]
+        field[a], field[b] = vectors[i], vectors[j]
+    about = model.kind == Turn.AXIS
+    field[about] = (field[about] * model.axis[about]).sum(axis=1, keepdims=True) * model.axis[about]
+    q = quaternion.from_rotation_vector(field) if model.space else field[:, 2:3]
+    return equations.holding(replace(equations.start(loading), q=q), loading)
+
+
+def _bent(equations: Equations, state: State, loading: Loading) -> State:
+    """Straight members bent by a slight bow about their weak axis, to the side that the loads prefer."""
+    model = equations.model
+    vectors = np.zeros((len(model.kind), 3))
+    for name, member in model.scene.members.items():
+        line = model.scene.center_lines[name]
+        if line.turning > 0.05:
+            continue
+        stiffness = model.scene.sections[member.section].stiffness(np.array([0.5]))[0]
+        weak_2 = model.space and stiffness[1] < stiffness[2] * (1.0 - 1e-9)
+        frame = quaternion.matrix(line.quaternions(np.array([0.0])))[0]
+        axis = np.array([0.0, 0.0, 1.0]) if not model.space else (-frame[:, 1] if weak_2 else frame[:, 2])
+        inner = model.chain(name)[1:-1]
+        vectors[inner] = BOW * np.sin(2.0 * np.pi * model.along(name)[1:-1])[:, None] * axis
+    vectors[model.kind != Turn.FREE] = 0.0
+
+    def turned(sign: float) -> State:
+        if model.space:
+            return replace(state, q=quaternion.multiply(quaternion.from_rotation_vector(sign * vectors), state.q))
+        return replace(state, q=state.q + sign * vectors[:, 2:3])
+
+    up, down = (turned(sign) for sign in (1.0, -1.0))
+    difference = equations.at(up, loading).potential - equations.at(down, loading).potential
+    return down if difference > 1e-12 else up
+
+
+TURN = 1.2
+"""Largest rotation (rad) of a step downhill under forces."""
+
+BOW = 0.2
+"""Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""

@@ -1,0 +1,137 @@
+"""A model made ready for any number of solves: IPOPT, Newton's method and the stability test."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from . import quaternion
+from .equations import Equations, State
+from .errors import SolveError, Status
+from .model import Loading, Model
+from .newton import Corrected, correct, first_guess, restore
+from .nlp import Ipopt, NLPResult
+from .problem import EquilibriumProblem
+from .stability import Stability, StabilityTest
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Prepared"]
+
+SOLVED = 1e-9
+"""Relative residual after the last Newton steps that is taken for an equilibrium; usual are 1e-13 to 1e-16."""
+
+ESCAPES = 8
+"""Unstable equilibria that are left in a row before giving up."""
+
+
+class Prepared:
+    """Solvers of one model; each is made when it is first needed."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    @functools.cached_property
+    def equations(self) -> Equations:
+        """The stationarity equations in rotations."""
+        return Equations(self.model)
+
+    @functools.cached_property
+    def _test(self) -> StabilityTest:
+        return StabilityTest(self.equations)
+
+    @functools.cached_property
+    def _problem(self) -> EquilibriumProblem:
+        loading = self.model.loading(1.0)
+        return EquilibriumProblem(self.model, loading, self.equations.start(loading))
+
+    def _ipopt(self, scale: float) -> Callable[..., NLPResult]:
+        return self._solvers(10.0 ** round(np.log10(scale)))
+
+    @functools.lru_cache(maxsize=8)  # noqa: B019 - lives as long as the model
+    def _solvers(self, scale: float) -> Callable[..., NLPResult]:
+        return Ipopt(objective_scale=1.0 / scale).prepare(self._problem.nlp)
+
+    def guess(self, loading: Loading) -> tuple[State, float]:
+        """A state to start from, and the gap of its closings."""
+        return first_guess(self.equations, loading, self._test.weight)
+
+    def correct(self, state: State, loading: Loading, **limits: float) -> Corrected:
+        """Newton's method from a near state."""
+        return correct(self.equations, state, loading, self._test.weight, **limits)
+
+    def stability(self, found: Corrected) -> Stability:
+        """The stability test at a state."""
+        return self._test.test(found.point)
+
+    def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
+        """IPOPT from a state, then Newton's method to rounding; the equilibrium and IPOPT's iterations.
+
+        Raises
+        ------
+        SolveError
+            No equilibrium: what IPOPT says of it.
+        """
+        problem = self._problem
+        scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
+        result = self._ipopt(scale)(
+            p=problem.parameters(loading), guess=problem.unknowns(state), lam=problem.multipliers(state) / scale
+        )
+        found = problem.state(result.x, result.lam, loading)
+        if not np.all(np.isfinite(found.q)):
+            raise SolveError(Status.FAILED, result.message, state)
+        polished = self.correct(found, loading)
+        if not polished.converged and polished.residual > SOLVED:
+            status = result.status if result.status is not Status.SOLVED else Status.FAILED
+            raise SolveError(status, f"IPOPT: {result.message}, {result.iterations} iterations", found)
+        return polished, result.iterations
+
+    def leave(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:
+        """Leave an unstable equilibrium along its escape shape to a stable or neutral one.
+
+        Raises
+        ------
+        SolveError
+            None was found.
+        """
+        amplitude = 0.2
+        for _ in range(ESCAPES):
+            try:
+                found, _ = self.minimise(loading, self._nudged(state, stability, loading, amplitude))
+            except SolveError:
+                amplitude *= 1.7
+                continue
+            there = self.stability(found)
+            if there.negative == 0:
+                return found, there
+            same = np.abs(found.state.q - state.q).max() < 1e-6
+            amplitude = 1.7 * amplitude if same else 0.2
+            state, stability = found.state, there
+        raise SolveError(Status.FAILED, "no stable equilibrium found along the escape shapes", state)
+
+    def _nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
+        """The state moved along the escape shape to the side of lower energy, closings restored."""
+        equations = self.equations
+        sides = []
+        for sign in (1.0, -1.0):
+            step = np.zeros(equations.total)
+            step[: equations.turning_unknowns] = sign * amplitude * stability.shape
+            moved = replace(equations.moved(state, step), lam=state.lam)
+            if equations.rows:
+                moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
+            sides.append((equations.at(moved, loading).potential, moved))
+        # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
+        (up, first), (down, second) = sides
+        return second if up - down > 1e-9 * max(abs(up), abs(down)) else first
+
+    def distance(self, a: State, b: State) -> float:
+        """Largest angle between the rotations of two states, rad."""
+        if not self.model.space:
+            return float(np.abs(a.q - b.q).max(initial=0.0))
+        relative = quaternion.multiply(quaternion.conjugate(a.q), b.q)
+        sine = np.linalg.norm(relative[:, 1:], axis=-1)
+        return float(2.0 * np.arctan2(sine, np.abs(relative[:, 0])).max(initial=0.0))

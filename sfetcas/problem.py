@@ -1,0 +1,345 @@
+"""The equilibrium of a model as a nonlinear program that a user can extend.
+
+Unknowns are the components of the quaternions (angles in the plane) of all rotations that are not held, and the
+displacements kept as unknowns; rows are the norms of the quaternions, the closings and the hinges.  Each element
+function is derived once for its type, mapped over the elements and scattered by constant matrices, so the
+effort of building does not grow with the number of elements.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from . import interpolation
+from .equations import State
+from .joints import hinge_rows
+from .kernels import compiled_where_it_pays
+from .model import Loading, Model, Turn
+from .nlp import NLP
+from .quaternion import turned
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["EquilibriumProblem", "equilibrium_nlp"]
+
+
+def _matrix(rows: Array, columns: Array, values: Array, shape: tuple[int, int]) -> ca.DM:
+    """Constant sparse matrix; entries at the same place are added."""
+    rows, columns, values = (np.asarray(a).ravel() for a in (rows, columns, values))
+    keep = values != 0.0
+    rows, columns, values = rows[keep], columns[keep], values[keep]
+    place, inverse = np.unique(columns.astype(np.int64) * shape[0] + rows, return_inverse=True)
+    summed = np.bincount(inverse, weights=values, minlength=len(place))
+    pointers = np.searchsorted(place // shape[0], np.arange(shape[1] + 1)).tolist()
+    return ca.DM(ca.Sparsity(shape[0], shape[1], pointers, (place % shape[0]).tolist()), summed)
+
+
+@dataclass(frozen=True)
+class _Reduction:
+    """Components of all rotations as held values plus a constant matrix times the unknowns.
+
+    ``index`` and ``weight`` (rotations * components, 2) give the at most two unknowns of each component: in
+    space a rotation about a held axis is ``(c, s axis)`` with two unknowns.
+    """
+
+    index: Array
+    weight: Array
+    unknowns: int
+    first: Array
+
+
+def _reduction(model: Model) -> _Reduction:
+    components, widths = model.element.components, model.widths
+    first = np.cumsum(widths) - widths
+    index = np.zeros((len(widths), components, 2), dtype=np.intp)
+    weight = np.zeros((len(widths), components, 2))
+    free = np.flatnonzero(widths == components)
+    for c in range(components):
+        index[free, c, 0], weight[free, c, 0] = first[free] + c, 1.0
+    for i in np.flatnonzero((model.kind == Turn.AXIS) & (widths == 2)):
+        index[i, 0, 0], weight[i, 0, 0] = first[i], 1.0
+        index[i, 1:, 0], weight[i, 1:, 0] = first[i] + 1, model.axis[i]
+    return _Reduction(index.reshape(-1, 2), weight.reshape(-1, 2), int(widths.sum()), first)
+
+
+class EquilibriumProblem:
+    """The nonlinear program of a model, with the means to write terms by the names of the scene.
+
+    Attributes
+    ----------
+    nlp : NLP
+        The program at load factor 1; its objective is the potential energy over ``model.scales.moment``.
+    """
+
+    def __init__(self, model: Model, loading: Loading, guess: State) -> None:
+        self.model = model
+        self._reduction = _reduction(model)
+        self._symbols()
+        self.nlp = NLP(
+            x=self.x,
+            p=self.p,
+            f=self._objective(),
+            g=ca.vertcat(self._norms(), self._closings(), self._hinges()),
+            lower=np.zeros(len(self.row_names)),
+            upper=np.zeros(len(self.row_names)),
+            x_lower=np.full(self.x.numel(), -np.inf),
+            x_upper=np.full(self.x.numel(), np.inf),
+            guess=self.unknowns(guess),
+            p_value=self.parameters(loading),
+            rows=self.row_names,
+            gradient=self._gradient(),
+            jacobian=self._jacobian(),
+            hessian=self._hessian,
+        )
+
+    # -- symbols --------------------------------------------------------------------------------
+
+    def _symbols(self) -> None:
+        model, element, positions = self.model, self.model.element, self.model.positions
+        n, points = model.weight.shape
+        turning = self._reduction.unknowns
+        self.x = ca.MX.sym("x", turning + positions.Y.shape[1])
+        sizes = (n * points * element.axes, len(model.kind) * element.components, len(positions.rows))
+        sizes = (*sizes, self.x.numel(), positions.B.shape[0])
+        self.p = ca.MX.sym("p", sum(sizes))
+        pull, held, offset, force, shift = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
+        self._pull = ca.reshape(pull, element.axes, n * points)
+        self._offset, self._force, self._shift = offset, force, shift
+        index, weight = self._reduction.index, self._reduction.weight
+        rows = np.broadcast_to(np.arange(len(index))[:, None], index.shape)
+        self._spread = _matrix(rows, index, weight, (len(index), self.x.numel()))
+        self._q = held + ca.mtimes(self._spread, self.x)
+        components = element.components
+        of_elements = (model.turns.ravel()[:, None] * components + np.arange(components)).ravel()
+        self._cells = of_elements
+        self._q_elements = ca.reshape(self._q[of_elements.tolist()], components, n * points)
+        self._stiffness = ca.MX(ca.DM(model.stiffness.reshape(n * points, -1).T))
+        self._tangent = ca.MX(ca.DM(model.tangent.reshape(n * points, -1).T))
+        norms = [f"norm of rotation {i}" for i in self._unit]
+        hinges = [f"hinge {i}, {c}" for i in range(len(model.hinges)) for c in "ab"]
+        self.row_names = (*norms, *positions.rows, *hinges)
+
+    @functools.cached_property
+    def _unit(self) -> list[int]:
+        """Rotations with a norm to hold."""
+        return np.flatnonzero(self.model.widths >= 2).tolist() if self.model.space else []
+
+    @functools.cached_property
+    def _norm_parts(self) -> tuple[Array, Array]:
+        """Row and unknown of each component in the norms."""
+        widths, first = self.model.widths, self._reduction.first
+        pairs = [(r, first[i] + c) for r, i in enumerate(self._unit) for c in range(widths[i])]
+        rows, columns = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+        return rows, columns
+
+    def _map(self, name: str, calls: float = 12.0) -> ca.Function:
+        n = len(self.model.turns)
+        return compiled_where_it_pays(getattr(self.model.element, name), calls * n).map(n)
+
+    @property
+    def _data(self) -> tuple[ca.MX, ca.MX, ca.MX]:
+        return self._stiffness, self._tangent, self._pull
+
+    # -- functions and first derivatives ---------------------------------------------------------
+
+    def _objective(self) -> ca.MX:
+        energy = self._map("energy")(self._q_elements, *self._data)
+        return ca.sum2(energy) - ca.dot(self._force, self.x)
+
+    @functools.cached_property
+    def _collect(self) -> ca.DM:
+        """Takes derivatives by the components at the nodes of the elements to derivatives by the unknowns."""
+        index, weight = self._reduction.index[self._cells], self._reduction.weight[self._cells]
+        columns = np.broadcast_to(np.arange(len(index))[:, None], index.shape)
+        return _matrix(index, columns, weight, (self.x.numel(), len(index)))
+
+    def _gradient(self) -> ca.MX:
+        gradient = self._map("gradient")(self._q_elements, *self._data)[1]
+        return ca.densify(ca.mtimes(self._collect, ca.vec(gradient)) - self._force)
+
+    @functools.cached_property
+    def _to_rows(self) -> ca.DM:
+        """Takes the reaches of the elements to the closing rows."""
+        model, axes = self.model, self.model.element.axes
+        z = model.positions.Z.reshape(len(model.positions.rows), len(model.members), axes)[:, model.owner]
+        row, element, axis = np.nonzero(z)
+        return _matrix(row, element * axes + axis, z[row, element, axis], (z.shape[0], z.shape[1] * axes))
+
+    def _closings(self) -> ca.MX:
+        if not self.model.positions.rows:
+            return ca.MX(0, 1)
+        reach = self._map("reach")(self._q_elements, self._tangent)
+        turning = self._reduction.unknowns
+        kept = ca.mtimes(ca.DM(self.model.positions.W), self.x[turning:])
+        return ca.mtimes(self._to_rows, ca.vec(reach)) + kept + self._offset
+
+    def _norms(self) -> ca.MX:
+        rows, columns = self._norm_parts
+        adder = _matrix(rows, columns, np.ones(len(rows)), (len(self._unit), self.x.numel()))
+        return ca.mtimes(adder, self.x**2) - 1.0 if self._unit else ca.MX(0, 1)
+
+    @functools.cached_property
+    def _hinge(self) -> ca.Function:
+        q, normals, lam = ca.SX.sym("q", 8), ca.SX.sym("normals", 3, 2), ca.SX.sym("lam", 2)
+        rows = hinge_rows(ca.vertsplit(q[:4]), ca.vertsplit(q[4:]), normals)
+        jacobian, hessian = ca.jacobian(rows, q), ca.hessian(ca.dot(lam, rows), q)[0]
+        outputs = [rows, ca.densify(jacobian), ca.densify(hessian)]
+        return ca.Function("hinge_row", [q, normals, lam], outputs).map(len(self.model.hinges))
+
+    @functools.cached_property
+    def _hinge_cells(self) -> Array:
+        return np.asarray((self.model.hinges[:, :, None] * 4 + np.arange(4)).reshape(len(self.model.hinges), 8))
+
+    def _hinge_call(self, lam: ca.MX | None = None) -> list[ca.MX]:
+        n = len(self.model.hinges)
+        q = ca.reshape(self._q[self._hinge_cells.ravel().tolist()], 8, n)
+        normals = ca.MX(ca.DM(self.model.hinge_axes.reshape(2 * n, 3).T))
+        result: list[ca.MX] = self._hinge(q, normals, ca.MX.zeros(2, n) if lam is None else ca.reshape(lam, 2, n))
+        return result
+
+    def _hinges(self) -> ca.MX:
+        return ca.vec(self._hinge_call()[0]) if len(self.model.hinges) else ca.MX(0, 1)
+
+    def _scattered(self, parts: list[tuple[Array, Array, Array, ca.MX]], shape: tuple[int, int]) -> ca.MX:
+        """Sparse matrix from (row, column, weight, values) with several entries (…, k) for each value."""
+        places = np.concatenate([(c.astype(np.int64) * shape[0] + r).ravel() for r, c, _, _ in parts])
+        weights = np.concatenate([w.ravel() for _, _, w, _ in parts])
+        sources, offset = [], 0
+        for r, _, _, values in parts:
+            count = values.numel()
+            sources.append(offset + np.repeat(np.arange(count), r.size // max(count, 1)))
+            offset += count
+        source = np.concatenate(sources)
+        keep = weights != 0.0
+        unique, inverse = np.unique(places[keep], return_inverse=True)
+        adder = _matrix(inverse, source[keep], weights[keep], (len(unique), offset))
+        pointers = np.searchsorted(unique // shape[0], np.arange(shape[1] + 1)).tolist()
+        sparsity = ca.Sparsity(shape[0], shape[1], pointers, (unique % shape[0]).tolist())
+        return ca.MX(sparsity, ca.mtimes(adder, ca.vertcat(*[ca.vec(v) for _, _, _, v in parts])))
+
+    def _jacobian(self) -> ca.MX:
+        model, positions = self.model, self.model.positions
+        blocks, width = [], self.x.numel()
+        if self._unit:
+            rows, columns = self._norm_parts
+            norm = [(rows, columns, np.full(len(rows), 2.0), self.x[columns.tolist()])]
+            blocks.append(self._scattered(norm, (len(self._unit), width)))
+        if positions.rows:
+            blocks.append(self._closing_jacobian())
+        if len(model.hinges):
+            jacobian = self._hinge_call()[1]
+            cells, n = self._hinge_cells, len(model.hinges)
+            labels = np.arange(2 * n).reshape(n, 1, 2, 1)
+            index, weight = self._reduction.index[cells], self._reduction.weight[cells]
+            shape = (n, 8, 2, 2)
+            r = np.broadcast_to(labels, shape)
+            c, w = (np.broadcast_to(a[:, :, None, :], shape) for a in (index, weight))
+            blocks.append(self._scattered([(r, c, w, jacobian)], (2 * n, width)))
+        return ca.vertcat(*blocks) if blocks else ca.MX(0, width)
+
+    def _closing_jacobian(self) -> ca.MX:
+        model, positions = self.model, self.model.positions
+        axes, turning = model.element.axes, self._reduction.unknowns
+        jacobian = self._map("reach_jacobian")(self._q_elements, self._tangent)[1]
+        n, width = model.turns.shape[0], model.turns.shape[1] * model.element.components
+        cells = self._cells.reshape(n, width)
+        index, weight = self._reduction.index[cells], self._reduction.weight[cells]
+        z = positions.Z.reshape(len(positions.rows), len(model.members), axes)
+        most = max(1, int((z != 0.0).sum(axis=0).max()))
+        # Each reach component goes to at most `most` rows: padded lists of rows and weights.
+        order = np.argsort(z == 0.0, axis=0, kind="stable")[:most]
+        value = np.take_along_axis(z, order, axis=0)
+        rows, values = order.transpose(1, 2, 0)[model.owner], value.transpose(1, 2, 0)[model.owner]
+        shape = (n, width, axes, most, 2)
+        r = np.broadcast_to(rows[:, None, :, :, None], shape)
+        c = np.broadcast_to(index[:, :, None, None, :], shape)
+        w = values[:, None, :, :, None] * weight[:, :, None, None, :]
+        parts = [(r, c, w, jacobian)]
+        kept_row, kept = np.nonzero(positions.W)
+        if len(kept_row):
+            values_w = positions.W[kept_row, kept]
+            parts.append((kept_row, turning + kept, values_w, ca.MX.ones(len(kept_row))))
+        return self._scattered(parts, (len(positions.rows), self.x.numel()))
+
+    def _hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
+        model, element = self.model, self.model.element
+        n, points = model.weight.shape
+        norms, closings = len(self._unit), len(model.positions.rows)
+        pull = lam_f * self._pull
+        if closings:
+            constant = ca.mtimes(self._to_rows.T, lam_g[norms : norms + closings])
+            spread = np.repeat(np.arange(n), points)
+            pull += ca.reshape(constant, element.axes, n)[:, spread.tolist()]
+        hessian = self._map("hessian")(self._q_elements, lam_f * self._stiffness, self._tangent, pull)
+        parts = [(*self._pairs(self._cells.reshape(n, -1)), hessian)]
+        if norms:
+            rows, columns = self._norm_parts
+            parts.append((columns, columns, np.full(len(rows), 2.0), lam_g[rows.tolist()]))
+        if len(model.hinges):
+            own = self._hinge_call(lam_g[norms + closings :])[2]
+            parts.append((*self._pairs(self._hinge_cells), own))
+        return self._scattered(parts, (self.x.numel(), self.x.numel()))
+
+    def _pairs(self, cells: Array) -> tuple[Array, Array, Array]:
+        """Rows, columns and weights of dense symmetric blocks over the unknowns behind their cells."""
+        index, weight = self._reduction.index[cells], self._reduction.weight[cells]
+        n, width = cells.shape
+        # Rotations about a held axis are the only ones with a second unknown a component.
+        used = 2 if (weight[..., 1] != 0.0).any() else 1
+        index, weight = index[..., :used], weight[..., :used]
+        shape = (n, width, width, used, used)
+        r = np.broadcast_to(index[:, None, :, :, None], shape)
+        c = np.broadcast_to(index[:, :, None, None, :], shape)
+        return r, c, weight[:, None, :, :, None] * weight[:, :, None, None, :]
+
+    # -- numbers --------------------------------------------------------------------------------
+
+    def parameters(self, loading: Loading) -> Array:
+        """Values of the parameters for a loading."""
+        model, positions = self.model, self.model.positions
+        held = np.where((model.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
+        rest = np.zeros((len(model.members), model.element.axes))
+        np.add.at(rest, model.owner, model.tangent.sum(axis=1))
+        offset = positions.BZ @ loading.shift - positions.Z @ rest.ravel()
+        constant = -(positions.E.T @ loading.force.ravel()).reshape(rest.shape)
+        pull = loading.pull + constant[model.owner][:, None, :]
+        force = np.zeros(self.x.numel())
+        if not model.space:
+            free = np.flatnonzero(model.widths)
+            force[self._reduction.first[free]] = loading.couple[free]
+        force[self._reduction.unknowns :] = positions.Y.T @ loading.force.ravel()
+        return np.concatenate([pull.ravel(), held.ravel(), offset, force, positions.B @ loading.shift])
+
+    def unknowns(self, state: State) -> Array:
+        """The unknowns of the program at a state."""
+        q = state.q.ravel()
+        x = np.zeros(self.x.numel())
+        index, weight = self._reduction.index, self._reduction.weight
+        np.add.at(x, index.ravel(), (weight * q[:, None]).ravel())
+        x[self._reduction.unknowns :] = state.y
+        return x
+
+    def state(self, x: Array, lam: Array, loading: Loading) -> State:
+        """The state of a solution; quaternions are made exactly unit."""
+        model = self.model
+        held = np.where((model.kind == Turn.HELD)[:, None], model.held(loading), 0.0).ravel()
+        weight, index = self._reduction.weight, self._reduction.index
+        q = (held + (weight * x[index]).sum(axis=1)).reshape(len(model.kind), -1)
+        if model.space:
+            q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+        rows = self.rows_of_equations
+        return State(q, x[self._reduction.unknowns :].copy(), lam[rows])
+
+    @property
+    def rows_of_equations(self) -> slice:
+        """The rows that are also rows of the stationarity equations: closings and hinges."""
+        return slice(len(self._unit), len(self.row_names))
+
+    def multipliers(self, state: State) -> Array:
+        """Multipliers of all rows at a state, those of the norms zero."""
+        return np.concatenate([np.zeros(len(self._unit)), state.lam])

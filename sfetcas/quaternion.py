@@ -1,0 +1,88 @@
+"""Unit quaternions (Euler-Rodrigues parameters), scalar first.
+
+A unit quaternion ``q = (q0, q1, q2, q3)`` turns a vector ``v`` into ``R(q) v``; ``q`` and ``-q`` are the
+same rotation; ``multiply(a, b)`` turns by ``b`` first.  Every function takes NumPy arrays whose last axis
+holds the components; :func:`product` and :func:`turned` also take lists of CasADi scalars, so that the
+formulas stand once.
+
+Source: Barraco and Munteanu, A special finite element ..., Part 1, section 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = [
+    "angle_about",
+    "conjugate",
+    "from_rotation_vector",
+    "matrix",
+    "multiply",
+    "product",
+    "rotate",
+    "turned",
+]
+
+
+def product(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    """Hamilton product ``a b`` of two quaternions given as four components each."""
+    return [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+
+
+def turned(q: Sequence[Any], v: Sequence[Any]) -> list[Any]:
+    """``R(q) v`` with ``R`` homogeneous of degree two in ``q``: exact for ``|q| = 1``, ``|q|^2 R v`` else."""
+    pure = product(q, [0.0, *v])
+    return product(pure, [q[0], -q[1], -q[2], -q[3]])[1:]
+
+
+def _components(a: ArrayLike) -> list[Array]:
+    return list(np.moveaxis(np.asarray(a, dtype=float), -1, 0))
+
+
+def multiply(a: ArrayLike, b: ArrayLike) -> Array:
+    """Product of quaternion arrays of shape (..., 4), broadcast against each other."""
+    return np.stack(np.broadcast_arrays(*product(_components(a), _components(b))), axis=-1)
+
+
+def conjugate(q: ArrayLike) -> Array:
+    """The inverse rotation, shape (..., 4)."""
+    return np.asarray(q, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotate(q: ArrayLike, v: ArrayLike) -> Array:
+    """``R(q) v`` for arrays of shape (..., 4) and (..., 3)."""
+    return np.stack(np.broadcast_arrays(*turned(_components(q), _components(v))), axis=-1)
+
+
+def matrix(q: ArrayLike) -> Array:
+    """Rotation matrices, shape (..., 3, 3); the columns are the turned unit vectors."""
+    q = np.asarray(q, dtype=float)
+    return np.stack([rotate(q, axis) for axis in np.eye(3)], axis=-1)
+
+
+def from_rotation_vector(phi: ArrayLike) -> Array:
+    """``(cos |phi|/2, sin |phi|/2 phi/|phi|)`` for rotation vectors (..., 3) in rad.
+
+    The sign is kept for more than half a turn, so that a field of quaternions built from a continuous field
+    of rotation vectors is continuous.
+    """
+    phi = np.asarray(phi, dtype=float)
+    half = 0.5 * np.linalg.norm(phi, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), 0.5 * phi * np.sinc(half / np.pi)], axis=-1)
+
+
+def angle_about(q: ArrayLike, axis: ArrayLike) -> Array:
+    """Angle in (-2 pi, 2 pi] of the part of ``q`` that turns about the unit vector ``axis``."""
+    q = np.asarray(q, dtype=float)
+    return np.asarray(2.0 * np.arctan2(q[..., 1:] @ np.asarray(axis, dtype=float), q[..., 0]))

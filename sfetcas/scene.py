@@ -1,0 +1,297 @@
+"""The scene: what the user says, as frozen records that are checked when they are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
+
+from .dimension import out_of_plane
+from .errors import SceneError
+from .later import SPACE_MOMENT, Staged, refusal
+from .loads import History, Load, Motion
+from .records import Fraction, Named, Number, Numbers, Vector, number, say, unknown
+from .sections import CrossSection
+from .shapes import CenterLine, place
+from .structure import Member, Node, hinged
+from .supports import check_floating, check_motion, check_motions_once
+
+__all__ = ["Analysis", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene"]
+
+
+def _accuracy(value: float) -> float:
+    if not 0.0 < value <= 0.1:
+        raise ValueError(f"found {value:g}, accepted: a number above 0 and up to 0.1")
+    return value
+
+
+def _tolerance(value: float) -> float:
+    if value < 0.0:
+        raise ValueError(f"found {value:g}, accepted: zero or a number above zero")
+    return value
+
+
+def _expected(value: Any) -> Any:
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, (list, tuple)) and value:
+        return tuple(_expected(entry) for entry in value)
+    if not isinstance(value, (bool, str)):
+        number(value)
+    return value
+
+
+class Analysis(Staged):
+    """What is asked for.
+
+    Parameters
+    ----------
+    type : static
+    accuracy : wanted error of the positions relative to the size of the scene, up to 0.1
+    steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
+    unstable : leave an unstable equilibrium for a stable one, or stay there
+    equilibria : one, to which the loads lead when they grow together from zero
+    """
+
+    type: Literal["static"] = "static"
+    accuracy: Annotated[Number, AfterValidator(_accuracy)] = 1e-4
+    steps: Numbers = (1.0,)
+    unstable: Literal["leave", "stay"] = "leave"
+    equilibria: Literal["one"] = "one"
+
+
+class Expect(Staged):
+    """What the literature or an independent method says about one quantity of one answer.
+
+    Parameters
+    ----------
+    quantity : place in the answer, as ``nodes.B.position``
+    value : number, nested list of numbers, true, false or a text, in the unit of the quantity
+    tolerance : largest accepted absolute difference; may be left out for what is met exactly
+    why : reason for the tolerance
+    source : where the value is from
+    at : fraction of the length of a member
+    step : factor of the answer; left out: the last step
+    """
+
+    quantity: str
+    value: Annotated[Any, BeforeValidator(_expected)]
+    tolerance: Annotated[Number, AfterValidator(_tolerance)] | None = None
+    why: str = ""
+    source: str = ""
+    at: Fraction | None = None
+    step: Number | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Expect:
+        if self.tolerance is None and isinstance(self.value, (float, tuple)):
+            raise SceneError(
+                "the key 'tolerance' is missing: only true, false, whole numbers and texts are met exactly"
+            )
+        return self
+
+
+class Scene(Staged):
+    """Flexible members between nodes, how they are held, loaded and moved, and what is asked for.
+
+    Parameters
+    ----------
+    title, source : free text
+    dimension : plane (x-y), space, or auto: plane where everything lies in x-y
+    gravity : (3,), m/s2, fixed axes
+    sections, nodes, members, loads, motions, histories : tables by name, read-only
+    analysis : what is asked for
+    expect : what is known about the answer
+
+    Raises
+    ------
+    SceneError
+        Anything that is not accepted: one sentence with its place.
+
+    Example
+    -------
+    >>> strip = CrossSection(EI3=1.0)
+    >>> nodes = {"A": Node(position=[0, 0], support="clamped"), "B": Node(position=[1, 0])}
+    >>> beam = Member(nodes=["A", "B"], section="strip")
+    >>> tip = Load(type="force", node="B", value=[0, 1])
+    >>> scene = Scene(sections={"strip": strip}, nodes=nodes, members={"beam": beam}, loads={"tip": tip})
+    >>> scene.resolved_dimension
+    'plane'
+    """
+
+    model_config = ConfigDict(validate_default=True)
+
+    title: str = ""
+    source: str = ""
+    dimension: Literal["auto", "plane", "space"] = "auto"
+    gravity: Vector | None = None
+    sections: Named[CrossSection] = Field(default_factory=dict)
+    nodes: Named[Node] = Field(default_factory=dict)
+    members: Named[Member] = Field(default_factory=dict)
+    loads: Named[Load] = Field(default_factory=dict)
+    motions: Named[Motion] = Field(default_factory=dict)
+    histories: Named[History] = Field(default_factory=dict)
+    analysis: Analysis = Analysis()
+    expect: tuple[Expect, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Scene:
+        for rule in _RULES:
+            rule(self)
+        return self
+
+    @cached_property
+    def center_lines(self) -> Mapping[str, CenterLine]:
+        """The unloaded centre line of each member, by name."""
+        lines = {}
+        for name, member in self.members.items():
+            start, end = (self.nodes[node].position for node in member.nodes)
+            lines[name] = place(member.shape, start, end, member.b2, ("members", name))
+        return MappingProxyType(lines)
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box of the undeformed members, m."""
+        samples = np.linspace(0.0, 1.0, 65)
+        points = np.vstack([line.positions(samples) for line in self.center_lines.values()])
+        return math.hypot(*np.ptp(points, axis=0))
+
+    @property
+    def resolved_dimension(self) -> Literal["plane", "space"]:
+        """How the scene is modelled: plane or space."""
+        return "plane" if self.dimension != "space" and self._out_of_plane is None else "space"
+
+    @property
+    def dimension_reason(self) -> str:
+        """Why the scene is modelled in the plane or in space."""
+        if self.dimension == "space":
+            return "dimension is set to 'space'"
+        if self._out_of_plane is None:
+            return "all positions, shapes, axes, loads and motions lie in x-y"
+        where, what = self._out_of_plane
+        return f"{'.'.join(where)} {what}"
+
+    @cached_property
+    def _out_of_plane(self) -> tuple[tuple[str, ...], str] | None:
+        parts = self.nodes, self.center_lines, self.loads, self.motions, self.gravity
+        return out_of_plane(*parts)
+
+
+def _check_members(scene: Scene) -> None:
+    if not scene.members:
+        raise SceneError("scene without members: a scene needs at least one member between two nodes")
+    for name, member in scene.members.items():
+        for node in member.nodes:
+            _known(node, scene.nodes, "nodes", "members", name, "nodes")
+        _known(member.section, scene.sections, "sections", "members", name, "section")
+    used = {node for member in scene.members.values() for node in member.nodes}
+    for name in scene.nodes:
+        if name not in used:
+            raise SceneError(
+                "node without member, accepted: a node where at least one member ends", ("nodes", name)
+            )
+
+
+def _check_driven(scene: Scene) -> None:
+    for name, load in scene.loads.items():
+        _known(load.node, scene.nodes, "nodes", "loads", name, "node")
+        _known(load.member, scene.members, "members", "loads", name, "member")
+        _known(load.history, scene.histories, "histories", "loads", name, "history")
+    for name, motion in scene.motions.items():
+        _known(motion.node, scene.nodes, "nodes", "motions", name, "node")
+        _known(motion.history, scene.histories, "histories", "motions", name, "history")
+    if not scene.loads and not scene.motions and scene.gravity is None:
+        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
+
+
+def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
+    if word is not None and word not in table:
+        raise SceneError(unknown(word, table, kind), where)
+
+
+def _check_axes(scene: Scene) -> None:
+    used = hinged(scene.nodes, scene.members)
+    for name, node in scene.nodes.items():
+        if node.axis != (0.0, 0.0, 1.0) and name not in used:
+            message = (
+                "neither the support nor the joint nor a member end released here is a hinge with this axis"
+            )
+            raise SceneError(message, ("nodes", name, "axis"))
+
+
+def _check_dimension(scene: Scene) -> None:
+    if scene.resolved_dimension == "space" and scene.dimension == "plane":
+        where = scene._out_of_plane[0] if scene._out_of_plane else ()
+        raise SceneError(f"dimension is set to 'plane', but {scene.dimension_reason}", where)
+
+
+def _check_sections(scene: Scene) -> None:
+    for name, member in scene.members.items():
+        missing = list(scene.sections[member.section].missing(_needed(scene, name)))
+        if missing:
+            why = f"members.{name} needs it in {scene.resolved_dimension} ({scene.dimension_reason})"
+            if missing[0] == "rhoA":
+                why = "gravity acts on the mass per length"
+            raise SceneError(f"the key {missing[0]!r} is missing: {why}", ("sections", member.section))
+
+
+def _needed(scene: Scene, member: str) -> tuple[str, ...]:
+    in_plane = ("EI3",) if scene.center_lines[member].bending_axis == 3 else ("EI2",)
+    stiffness = in_plane if scene.resolved_dimension == "plane" else ("EI2", "EI3", "GJ")
+    return stiffness if scene.gravity is None else (*stiffness, "rhoA")
+
+
+def _check_moments(scene: Scene) -> None:
+    for name, load in scene.loads.items():
+        if load.type != "moment":
+            continue
+        if load.node is not None and (joint := scene.nodes[load.node].joint) != "rigid":
+            message = f"node {load.node!r} has no rotation of its own for a moment, as its joint is a {joint}"
+            raise SceneError(message, ("loads", name, "node"))
+        later = refusal(SPACE_MOMENT)
+        if later and scene.resolved_dimension == "space":
+            raise SceneError(
+                f"{later}; the scene is in space as {scene.dimension_reason}", ("loads", name, "type")
+            )
+
+
+def _check_motions(scene: Scene) -> None:
+    reason = f"the scene is in space ({scene.dimension_reason})"
+    for name, motion in scene.motions.items():
+        try:
+            check_motion(motion, scene.nodes[motion.node], scene.resolved_dimension, reason)
+        except SceneError as error:
+            raise error.within("motions", name) from None
+    check_motions_once(scene.motions)
+
+
+def _check_supports(scene: Scene) -> None:
+    check_floating(scene.nodes, scene.members, scene.motions, scene.resolved_dimension)
+
+
+def _check_expect(scene: Scene) -> None:
+    tables = {"nodes": scene.nodes, "reactions": scene.nodes, "members": scene.members}
+    for i, expect in enumerate(scene.expect):
+        kind, _, rest = expect.quantity.partition(".")
+        if kind in tables:
+            _known(rest.partition(".")[0], tables[kind], kind, "expect", str(i), "quantity")
+        if expect.step is not None and not any(math.isclose(expect.step, f) for f in scene.analysis.steps):
+            accepted = f"a factor of analysis.steps, {say(scene.analysis.steps)}"
+            raise SceneError(f"found {expect.step:g}, accepted: {accepted}", ("expect", str(i), "step"))
+
+
+_RULES: tuple[Callable[[Scene], None], ...] = (
+    _check_members,
+    _check_driven,
+    _check_axes,
+    _check_dimension,
+    _check_sections,
+    _check_moments,
+    _check_motions,
+    _check_supports,
+    _check_expect,
+)

@@ -1,0 +1,247 @@
+"""Equilibria by name: positions, reactions, section forces, energies and the certificate."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import quaternion
+from .equations import Equations, Point, State
+from .errors import SceneError, Status
+from .fields import Fields
+from .model import Loading, Model
+from .records import nearest
+from .stability import Stability
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Certificate", "Equilibrium", "Solution"]
+
+MOST_PLACES = 400
+"""Places listed along a member at most; with more elements only their ends, thinned out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What proves an answer, all recomputed from the state and not taken from a solver.
+
+    Attributes
+    ----------
+    residual : float
+        Largest out-of-balance force or moment over the largest that was added up, or gap over the length scale.
+    stable : bool or "neutral"
+        Inertia of the energy on the closings.
+    negative : int
+        Its negative eigenvalues.
+    smallest : float
+        Its smallest eigenvalue, N: second variation by a rotation field over the integral of its square.
+    error_estimate : float or None
+        Estimated discretisation error of the positions over the size of the scene.
+    escape : mapping
+        Escape shape by member: rotations about the fixed axes, largest 1, at the places of ``Equilibrium.places``.
+    """
+
+    residual: float
+    stable: bool | str
+    negative: int
+    smallest: float
+    error_estimate: float | None
+    escape: Mapping[str, Array] = field(repr=False, default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the JSON answer."""
+        smallest = self.smallest if np.isfinite(self.smallest) else None
+        answer = {"residual": self.residual, "stable": self.stable, "negative": self.negative, "smallest": smallest}
+        return {**answer, "error_estimate": self.error_estimate}
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """One equilibrium, made by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
+
+    Attributes
+    ----------
+    factor : float
+        Factor of the loads and motions.
+    model : Model
+        Discretisation that the answer is on.
+    state, loading
+        Unknowns and loads, dimensionless.
+    certificate : Certificate
+    notes : tuple of str
+        What a reader should know: an unstable state that was left, reactions that are not unique.
+    iterations : int
+        Iterations of IPOPT.
+    """
+
+    factor: float
+    model: Model
+    state: State
+    loading: Loading
+    certificate: Certificate
+    notes: tuple[str, ...]
+    iterations: int
+    strain: float
+    potential: float
+    fields: Fields = field(repr=False)
+
+    def position(self, node: str) -> Array:
+        """Position of a node, (3,) m."""
+        return self.fields.position(self._known(node, self.model.nodes, "node"))
+
+    def quaternion(self, node: str) -> Array | None:
+        """Rotation of a node since the undeformed scene, (4,); None where it has no rotation of its own."""
+        rotation = self.fields.rotation(self._known(node, self.model.nodes, "node"))
+        return None if rotation is None else self._as_quaternions(rotation[None, :])[0]
+
+    def angle(self, node: str) -> float | None:
+        """Rotation about z since the undeformed scene, rad, counting turns; in the plane only."""
+        rotation = self.fields.rotation(self._known(node, self.model.nodes, "node"))
+        return None if rotation is None or self.model.space else float(rotation[0])
+
+    def reaction(self, node: str) -> tuple[Array, Array]:
+        """Force (3,) N and moment about the node (3,) N m that the ground exerts on the structure."""
+        if self.model.scene.nodes[self._known(node, self.model.nodes, "node")].support == "free":
+            raise SceneError(f"node {node!r} is free: no ground acts on it")
+        return self.fields.reaction(node)
+
+    def along(self, member: str, at: Any) -> dict[str, Array]:
+        """Fields of a member at fractions of its length, see :meth:`Fields.along`; quaternions added."""
+        found = self.fields.along(self._known(member, self.model.members, "member"), np.atleast_1d(at))
+        rotation = found.pop("rotation")
+        found["quaternion"] = self._as_quaternions(rotation)
+        if not self.model.space:
+            found["angle"] = rotation[:, 0]
+        return found
+
+    def places(self, member: str) -> Array:
+        """Fractions of the length that the answer lists: nodes of the elements, or fewer."""
+        places = self.model.along(member)
+        if len(places) > MOST_PLACES:
+            places = self.model.mesh.cuts[member]
+            places = places[np.unique(np.linspace(0, len(places) - 1, MOST_PLACES).round().astype(int))]
+        return places
+
+    @functools.cached_property
+    def energy(self) -> dict[str, float]:
+        """Elastic energy, potential of the loads, and their sum, N m; zero for the undeformed scene."""
+        unit = self.model.scales.moment
+        elastic, total = self.strain * unit, self.potential * unit
+        return {"elastic": elastic, "loads": total - elastic, "total": total}
+
+    def _as_quaternions(self, rotation: Array) -> Array:
+        if self.model.space:
+            return rotation
+        zero = np.zeros(len(rotation))
+        return quaternion.from_rotation_vector(np.stack([zero, zero, rotation[:, 0]], axis=-1))
+
+    @staticmethod
+    def _known(name: str, names: tuple[str, ...], kind: str) -> str:
+        if name not in names:
+            raise SceneError(f"found {kind} {name!r}; {nearest(name, names)}")
+        return name
+
+    def to_dict(self) -> dict[str, Any]:
+        """As an entry of ``steps`` in the JSON answer."""
+        scene = self.model.scene
+        nodes: dict[str, Any] = {}
+        for name in self.model.nodes:
+            entry: dict[str, Any] = {"position": self.position(name).tolist()}
+            turned = self.quaternion(name)
+            if turned is not None:
+                entry["quaternion"] = turned.tolist()
+                if not self.model.space:
+                    entry["angle"] = self.angle(name)
+            nodes[name] = entry
+        reactions = {}
+        for name, node in scene.nodes.items():
+            if node.support != "free":
+                force, moment = self.reaction(name)
+                reactions[name] = {"force": force.tolist(), "moment": moment.tolist()}
+        members = {}
+        for name in self.model.members:
+            places = self.places(name)
+            found = self.along(name, places)
+            members[name] = {"s": places.tolist(), **{key: value.tolist() for key, value in found.items()}}
+        answer: dict[str, Any] = {"factor": self.factor, "nodes": nodes, "reactions": reactions, "members": members}
+        answer |= {"energy": self.energy, "certificate": self.certificate.to_dict()}
+        return {**answer, "notes": list(self.notes)}
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The answer of a scene: one equilibrium a load factor.
+
+    Attributes
+    ----------
+    status : Status
+        SOLVED, or SHORT where an accuracy that was asked for is not reached on the mesh that was asked for.
+    steps : tuple of Equilibrium
+    seconds : dict
+        Time spent on models and on solving.
+    """
+
+    scene: Any
+    status: Status
+    steps: tuple[Equilibrium, ...]
+    seconds: Mapping[str, float]
+
+    @property
+    def last(self) -> Equilibrium:
+        """The equilibrium of the last factor."""
+        return self.steps[-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON answer."""
+        model = self.last.model
+        return {
+            "status": self.status.value,
+            "title": self.scene.title,
+            "dimension": model.dimension,
+            "unknowns": model.unknowns,
+            "seconds": dict(self.seconds),
+            "steps": [step.to_dict() for step in self.steps],
+        }
+
+
+def equilibrium(
+    equations: Equations,
+    state: State,
+    loading: Loading,
+    factor: float,
+    point: Point,
+    residual: float,
+    stability: Stability,
+    *,
+    error_estimate: float | None = None,
+    notes: tuple[str, ...] = (),
+    iterations: int = 0,
+) -> Equilibrium:
+    """Put an equilibrium together; dimensionless in, by name and in SI out."""
+    model = equations.model
+    turn = np.where(equations.number >= 0, stability.shape[equations.number], 0.0) if len(stability.shape) else None
+    escape = {} if turn is None else {name: turn[model.chain(name)] for name in model.members}
+    certificate = Certificate(
+        residual=residual,
+        stable=stability.stable,
+        negative=stability.negative,
+        smallest=stability.smallest * model.scales.force,
+        error_estimate=error_estimate,
+        escape=escape,
+    )
+    return Equilibrium(
+        factor=factor,
+        model=model,
+        state=state,
+        loading=loading,
+        certificate=certificate,
+        notes=notes,
+        iterations=iterations,
+        strain=point.strain,
+        potential=point.potential,
+        fields=Fields(equations, state, loading),
+    )

@@ -1,0 +1,207 @@
+"""Stability of an equilibrium: inertia of the energy on the closings, smallest eigenvalue, escape shape.
+
+With ``H`` the second derivative of the potential by rotations, ``A`` the derivative of the closings and ``M`` a
+diagonal weight, the eigenvalues of ``H x = mu M x`` on the null space of ``A`` decide: all above zero is a strict
+minimum, one below zero is a way out.  They are counted through Sylvester's law of inertia: the negative
+eigenvalues of ``H - sigma M`` less those of the Schur complement ``A (H - sigma M)^-1 A^T``.
+
+The weight of a rotation is its length times the smallest stiffness of its member over the square of the
+member's length, so that the eigenvalues are pure numbers whatever the units and however unlike the members are.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .equations import Equations, Point
+from .linear import SparseSolver
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Stability", "StabilityTest"]
+
+NEUTRAL = 1e-7
+"""Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
+
+ROUNDING = 1e-12
+"""The same, relative to the largest entry of the weighted matrix."""
+
+DENSE = 120
+"""Up to this many unknowns all eigenvalues by LAPACK are cheaper than factorisations (measured)."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Outcome of the test.
+
+    Attributes
+    ----------
+    stable : bool or "neutral"
+    negative : int
+        Eigenvalues below zero: independent ways out.
+    smallest : float
+        Rayleigh quotient of the escape shape by the integral of its square, dimensionless.
+    shape : ndarray
+        Escape shape: the turning unknowns of the smallest eigenvalue, largest entry 1.
+    """
+
+    stable: bool | str
+    negative: int
+    smallest: float
+    shape: Array
+
+
+class StabilityTest:
+    """The test for one model, prepared for repeated use."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.equations = equations
+        n = equations.turning_unknowns
+        self._n = n
+        self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
+        self._h_row, self._h_column = equations.row[self._in_h], equations.column[self._in_h]
+        self._in_a = np.flatnonzero((equations.row >= equations.unknowns) & (equations.column < n))
+        self._combine = _left_null_space(equations)
+        self._diagonal = np.flatnonzero(self._h_row == self._h_column)
+
+    @functools.cached_property
+    def weight(self) -> Array:
+        """The weight M of the module's docstring, (turning unknowns,)."""
+        model = self.equations.model
+        x = np.linspace(0.0, 1.0, 5)
+        stiffness = np.zeros(len(model.kind))
+        for name, member in model.scene.members.items():
+            line = model.scene.center_lines[name]
+            values = model.scene.sections[member.section].stiffness(x)
+            values = values if model.space else values[:, [1 if line.bending_axis == 2 else 2]]
+            relative = np.nanmin(values) / (model.scales.moment * model.scales.length)
+            turns = np.unique(model.turns[model.elements_of(name)])
+            stiffness[turns] = np.maximum(stiffness[turns], relative / (line.length / model.scales.length) ** 2)
+        number, weight = self.equations.number, np.zeros(self._n)
+        weight[number[number >= 0]] = np.broadcast_to(stiffness[:, None], number.shape)[number >= 0]
+        return weight * self.equations.mass
+
+    def _rows(self, point: Point) -> Array:
+        """The closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
+        equations = self.equations
+        rows = np.zeros((equations.rows, self._n))
+        places = equations.row[self._in_a] - equations.unknowns, equations.column[self._in_a]
+        rows[places] = point.entries[self._in_a]
+        return (self._combine.T @ rows) / np.sqrt(self.weight)
+
+    def _weighted(self, point: Point) -> Array:
+        root = np.sqrt(self.weight)
+        return np.asarray(point.entries[self._in_h] / (root[self._h_row] * root[self._h_column]))
+
+    def test(self, point: Point) -> Stability:
+        """Inertia, smallest eigenvalue and escape shape at an equilibrium."""
+        if self._n == 0:
+            return Stability(True, 0, np.inf, np.zeros(0))
+        entries, rows = self._weighted(point), self._rows(point)
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        find = self._dense if self._n <= DENSE else self._sparse
+        values, vector, negative = find(entries, rows, limit)
+        if not len(values):
+            return Stability(True, 0, np.inf, np.zeros(self._n))
+        stable: bool | str = values[0] > limit
+        if negative == 0 and not stable:
+            stable = "neutral"
+        shape = vector / np.sqrt(self.weight)
+        quotient = values[0] * float(vector @ vector) / float(shape @ (self.equations.mass * shape))
+        peak = shape[np.argmax(np.abs(shape))]
+        return Stability(stable, negative, quotient, shape / peak)
+
+    def _dense(self, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
+        h = np.zeros((self._n, self._n))
+        h[self._h_row, self._h_column] = entries
+        basis = np.eye(self._n)
+        if len(rows):
+            _, sizes, right = np.linalg.svd(rows)
+            rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+            basis = right[rank:].T
+        values, vectors = np.linalg.eigh(basis.T @ h @ basis)
+        if not len(values):
+            return values, np.zeros(self._n), 0
+        return values, basis @ vectors[:, 0], int((values < -limit).sum())
+
+    def _sparse(self, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
+        negative = self._below(entries, rows, -limit)
+        shift = -limit
+        while self._below(entries, rows, shift) > 0:
+            shift *= 8.0 if shift < -0.1 else 1000.0
+        values, vector = self._subspace(entries, rows, shift)
+        if negative == 0 and values[0] < -limit:
+            values[0] = -limit
+        return values, vector, negative
+
+    def _below(self, entries: Array, rows: Array, shift: float) -> int:
+        """Number of eigenvalues on the null space of the rows below the shift."""
+        shifted = entries.copy()
+        shifted[self._diagonal] -= shift
+        matrix = ca.DM(self._pattern, shifted)
+        self._ldl.sfact(matrix)
+        self._ldl.nfact(matrix)
+        count = int(self._ldl.neig(matrix))
+        if len(rows):
+            schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
+            values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
+            count -= int((values < -RANK * np.abs(values).max()).sum())
+        return count
+
+    @functools.cached_property
+    def _pattern(self) -> ca.Sparsity:
+        pointers = np.searchsorted(self._h_column, np.arange(self._n + 1)).tolist()
+        return ca.Sparsity(self._n, self._n, pointers, self._h_row.tolist())
+
+    @functools.cached_property
+    def _ldl(self) -> ca.Linsol:
+        return ca.Linsol("inertia", "ldl", self._pattern)
+
+    def _subspace(self, entries: Array, rows: Array, shift: float) -> tuple[Array, Array]:
+        """Smallest eigenvalues above the shift by inverse iteration of a small subspace."""
+        n, r = self._n, len(rows)
+        row, column = [self._h_row, *(np.nonzero(rows))], self._h_column
+        a_row, a_column = np.nonzero(rows)
+        row = np.concatenate([self._h_row, n + a_row, a_column, np.arange(n, n + r)])
+        column = np.concatenate([self._h_column, a_column, n + a_row, np.arange(n, n + r)])
+        shifted = entries.copy()
+        shifted[self._diagonal] -= shift
+        values = rows[a_row, a_column]
+        # A tiny negative diagonal keeps redundant rows from making the matrix singular.
+        all_values = np.concatenate([shifted, values, values, np.full(r, -1e-14)])
+        order = np.lexsort((row, column))
+        solver = SparseSolver(n + r, row[order], column[order])
+        solver.factor(all_values[order])
+        block = np.random.default_rng(0).standard_normal((n, 4))
+        smallest = np.array([np.inf])
+        for _ in range(60):
+            block = solver.solve(np.vstack([block, np.zeros((r, 4))]))[:n]
+            block = np.linalg.qr(block)[0]
+            product = np.zeros_like(block)
+            np.add.at(product, self._h_row, entries[:, None] * block[self._h_column])
+            new, turn = np.linalg.eigh(block.T @ product)
+            block = block @ turn
+            if abs(new[0] - smallest[0]) <= 1e-8 * max(abs(new[0]), abs(shift)):
+                return new, block[:, 0]
+            smallest = new
+        return smallest, block[:, 0]
+
+
+RANK = 1e-10
+"""Singular values below this, relative to the largest, are zero."""
+
+
+def _left_null_space(equations: Equations) -> Array:
+    """Combinations of the rows in which no displacement appears, (rows, combinations)."""
+    w = np.zeros((equations.rows, equations.displacement_unknowns))
+    w[: len(equations.model.positions.rows)] = equations.model.positions.W
+    if not w.shape[1]:
+        return np.eye(equations.rows)
+    left, sizes, _ = np.linalg.svd(w)
+    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+    return np.asarray(left[:, rank:])

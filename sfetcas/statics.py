@@ -1,0 +1,409 @@
+"""Static equilibria of a scene: from the undeformed state, in one go, to the accuracy asked for.
+
+1. A coarse *pilot* mesh: IPOPT from a start guess at the full load, then Newton's method to rounding.
+2. The branch is checked by following the loads from zero on the pilot (see :mod:`~sfetcas.continuation`), and
+   an unstable equilibrium is left along its escape shape.
+3. The mesh is refined where the solution is not smooth enough; Newton's method goes on from the coarser state.
+4. All elements are halved once more: the difference is the estimate of the error, the halved mesh the answer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from . import interpolation
+from .continuation import follow
+from .elements import ELEMENTS
+from .equations import State
+from .errors import SceneError, SolveError, Status
+from .fields import Fields, transferred
+from .mesh import Mesh, first_mesh, uniform_mesh
+from .model import Loading, assemble
+from .newton import Corrected
+from .prepared import Prepared
+from .scene import Scene
+from .solution import Equilibrium, Solution, equilibrium
+from .stability import Stability
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+__all__ = ["Settings", "solve", "solve_model"]
+
+FINE = 1e-8
+"""Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
+
+PILOT_ELEMENTS = 60
+"""A mesh that was asked for is its own pilot up to this many elements."""
+
+HUGE = 2000
+"""From this many elements on the error is estimated from the mesh with half the elements, not with twice."""
+
+LEVELS = 40
+"""Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
+
+MOST_ELEMENTS = 20_000
+"""A mesh that the library chooses does not grow beyond this."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to solve; everything has a default that suits.
+
+    Attributes
+    ----------
+    accuracy : float or None
+        Wanted error of the positions over the size of the scene; None takes that of the scene.
+    element, elements : str, int or None
+        Element of all members and number of elements of each; None takes those of the members, or chooses.
+    gauss : bool
+        Gauss integration with the norm divided out instead of integration at the nodes.
+    assembly : str
+        ``auto``, ``closing`` or ``nodal``.
+    branch : bool
+        Check the branch by following the loads from zero.
+    """
+
+    accuracy: float | None = None
+    element: str | None = None
+    elements: int | None = None
+    gauss: bool = False
+    assembly: Literal["auto", "closing", "nodal"] = "auto"
+    branch: bool = True
+
+    def __post_init__(self) -> None:
+        if self.accuracy is not None and not 0.0 < self.accuracy <= 0.1:
+            raise SceneError(f"accuracy: found {self.accuracy:g}, accepted: a number above 0 and up to 0.1")
+        if self.element is not None and self.element not in ELEMENTS:
+            raise SceneError(f"element: found {self.element!r}, accepted: {', '.join(ELEMENTS)}")
+        if self.elements is not None and not 1 <= self.elements <= 1_000_000:
+            raise SceneError(f"elements: found {self.elements}, accepted: 1 to 1000000")
+        if self.assembly not in ("auto", "closing", "nodal"):
+            raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
+
+
+def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = None) -> Equilibrium:
+    """One equilibrium of a prepared model: IPOPT from the start guess, or Newton's method from a near answer.
+
+    Parameters
+    ----------
+    model : Model or Prepared
+        Pass the same :class:`Prepared` for repeated solves: nothing is built again.
+    factor : float
+        Factor of loads and motions.
+    start : Equilibrium, optional
+        Answer of the same model for a near factor.
+
+    Raises
+    ------
+    SolveError
+        No equilibrium was found.
+    """
+    prepared = model if isinstance(model, Prepared) else Prepared(model)
+    loading = prepared.model.loading(factor)
+    found, iterations = _warm(prepared, start, loading) if start is not None else None, 0
+    if found is None:
+        found, iterations = _cold(prepared, loading)
+    return _finished(prepared, found, loading, factor, prepared.stability(found), iterations=iterations)
+
+
+def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected | None:
+    found = prepared.correct(start.state, loading, iterations=20, most=2.0)
+    return found if found.converged else None
+
+
+def _cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
+    state, gap = prepared.guess(loading)
+    if gap > 0.2:
+        raise SolveError(Status.INFEASIBLE, f"the closings miss by {gap * prepared.model.scales.length:.3g} m", state)
+    return prepared.minimise(loading, state)
+
+
+def _finished(
+    prepared: Prepared,
+    found: Corrected,
+    loading: Loading,
+    factor: float,
+    stability: Stability,
+    *,
+    estimate: float | None = None,
+    notes: tuple[str, ...] = (),
+    iterations: int = 0,
+) -> Equilibrium:
+    return equilibrium(
+        prepared.equations,
+        found.state,
+        loading,
+        factor,
+        found.point,
+        found.residual,
+        stability,
+        error_estimate=estimate,
+        notes=notes,
+        iterations=iterations,
+    )
+
+
+def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution:
+    """Equilibria of a scene for the load factors of its analysis.
+
+    Parameters
+    ----------
+    scene : Scene
+    settings : Settings, optional
+        Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
+
+    Raises
+    ------
+    SceneError
+        The scene asks for what cannot be modelled.
+    SolveError
+        A factor has no equilibrium that could be found; the sentence says why.
+
+    Example
+    -------
+    >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
+    >>> solve(scene).last.position("tip")                       # doctest: +SKIP
+    """
+    settings = replace(settings or Settings(), **changes)
+    return _Run(scene, settings).solution()
+
+
+@dataclass
+class _Found:
+    """An equilibrium on the way: where it stands and what was said about it."""
+
+    prepared: Prepared
+    corrected: Corrected
+    stability: Stability
+    notes: tuple[str, ...] = ()
+    iterations: int = 0
+
+
+class _Run:
+    """One run over the load factors of a scene."""
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self.scene, self.settings = scene, settings
+        self.accuracy = settings.accuracy or scene.analysis.accuracy
+        self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
+        self.seconds = {"model": 0.0, "solve": 0.0}
+        self.leave = scene.analysis.unstable == "leave"
+        self.started = any(node.start is not None for node in scene.nodes.values())
+        self._choose_meshes()
+
+    # -- meshes ---------------------------------------------------------------------------------
+
+    def _choose_meshes(self) -> None:
+        scene, settings = self.scene, self.settings
+        names = {m.element for m in scene.members.values() if m.element is not None}
+        if settings.element is not None:
+            names = {settings.element}
+        if len(names) > 1:
+            raise SceneError(f"members: found the elements {', '.join(sorted(names))}, accepted: one for all members")
+        name = next(iter(names), "SFET7" if self.accuracy < FINE else "SFET5")
+        order = ELEMENTS.index(name) + 1
+        # A coarser turning an element for low orders: they need more elements to be near at all.
+        mesh = first_mesh(scene, order, turning=min(2.0, 0.5 * order))
+        counts = {n: settings.elements or m.elements for n, m in scene.members.items()}
+        self.fixed = {n for n, count in counts.items() if count is not None}
+        equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
+        cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in scene.members}
+        self.target = Mesh(order, cuts, settings.gauss)
+        if self.target.elements <= PILOT_ELEMENTS or not self.fixed:
+            self.pilot_mesh = self.target
+        else:
+            self.pilot_mesh = first_mesh(scene, max(order, 4), turning=1.0)
+
+    def _prepared(self, mesh: Mesh) -> Prepared:
+        begin = time.perf_counter()
+        prepared = Prepared(assemble(self.scene, mesh, assembly=self.settings.assembly))
+        _ = prepared.equations
+        self.seconds["model"] += time.perf_counter() - begin
+        return prepared
+
+    # -- the run --------------------------------------------------------------------------------
+
+    def solution(self) -> Solution:
+        """All steps."""
+        begin = time.perf_counter()
+        pilot = self._prepared(self.pilot_mesh)
+        steps: list[Equilibrium] = []
+        last: tuple[float, _Found] | None = None
+        for factor in self.scene.analysis.steps:
+            found = self._on_pilot(pilot, factor, last)
+            last = (factor, found)
+            steps.append(self._refined(found, factor))
+        self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
+        reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
+        status = Status.SOLVED if reached or not self.asked else Status.SHORT
+        return Solution(self.scene, status, tuple(steps), self.seconds)
+
+    def _on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found:
+        loading = pilot.model.loading(factor)
+        alone, failure = self._direct(pilot, loading)
+        if self.started or not self.settings.branch:
+            return self._accepted(pilot, alone, failure, loading)
+        reached = self._grown(pilot, factor, last)
+        if reached is None:
+            return self._accepted(pilot, alone, failure, loading)
+        if alone is not None:
+            reached.iterations = alone.iterations
+            if pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3:
+                reached.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
+        return reached
+
+    def _direct(self, pilot: Prepared, loading: Loading) -> tuple[_Found | None, SolveError | None]:
+        """IPOPT from the start guess."""
+        try:
+            corrected, iterations = _cold(pilot, loading)
+        except SolveError as error:
+            return None, error
+        return _Found(pilot, corrected, pilot.stability(corrected), iterations=iterations), None
+
+    def _accepted(
+        self, pilot: Prepared, alone: _Found | None, failure: SolveError | None, loading: Loading
+    ) -> _Found:
+        """What IPOPT found, an unstable state left if that is wanted."""
+        if alone is None:
+            assert failure is not None
+            raise failure
+        if alone.stability.negative == 0 or not self.leave:
+            return alone
+        corrected, stability = pilot.leave(alone.corrected.state, alone.stability, loading)
+        note = f"left an unstable equilibrium with {alone.stability.negative} ways out along its escape shape"
+        return _Found(pilot, corrected, stability, (note,), alone.iterations)
+
+    def _grown(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found | None:
+        """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
+        model = pilot.model
+        if last is not None and last[0] * (factor - last[0]) >= 0.0 and (last[0] != 0.0 or not self.scene.histories):
+            before, state = last[0], last[1].corrected.state
+            found = self._followed(pilot, lambda t: model.loading(before + t * (factor - before)), state)
+            if found is not None:
+                return found
+        zero = pilot.equations.start(model.loading(0.0, 0.0))
+        if self.scene.histories and factor != 0.0:
+            # With histories the way leads through the factors, after the loads of factor 0 have grown.
+            first = self._followed(pilot, lambda t: model.loading(0.0, t), zero)
+            if first is None:
+                return None
+            zero = first.corrected.state
+        return self._followed(pilot, lambda t: model.loading(t * factor), zero)
+
+    def _followed(self, pilot: Prepared, way: Any, state: State) -> _Found | None:
+        result = follow(pilot, way, state, leave=self.leave)
+        if not result.reached:
+            return None
+        corrected = pilot.correct(result.state, way(1.0))
+        notes = tuple(
+            f"left an unstable equilibrium along its escape shape at {100.0 * part:.3g} % of the way to these loads"
+            for part in result.left
+        )
+        return _Found(pilot, corrected, pilot.stability(corrected), notes)
+
+    # -- accuracy -------------------------------------------------------------------------------
+
+    def _onto(self, mesh: Mesh, source: _Found, factor: float) -> _Found:
+        """The same equilibrium on another mesh."""
+        prepared = self._prepared(mesh)
+        loading = prepared.model.loading(factor)
+        state = transferred(source.prepared.model, source.corrected.state, prepared.model)
+        corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        if not corrected.converged:
+            corrected, _ = prepared.minimise(loading, state)
+        return replace(source, prepared=prepared, corrected=corrected)
+
+    def _refined(self, pilot: _Found, factor: float) -> Equilibrium:
+        if self.fixed == set(self.scene.members):
+            return self._on_target(pilot, factor)
+        now = pilot if self.pilot_mesh is self.target else self._onto(self.target, pilot, factor)
+        smooth = np.sqrt(self.accuracy)
+        loading = now.prepared.model.loading(factor)
+        for _ in range(LEVELS):
+            marked = self._marked(now, loading, smooth)
+            if not any(m.any() for m in marked.values()):
+                finer = self._onto(self._halved(now), now, factor)
+                error = self._difference(now, finer, factor)
+                now = finer
+                if error <= self.accuracy:
+                    return self._answer(now, factor, error)
+                smooth *= 0.1
+            elif now.prepared.model.mesh.elements > MOST_ELEMENTS:
+                break
+            else:
+                now = self._onto(now.prepared.model.mesh.refined(marked), now, factor)
+            loading = now.prepared.model.loading(factor)
+        finer = self._onto(self._halved(now), now, factor)
+        return self._answer(finer, factor, self._difference(now, finer, factor))
+
+    def _halved(self, now: _Found) -> Mesh:
+        cuts = now.prepared.model.mesh.cuts
+        marks = {n: np.full(len(c) - 1, n not in self.fixed) for n, c in cuts.items()}
+        return now.prepared.model.mesh.refined(marks)
+
+    def _on_target(self, pilot: _Found, factor: float) -> Equilibrium:
+        """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
+        mesh = self.target
+        if mesh.elements > HUGE:
+            half = Mesh(mesh.order, {n: _every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss)
+            coarse = self._onto(half, pilot, factor)
+            now = self._onto(mesh, coarse, factor)
+            # The error falls by 4^p a halving; twice that share for not being there yet.
+            error = self._difference(coarse, now, factor) * 2.0 / (4.0**mesh.order - 1.0)
+            return self._answer(now, factor, error)
+        now = pilot if self.pilot_mesh is mesh else self._onto(mesh, pilot, factor)
+        finer = self._onto(mesh.refined(), now, factor)
+        return self._answer(now, factor, self._difference(now, finer, factor))
+
+    def _answer(self, found: _Found, factor: float, error: float) -> Equilibrium:
+        prepared = found.prepared
+        stability = prepared.stability(found.corrected)
+        loading = prepared.model.loading(factor)
+        if stability.negative > 0 and self.leave:
+            corrected, stability = prepared.leave(found.corrected.state, stability, loading)
+            note = "left an equilibrium that is unstable on the fine mesh only"
+            found = replace(found, corrected=corrected, notes=(*found.notes, note))
+        return _finished(
+            prepared,
+            found.corrected,
+            loading,
+            factor,
+            stability,
+            estimate=error,
+            notes=found.notes,
+            iterations=found.iterations,
+        )
+
+    def _difference(self, coarse: _Found, fine: _Found, factor: float) -> float:
+        """Largest distance of positions at ends and middles of the coarse elements, over the scene's size."""
+        largest = 0.0
+        sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (coarse, fine)]
+        for name, cuts in coarse.prepared.model.mesh.cuts.items():
+            x = np.sort(np.concatenate([cuts, 0.5 * (cuts[1:] + cuts[:-1])]))
+            a, b = (side.along(name, x, dimensionless=True)["position"] for side in sides)
+            largest = max(largest, float(np.linalg.norm(a - b, axis=1).max()))
+        return largest / self.scene.size
+
+    def _marked(self, found: _Found, loading: Loading, smooth: float) -> Mapping[str, Array]:
+        """Elements whose rotations or tangents have a highest Legendre coefficient above ``smooth``."""
+        model = found.prepared.model
+        element = model.element
+        fields = Fields(found.prepared.equations, found.corrected.state, loading)
+        q = found.corrected.state.q[model.turns]
+        angles = np.linalg.norm(np.einsum("j,ejc->ec", interpolation.legendre_tail(element.nodes), q), axis=1)
+        turned = np.einsum("k,eka->ea", interpolation.legendre_tail(element.points), fields.turned / element.weights[:, None])
+        reach = np.linalg.norm(turned, axis=1) * model.scales.length / self.scene.size
+        rough = (2.0 if model.space else 1.0) * angles + reach > smooth
+        return {
+            name: rough[model.elements_of(name)] if name not in self.fixed else np.zeros(len(cuts) - 1, bool)
+            for name, cuts in model.mesh.cuts.items()
+        }
+
+
+def _every_other(cuts: Array) -> Array:
+    return cuts if len(cuts) < 3 else np.unique(np.append(cuts[::2], cuts[-1]))
