@@ -139,7 +139,8 @@ ONE = np.array([1.0, 0.0, 0.0, 0.0])
 def _matrices() -> tuple[Floats, Floats]:
     """From values at the Gauss points to the Legendre series of the values and of their integral from 0."""
     values = legendre.legvander(2.0 * POINTS - 1.0, ORDER - 1)
-    to_series = np.linalg.inv(values)  # not by the weights, whose rounding grows towards the edges
+    # not by the weights, whose rounding grows towards the edges
+    to_series = np.asarray(np.linalg.inv(values), float)
     integral = 0.5 * legendre.legint(np.eye(ORDER), lbnd=-1.0, axis=0)
     return fixed(to_series), fixed(integral @ to_series)
 

@@ -119,6 +119,12 @@ class Equations:
         mass[self.number[used]] = np.broadcast_to(lump[:, None], self.number.shape)[used]
         return mass
 
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the closing and hinge rows."""
+        hinges = (f"hinge {i}, {side} direction" for i in range(len(self.model.hinges)) for side in ("first", "second"))
+        return (*self.model.positions.rows, *hinges)
+
     # -- pattern of the Newton matrix -----------------------------------------------------------
 
     def _pattern(self) -> None:
@@ -201,7 +207,7 @@ class Equations:
         return nodal, gap
 
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
-        """The equations at a state; with ``convex`` the matrices of the elements without negative curvature."""
+        """The equations at a state; with ``convex`` the element matrices made positive."""
         model, positions = self.model, self.model.positions
         constant = self.member_pulls(state.lam, loading)[model.owner]
         self._kernel.set(0, state.q[model.turns])
@@ -344,11 +350,11 @@ class Equations:
 
 
 def _positive_part(matrices: Array) -> Array:
-    """Symmetric matrices (n, k, k) without their negative eigenvalues."""
+    """Symmetric matrices (n, k, k) with the absolute values of their eigenvalues."""
     values, vectors = np.linalg.eigh(matrices)
     if (values >= 0.0).all():
         return matrices
-    return np.asarray(np.einsum("nij,nj,nkj->nik", vectors, np.maximum(values, 0.0), vectors))
+    return np.asarray(np.einsum("nij,nj,nkj->nik", vectors, np.abs(values), vectors))
 
 
 def _basis(axis: Array) -> Array:

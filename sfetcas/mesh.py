@@ -90,7 +90,7 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
     ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
     """
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
-    moments = sum(abs(load.value[2]) for load in scene.loads.values() if load.type == "moment")
+    moments = sum(abs(load.vector[2]) for load in scene.loads.values() if load.type == "moment")
     most = _largest_force(scene)
     cuts = {}
     for name, member in scene.members.items():
@@ -109,7 +109,7 @@ def _largest_force(scene: Scene) -> float:
     for load in scene.loads.values():
         if load.type != "moment":
             length = scene.center_lines[load.member].length if load.type == "distributed" and load.member else 1.0
-            total += float(np.linalg.norm(load.value)) * length
+            total += float(np.linalg.norm(load.vector)) * length
     if scene.gravity is not None:
         x = np.linspace(0.0, 1.0, 5)
         masses = [

@@ -564,7 +564,7 @@ def _groups(
         if load.type == "moment":
             _add_moment(group, load, name, scene, mesh, element, scales, rotations, data)
         elif load.node is not None:
-            group.force[nodes.index(load.node)] += np.asarray(load.value)[: element.axes] / scales.force
+            group.force[nodes.index(load.node)] += np.asarray(load.vector)[: element.axes] / scales.force
         else:
             assert load.member is not None
             _add_along(group, load, load.member, scene, mesh, element, scales, data)
@@ -607,7 +607,7 @@ def _add_moment(
     else:
         assert load.member is not None and load.at is not None
         number = _chain(load.member, mesh, element, rotations, data)[_cut(mesh, load.member, load.at) * element.order]
-    group.couple[number] += load.value[2] / scales.moment
+    group.couple[number] += load.vector[2] / scales.moment
 
 
 def _chain(
@@ -633,7 +633,7 @@ def _add_along(
     data: Mapping[str, Any],
 ) -> None:
     """A force at a place of a member, or one spread along it."""
-    value = np.asarray(load.value, dtype=float)[: element.axes] / scales.force
+    value = np.asarray(load.vector, dtype=float)[: element.axes] / scales.force
     start = data["first"][member]
     if load.type == "force":
         cut = _cut(mesh, member, 1.0 if load.at is None else load.at)

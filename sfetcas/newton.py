@@ -13,7 +13,7 @@ from .model import Loading, Turn
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-__all__ = ["Corrected", "correct", "descend", "first_guess", "relative_residual", "restore"]
+__all__ = ["Corrected", "correct", "descend", "first_guess", "redundant_rows", "relative_residual", "restore"]
 
 PROXIMAL = 1e-10
 """Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
@@ -216,7 +216,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[
     if np.any(loading.turn):
         state = _carried(equations, loading)
     targets = _wished(equations)
-    if equations.rows and (_no_slack(equations, equations.at(state, loading)) or targets is not None):
+    if equations.rows and (redundant_rows(equations, equations.at(state, loading)) or targets is not None):
         state = _bent(equations, state, loading)
     if targets is not None:
         state, _ = restore(equations, state, loading, weight, targets)
@@ -237,14 +237,18 @@ def _wished(equations: Equations) -> Array | None:
     return targets.ravel() if np.isfinite(targets).any() else None
 
 
-def _no_slack(equations: Equations, point: Point) -> bool:
-    """Whether the closings are redundant to first order at this state."""
+def redundant_rows(equations: Equations, point: Point) -> list[int]:
+    """Rows that depend on others to first order at this state; empty where the multipliers are unique."""
     n = equations.unknowns
+    if not equations.rows:
+        return []
     chosen = (equations.row >= n) & (equations.column < n)
     rows = np.zeros((equations.rows, n))
     rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
-    sizes = np.linalg.svd(rows, compute_uv=False)
-    return len(sizes) < equations.rows or sizes[-1] < 1e-6 * sizes[0]
+    left, sizes, _ = np.linalg.svd(rows, full_matrices=True)
+    sizes = np.append(sizes, np.zeros(equations.rows - len(sizes)))
+    loose = left[:, sizes < SLACK * sizes.max(initial=1e-300)]
+    return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist()
 
 
 def _carried(equations: Equations, loading: Loading) -> State:
@@ -300,6 +304,9 @@ def _bent(equations: Equations, state: State, loading: Loading) -> State:
     difference = equations.at(up, loading).potential - equations.at(down, loading).potential
     return down if difference > 1e-12 else up
 
+
+SLACK = 1e-6
+"""Singular values of the closings below this share of the largest: no slack to first order."""
 
 TURN = 1.2
 """Largest rotation (rad) of a step downhill under forces."""

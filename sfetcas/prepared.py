@@ -128,6 +128,11 @@ class Prepared:
         (up, first), (down, second) = sides
         return second if up - down > 1e-9 * max(abs(up), abs(down)) else first
 
+    def load_size(self, found: Corrected) -> float:
+        """Largest elastic moment or load in the balance of a state, dimensionless."""
+        loading = self.model.loading(1.0)
+        return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.couple))
+
     def distance(self, a: State, b: State) -> float:
         """Largest angle between the rotations of two states, rad."""
         if not self.model.space:

@@ -15,12 +15,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from . import interpolation
+from . import interpolation, quaternion
 from .equations import State
 from .joints import hinge_rows
 from .kernels import compiled_where_it_pays
 from .model import Loading, Model, Turn
 from .nlp import NLP
+from .quaternion import product
 from .quaternion import turned
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -105,11 +106,11 @@ class EquilibriumProblem:
         turning = self._reduction.unknowns
         self.x = ca.MX.sym("x", turning + positions.Y.shape[1])
         sizes = (n * points * element.axes, len(model.kind) * element.components, len(positions.rows))
-        sizes = (*sizes, self.x.numel(), positions.B.shape[0])
+        sizes = (*sizes, self.x.numel(), positions.B.shape[1])
         self.p = ca.MX.sym("p", sum(sizes))
         pull, held, offset, force, shift = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
         self._pull = ca.reshape(pull, element.axes, n * points)
-        self._offset, self._force, self._shift = offset, force, shift
+        self._offset, self._force, self._b = offset, force, shift
         index, weight = self._reduction.index, self._reduction.weight
         rows = np.broadcast_to(np.arange(len(index))[:, None], index.shape)
         self._spread = _matrix(rows, index, weight, (len(index), self.x.numel()))
@@ -297,6 +298,46 @@ class EquilibriumProblem:
         c = np.broadcast_to(index[:, :, None, None, :], shape)
         return r, c, weight[:, None, :, :, None] * weight[:, :, None, None, :]
 
+    # -- expressions by place ---------------------------------------------------------------------
+
+    def displacement(self, node: int) -> ca.MX:
+        """Displacement of a node, dimensionless."""
+        model, positions, axes = self.model, self.model.positions, self.model.element.axes
+        rows = slice(node * axes, (node + 1) * axes)
+        e = positions.E[rows].reshape(axes, len(model.members), axes)[:, model.owner]
+        row, element, axis = np.nonzero(e)
+        adder = _matrix(row, element * axes + axis, e[row, element, axis], (axes, len(model.owner) * axes))
+        reach = self._map("reach")(self._q_elements, self._tangent)
+        rest = np.zeros((len(model.members), axes))
+        np.add.at(rest, model.owner, model.tangent.sum(axis=1))
+        constant = ca.DM(-positions.E[rows] @ rest.ravel()) + ca.mtimes(ca.DM(positions.B[rows]), self._b)
+        kept = ca.mtimes(ca.DM(positions.Y[rows]), self.x[self._reduction.unknowns :])
+        return ca.densify(ca.mtimes(adder, ca.vec(reach)) + kept + constant)
+
+    def rotation(self, number: int) -> ca.MX:
+        """Components of a rotation."""
+        components = self.model.element.components
+        return self._q[number * components : (number + 1) * components]
+
+    def strain(self, member: str, at: float) -> ca.MX:
+        """Curvature minus that of the unloaded member, dimensionless, about the section's axes."""
+        model, element = self.model, self.model.element
+        cuts = model.mesh.cuts[member]
+        e = int(np.clip(np.searchsorted(cuts, at, side="right") - 1, 0, len(cuts) - 2))
+        length = model.weight[model.elements_of(member)][e].sum()
+        xi = np.array([(at - cuts[e]) / (cuts[e + 1] - cuts[e])])
+        points = len(element.nodes)
+        number = model.elements_of(member).start + e
+        q = self._q_elements[:, number * points : (number + 1) * points]
+        here = ca.mtimes(q, ca.DM(interpolation.evaluation(element.nodes, xi).T))
+        slope = ca.mtimes(q, ca.DM(interpolation.differentiation(element.nodes, xi).T)) / length
+        if not model.space:
+            return slope
+        parts = ca.vertsplit(here)
+        spin = product([parts[0], -parts[1], -parts[2], -parts[3]], ca.vertsplit(slope))[1:]
+        frame = quaternion.matrix(model.scene.center_lines[member].quaternions(np.array([at])))[0]
+        return ca.mtimes(ca.DM(frame.T), 2.0 * ca.vertcat(*spin)) / ca.dot(here, here)
+
     # -- numbers --------------------------------------------------------------------------------
 
     def parameters(self, loading: Loading) -> Array:
@@ -313,7 +354,7 @@ class EquilibriumProblem:
             free = np.flatnonzero(model.widths)
             force[self._reduction.first[free]] = loading.couple[free]
         force[self._reduction.unknowns :] = positions.Y.T @ loading.force.ravel()
-        return np.concatenate([pull.ravel(), held.ravel(), offset, force, positions.B @ loading.shift])
+        return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift])
 
     def unknowns(self, state: State) -> Array:
         """The unknowns of the program at a state."""

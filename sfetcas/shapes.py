@@ -285,7 +285,6 @@ def _bending_axis(curve: Curve) -> int:
     size = max(1.0, float(np.abs(bending).max()))
     level = max(
         np.abs(curve.positions(x)[:, 2]).max(),
-        np.abs(frames[:, 2, 0]).max(),
         # also holds between the samples of a helix that meet it always at the same phase
         np.abs(bending[:, :2]).max() / size,
     )

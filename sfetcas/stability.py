@@ -108,11 +108,11 @@ class StabilityTest:
         values, vector, negative = find(entries, rows, limit)
         if not len(values):
             return Stability(True, 0, np.inf, np.zeros(self._n))
-        stable: bool | str = values[0] > limit
+        stable: bool | str = bool(values[0] > limit)
         if negative == 0 and not stable:
             stable = "neutral"
         shape = vector / np.sqrt(self.weight)
-        quotient = values[0] * float(vector @ vector) / float(shape @ (self.equations.mass * shape))
+        quotient = float(values[0]) * float(vector @ vector) / float(shape @ (self.equations.mass * shape))
         peak = shape[np.argmax(np.abs(shape))]
         return Stability(stable, negative, quotient, shape / peak)
 

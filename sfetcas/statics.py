@@ -24,15 +24,16 @@ from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Loading, assemble
-from .newton import Corrected
+from .newton import Corrected, redundant_rows
 from .prepared import Prepared
 from .scene import Scene
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
+from .threads import single_threaded
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-__all__ = ["Settings", "solve", "solve_model"]
+__all__ = ["Settings", "pilot_of", "solve", "solve_model"]
 
 FINE = 1e-8
 """Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
@@ -86,6 +87,7 @@ class Settings:
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
 
 
+@single_threaded
 def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = None) -> Equilibrium:
     """One equilibrium of a prepared model: IPOPT from the start guess, or Newton's method from a near answer.
 
@@ -148,6 +150,7 @@ def _finished(
     )
 
 
+@single_threaded
 def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution:
     """Equilibria of a scene for the load factors of its analysis.
 
@@ -171,6 +174,11 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     """
     settings = replace(settings or Settings(), **changes)
     return _Run(scene, settings).solution()
+
+
+def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
+    """The mesh that :func:`solve` begins with."""
+    return _Run(scene, settings or Settings()).target
 
 
 @dataclass
@@ -253,7 +261,8 @@ class _Run:
             return self._accepted(pilot, alone, failure, loading)
         if alone is not None:
             reached.iterations = alone.iterations
-            if pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3:
+            apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
+            if apart and not reached.notes and alone.stability.negative == 0:
                 reached.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
         return reached
 
@@ -287,6 +296,10 @@ class _Run:
             if found is not None:
                 return found
         zero = pilot.equations.start(model.loading(0.0, 0.0))
+        if np.any(model.loading(factor).shift) and not self.scene.histories:
+            point = pilot.equations.at(zero, model.loading(0.0, 0.0))
+            if redundant_rows(pilot.equations, point):
+                return self._grown_from_bent(pilot, factor)
         if self.scene.histories and factor != 0.0:
             # With histories the way leads through the factors, after the loads of factor 0 have grown.
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero)
@@ -294,6 +307,20 @@ class _Run:
                 return None
             zero = first.corrected.state
         return self._followed(pilot, lambda t: model.loading(t * factor), zero)
+
+    def _grown_from_bent(self, pilot: Prepared, factor: float) -> _Found | None:
+        """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
+        begin = 0.01 * factor
+        bent, _ = self._direct(pilot, pilot.model.loading(begin))
+        if bent is None:
+            return None
+        state = bent.corrected.state
+        if bent.stability.negative and self.leave:
+            try:
+                state = pilot.leave(state, bent.stability, pilot.model.loading(begin))[0].state
+            except SolveError:
+                return None
+        return self._followed(pilot, lambda t: pilot.model.loading(begin + t * (factor - begin)), state)
 
     def _followed(self, pilot: Prepared, way: Any, state: State) -> _Found | None:
         result = follow(pilot, way, state, leave=self.leave)
@@ -362,6 +389,7 @@ class _Run:
 
     def _answer(self, found: _Found, factor: float, error: float) -> Equilibrium:
         prepared = found.prepared
+        found = replace(found, notes=(*found.notes, *_redundancy(prepared, found.corrected)))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
         if stability.negative > 0 and self.leave:
@@ -403,6 +431,28 @@ class _Run:
             name: rough[model.elements_of(name)] if name not in self.fixed else np.zeros(len(cuts) - 1, bool)
             for name, cuts in model.mesh.cuts.items()
         }
+
+
+def _redundancy(prepared: Prepared, corrected: Corrected) -> tuple[str, ...]:
+    """A note where closings are redundant, so that reactions are not unique.
+
+    Raises
+    ------
+    SolveError
+        Members stretched between held points: no finite reaction holds an inextensible member straight.
+    """
+    rows = redundant_rows(prepared.equations, corrected.point)
+    if not rows:
+        return ()
+    names = ", ".join(prepared.equations.row_names[row] for row in rows)
+    if np.abs(corrected.state.lam).max() > BEYOND * max(1.0, prepared.load_size(corrected)):
+        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
+        raise SolveError(Status.INFEASIBLE, detail, corrected.state)
+    return (f"reactions are not unique, the smallest are given; redundant: {names}",)
+
+
+BEYOND = 1e4
+"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
 
 def _every_other(cuts: Array) -> Array:

@@ -187,7 +187,7 @@ def test_wrong_sections_are_refused(values, message):
 
 
 def _moments(width: float, height: float, inside, count: int = 2000):
-    """Area and second moments about b2 and b3 by the midpoint rule; b2 is along the height, b3 along the width."""
+    """Area, second moments about b2 and b3 by the midpoint rule: b2 along the height, b3 along the width."""
     z = (np.arange(count) + 0.5) / count - 0.5
     along_b2, along_b3 = np.meshgrid(height * z, width * z, indexing="ij")
     cell = inside(along_b2, along_b3) * width * height / count**2

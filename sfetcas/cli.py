@@ -1,0 +1,226 @@
+"""The command line: run, check, info."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from .checks import Check, check
+from .elements import ELEMENTS
+from .errors import SceneError, SolveError, Status
+from .model import assemble
+from .scenefile import load
+from .solution import Equilibrium, Solution
+from .statics import Settings, pilot_of, solve
+
+__all__ = ["main"]
+
+SOLVED, SHORT, BAD_INPUT, NO_SOLUTION = 0, 1, 2, 3
+"""Exit codes."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code is returned."""
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.command(options))
+    except SceneError as error:
+        print(f"sfetcas: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except SolveError as error:
+        print(f"sfetcas: no solution: {error}", file=sys.stderr)
+        return NO_SOLUTION
+    except KeyboardInterrupt:
+        print("sfetcas: interrupted; nothing was written", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return SOLVED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="sfetcas", description="Equilibria of very flexible beams under large motion.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    run = commands.add_parser("run", help="solve a scene and print a short report")
+    run.add_argument("file", type=Path, help="scene file, .toml or .json")
+    run.add_argument("--json", type=Path, metavar="OUT", help="write the whole answer as JSON")
+    run.add_argument("--plot", type=Path, metavar="OUT.png", help="write a picture")
+    _add_overrides(run)
+    run.set_defaults(command=_run)
+    checks = commands.add_parser("check", help="solve scenes and compare with their expect tables")
+    checks.add_argument("files", type=Path, nargs="+", metavar="file")
+    _add_overrides(checks)
+    checks.set_defaults(command=_check)
+    info = commands.add_parser("info", help="show the model: blocks, unknowns, why plane or space")
+    info.add_argument("file", type=Path)
+    _add_overrides(info)
+    info.set_defaults(command=_info)
+    return parser
+
+
+def _add_overrides(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--accuracy", type=float, help="wanted error of positions over the size of the scene")
+    parser.add_argument("--element", choices=ELEMENTS, metavar="SFETn", help="element of all members: SFET2 to SFET9")
+    parser.add_argument("--elements", type=int, metavar="N", help="number of elements of each member")
+    parser.add_argument("--integration", choices=("nodes", "gauss"), default="nodes", help="quadrature in elements")
+    parser.add_argument("--assembly", choices=("auto", "closing", "nodal"), default="auto")
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    return Settings(
+        accuracy=options.accuracy,
+        element=options.element,
+        elements=options.elements,
+        gauss=options.integration == "gauss",
+        assembly=options.assembly,
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    begin = time.perf_counter()
+    scene, settings = load(options.file), _settings(options)
+    for path in (options.json, options.plot):
+        if path is not None:
+            _check_writable(path)
+    drawing = _drawing(options.plot)
+    solution = solve(scene, settings)
+    if options.json is not None:
+        _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
+    if drawing is not None:
+        _write(options.plot, lambda path: drawing(solution, path))
+    _report(solution, time.perf_counter() - begin)
+    checks = check(scene, solution)
+    _print_checks(checks)
+    return SOLVED if solution.status is Status.SOLVED and all(c.passed for c in checks) else SHORT
+
+
+def _drawing(path: Path | None) -> Callable[[Solution, Path], None] | None:
+    if path is None:
+        return None
+    # Matplotlib costs more than most solves: only a picture pays for it.
+    from .plotting import save_picture
+
+    return save_picture
+
+
+def _check_writable(path: Path) -> None:
+    folder = path.parent
+    if path.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise SceneError(f"{path}: cannot be written; accepted: a file in a folder that exists and can be written")
+
+
+def _write(path: Path, writer: Callable[[Path], Any]) -> None:
+    """Write beside the final name first, so that nothing half-written is ever seen."""
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
+    os.close(handle)
+    try:
+        writer(Path(name))
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{path}: could not be written: {error}") from None
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _report(solution: Solution, seconds: float) -> None:
+    model = solution.last.model
+    print(solution.scene.title or "untitled scene")
+    print(f"  {model.dimension}: {model.reason}")
+    print(f"  {model.mesh.elements} elements {model.element.name}, {model.unknowns} unknowns, {model.assembly} assembly")
+    for step in solution.steps:
+        _report_step(step)
+    split = f"model {solution.seconds['model']:.3f} s, solve {solution.seconds['solve']:.3f} s"
+    print(f"{solution.status.value} in {seconds:.3f} s ({split})")
+
+
+def _report_step(step: Equilibrium) -> None:
+    print(f"factor {step.factor:g}")
+    for name in step.model.nodes:
+        angle = step.angle(name)
+        turned = f"  angle {angle:.9g} rad" if angle is not None else ""
+        print(f"  node {name}: position {_vector(step.position(name))} m{turned}")
+    for name, node in step.model.scene.nodes.items():
+        if node.support != "free":
+            force, moment = step.reaction(name)
+            print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    proof = step.certificate
+    kind = {True: "stable", False: f"unstable ({proof.negative} ways out)"}.get(proof.stable, "neutral")  # type: ignore[call-overload]
+    print(
+        f"  {kind}, smallest eigenvalue {proof.smallest:.4g} N, residual {proof.residual:.1e}, "
+        f"estimated error {proof.error_estimate:.1e} of the size"
+    )
+    for note in step.notes:
+        print(f"  note: {note}")
+
+
+def _vector(values: Any) -> str:
+    return "(" + ", ".join(f"{value:.9g}" for value in values) + ")"
+
+
+def _check(options: argparse.Namespace) -> int:
+    worst = SOLVED
+    for file in options.files:
+        scene = load(file)
+        print(f"{file}: {scene.title}")
+        solution = solve(scene, _settings(options))
+        checks = check(scene, solution)
+        _print_checks(checks)
+        if solution.status is not Status.SOLVED or not all(c.passed for c in checks):
+            worst = SHORT
+    return worst
+
+
+def _print_checks(checks: Sequence[Check]) -> None:
+    if not checks:
+        return
+    head = ("quantity", "value", "reference", "error", "tolerance", "")
+    rows = [head, *(_row(c) for c in checks)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    for row in rows:
+        print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _row(c: Check) -> tuple[str, ...]:
+    expect = c.expect
+    place = "" if expect.at is None else f" at {expect.at:g}"
+    step = "" if expect.step is None else f" step {expect.step:g}"
+    tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"
+    verdict = "ok" if c.passed else "FAILED"
+    return expect.quantity + place + step, _short(c.value), _short(expect.value), f"{c.error:.1e}", tolerance, verdict
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_short(entry) for entry in value) + "]"
+    return f"{value:.8g}" if isinstance(value, float) else str(value)
+
+
+def _info(options: argparse.Namespace) -> int:
+    scene, settings = load(options.file), _settings(options)
+    mesh = pilot_of(scene, settings)
+    model = assemble(scene, mesh, assembly=settings.assembly)
+    print(scene.title or "untitled scene")
+    print(f"  {model.dimension}: {model.reason}")
+    print(f"  begins with {mesh.elements} elements {model.element.name}; {model.assembly} assembly")
+    for block in model.blocks:
+        print(f"  {block.size:6d}  {block.name}: {block.why}")
+    print(f"  {model.unknowns:6d}  unknowns of the minimisation")
+    for name in model.members:
+        line = scene.center_lines[name]
+        print(f"  member {name}: length {line.length:.9g} m, {len(mesh.cuts[name]) - 1} elements")
+    print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")
+    return SOLVED
