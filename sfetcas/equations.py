@@ -82,8 +82,8 @@ class Equations:
         self._kernel = Batch(compiled_where_it_pays(element.turning, calls), n)
         self._kernel.set(1, model.stiffness)
         self._kernel.set(2, model.tangent)
-        self._rest = np.zeros((len(model.members), element.axes))
-        np.add.at(self._rest, model.owner, model.tangent.sum(axis=1))
+        self._first = np.array([model.first[name] for name in model.members])
+        self._rest = np.add.reduceat(model.tangent.sum(axis=1), self._first, axis=0)
         self._z = positions.Z.reshape(len(positions.rows), len(model.members), element.axes)
         self._pattern()
         if len(model.hinges):
@@ -106,6 +106,8 @@ class Equations:
         self.unknowns = self.turning_unknowns + self.displacement_unknowns
         about = np.flatnonzero(model.kind == Turn.AXIS) if model.space else np.array([], dtype=np.intp)
         self._basis = {int(i): _basis(model.axis[i]) for i in about}
+        self._on_axes = np.argwhere(np.isin(model.turns, about)).tolist()
+        self._free = np.flatnonzero(self.number[:, 0] >= 0)
 
     @functools.cached_property
     def mass(self) -> Array:
@@ -174,7 +176,11 @@ class Equations:
         row, column = np.concatenate(rows), np.concatenate(columns)
         valid = (row >= 0) & (column >= 0)
         places, inverse = np.unique(column[valid] * total + row[valid], return_inverse=True)
-        self._valid, self._to_entry = valid, inverse
+        self._valid, self._to_entry = np.flatnonzero(valid), inverse
+        self._size = len(valid)
+        self._zeros = np.zeros(total)
+        self._used = np.flatnonzero(local.ravel() >= 0)
+        self._used_numbers = local.ravel()[self._used]
         self.row, self.column = places % total, places // total
         self.diagonal = np.flatnonzero(self.row == self.column)
         self.total = total
@@ -199,9 +205,7 @@ class Equations:
     def displacements(self, state: State, loading: Loading, reach: Array) -> tuple[Array, Array]:
         """Displacements of the nodes (nodes * axes,) and closing gaps, from the reaches of the elements."""
         positions = self.model.positions
-        delta = -self._rest
-        np.add.at(delta, self.model.owner, reach)
-        delta = delta.ravel()
+        delta = (np.add.reduceat(reach, self._first, axis=0) - self._rest).ravel()
         nodal = positions.E @ delta + positions.Y @ state.y + positions.B @ loading.shift
         gap = positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift
         return nodal, gap
@@ -220,25 +224,25 @@ class Equations:
 
         potential = float(strain.sum() + work.sum() - (constant * reach).sum() - (loading.pull * model.tangent).sum())
         potential -= float(loading.force.ravel() @ nodal)
-        residual, size = np.zeros(self.total), np.zeros(self.total)
-        used = self._local.ravel() >= 0
-        np.add.at(residual, self._local.ravel()[used], moments.ravel()[used])
-        np.add.at(size, self._local.ravel()[used], np.abs(moments.ravel()[used]))
+        used = moments.ravel()[self._used]
+        residual = np.bincount(self._used_numbers, weights=used, minlength=self.total)
+        size = np.bincount(self._used_numbers, weights=np.abs(used), minlength=self.total)
         if not model.space:
             potential -= float(loading.couple @ state.q[:, 0])
-            free = self.number[:, 0] >= 0
-            residual[self.number[free, 0]] -= loading.couple[free]
-            size[self.number[free, 0]] += np.abs(loading.couple[free])
+            couple = loading.couple[self._free]
+            residual[: self.turning_unknowns] -= couple
+            size[: self.turning_unknowns] += np.abs(couple)
         lam, force = state.lam[: len(positions.rows)], loading.force.ravel()
-        displacement = slice(self.turning_unknowns, self.unknowns)
-        residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
-        size[displacement] = np.abs(positions.W.T) @ np.abs(lam) + np.abs(positions.Y.T) @ np.abs(force)
+        if self.displacement_unknowns:
+            displacement = slice(self.turning_unknowns, self.unknowns)
+            residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
+            size[displacement] = np.abs(positions.W.T) @ np.abs(lam) + np.abs(positions.Y.T) @ np.abs(force)
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
         parts = [stiffness.ravel(), *self._closing_parts(spin), self._w_entries, self._w_entries]
         if len(model.hinges):
             parts += self._hinge_parts(state, residual)
-        values = np.concatenate([*parts, np.zeros(self.total)])[self._valid]
+        values = np.concatenate([*parts, self._zeros])[self._valid]
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
         return Point(potential, float(strain.sum()), residual, size, entries)
 
@@ -277,15 +281,15 @@ class Equations:
         self._kernel.set(3, np.zeros_like(model.tangent))
         _, _, moments, stiffness, _, spin = self._kernel()
         stiffness = self._local_parts(moments, stiffness, spin)[1].ravel()
-        values = np.zeros(len(self._valid))
+        values = np.zeros(self._size)
         values[: len(stiffness)] = stiffness
         return np.bincount(self._to_entry, weights=values[self._valid], minlength=len(self.row))
 
     def _local_parts(self, moments: Array, stiffness: Array, spin: Array) -> tuple[Array, Array, Array]:
-        """Copies of the kernel's results in the bases of the unknowns."""
+        """The kernel's results in the bases of the unknowns; read before the kernel is called again."""
         n, width = self._local.shape
-        moments, stiffness = moments.copy(), stiffness.reshape(n, width, width).copy()
-        spin = spin.reshape(n, width, self.model.element.axes).copy()
+        stiffness = stiffness.reshape(n, width, width)
+        spin = spin.reshape(n, width, self.model.element.axes)
         self._turn_bases(moments, stiffness, spin)
         return moments, stiffness, spin
 
@@ -310,10 +314,8 @@ class Equations:
         return [stiffness.ravel(), spin.ravel(), spin.ravel()]
 
     def _turn_bases(self, moments: Array, stiffness: Array, spin: Array) -> None:
-        """Turn the components of rotations about a held axis so that the first is about it."""
-        if not self._basis:
-            return
-        for e, k in np.argwhere(np.isin(self.model.turns, list(self._basis))):
+        """Turn the components of rotations about a held axis, in place, so that the first is about it."""
+        for e, k in self._on_axes:
             basis, part = self._basis[int(self.model.turns[e, k])], slice(3 * k, 3 * k + 3)
             moments[e, part] = moments[e, part] @ basis
             stiffness[e, part] = basis.T @ stiffness[e, part]

@@ -37,6 +37,7 @@ class SparseSolver:
         if self._places is None:
             self._sparsity = ca.Sparsity(n, n, _pointers(n, column), row.tolist())
             self._solver = ca.Linsol("newton", plugin, self._sparsity)
+            self._analysed = False
 
     def factor(self, entries: Array) -> None:
         """Factorise; a singular matrix raises ``LinAlgError`` here or in :meth:`solve`."""
@@ -47,7 +48,9 @@ class SparseSolver:
             return
         self._matrix = ca.DM(self._sparsity, entries)
         try:
-            self._solver.sfact(self._matrix)
+            if not self._analysed:
+                self._solver.sfact(self._matrix)
+                self._analysed = True
             self._solver.nfact(self._matrix)
         except RuntimeError:
             raise np.linalg.LinAlgError("singular matrix") from None

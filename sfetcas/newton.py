@@ -18,6 +18,9 @@ __all__ = ["Corrected", "correct", "descend", "first_guess", "redundant_rows", "
 PROXIMAL = 1e-10
 """Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
 
+ROUNDING = 3e-15
+"""Relative residual at which there is nothing left to gain."""
+
 DUAL = 1e-12
 """Softness of the closings in the matrix (not in the equations), against redundant ones."""
 
@@ -42,9 +45,11 @@ class Corrected:
 def relative_residual(equations: Equations, point: Point) -> float:
     """Largest out-of-balance moment or force over the largest one that was added up, or largest gap."""
     n = equations.unknowns
-    balance = np.abs(point.residual[:n]).max(initial=0.0) / max(point.size.max(initial=0.0), 1e-30)
-    gap = np.abs(point.residual[n:]).max(initial=0.0)
-    return float(max(balance if np.abs(point.residual[:n]).max(initial=0.0) > 1e-15 else 0.0, gap))
+    off = np.abs(point.residual)
+    balance = float(off[:n].max(initial=0.0))
+    gap = float(off[n:].max(initial=0.0))
+    # An unloaded scene is balanced: nothing is added up that a residual could be compared with.
+    return max(balance / float(point.size.max(initial=0.0)) if balance > 1e-15 else 0.0, gap)
 
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
@@ -88,7 +93,7 @@ def correct(
     first = second = last = np.inf
     count = 0
     for count in range(iterations):
-        if residual == 0.0:
+        if residual <= ROUNDING:
             break
         try:
             step = newton_step(equations, point, weight)
@@ -128,8 +133,8 @@ def descend(equations: Equations, state: State, loading: Loading, weight: Array,
     """
     scale = 1.0
     most = np.inf if np.any(loading.couple) else TURN
+    point = equations.at(state, loading, convex=True)
     for _ in range(iterations):
-        point = equations.at(state, loading, convex=True)
         try:
             step = newton_step(equations, point, 1e4 * weight)
         except np.linalg.LinAlgError:
@@ -148,12 +153,12 @@ def descend(equations: Equations, state: State, loading: Loading, weight: Array,
         scale = min(1.0, 4.0 * scale, most / max(length, 1e-30))
         for _ in range(40):
             trial = equations.moved(state, np.concatenate([scale * step[:n], scale * step[n:]]))
-            there = equations.at(trial, loading)
+            there = equations.at(trial, loading, convex=True)
             after = there.potential + penalty * np.abs(there.residual[n:]).sum()
             if after - before <= 0.3 * (scale - 0.5 * scale**2) * slope + 1e-12 * abs(before):
                 break
             scale *= 0.5
-        state = trial
+        state, point = trial, there
         if scale == 1.0 and length < 0.02:
             break
     return state

@@ -132,7 +132,7 @@ class StabilityTest:
     def _sparse(self, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
         negative = self._below(entries, rows, -limit)
         shift = -limit
-        while self._below(entries, rows, shift) > 0:
+        while negative and self._below(entries, rows, shift) > 0:
             shift *= 8.0 if shift < -0.1 else 1000.0
         values, vector = self._subspace(entries, rows, shift)
         if negative == 0 and values[0] < -limit:
@@ -165,7 +165,6 @@ class StabilityTest:
     def _subspace(self, entries: Array, rows: Array, shift: float) -> tuple[Array, Array]:
         """Smallest eigenvalues above the shift by inverse iteration of a small subspace."""
         n, r = self._n, len(rows)
-        row, column = [self._h_row, *(np.nonzero(rows))], self._h_column
         a_row, a_column = np.nonzero(rows)
         row = np.concatenate([self._h_row, n + a_row, a_column, np.arange(n, n + r)])
         column = np.concatenate([self._h_column, a_column, n + a_row, np.arange(n, n + r)])
@@ -178,15 +177,15 @@ class StabilityTest:
         solver = SparseSolver(n + r, row[order], column[order])
         solver.factor(all_values[order])
         block = np.random.default_rng(0).standard_normal((n, 4))
-        smallest = np.array([np.inf])
+        smallest, starts = np.array([np.inf]), np.searchsorted(self._h_column, np.arange(n))
         for _ in range(60):
             block = solver.solve(np.vstack([block, np.zeros((r, 4))]))[:n]
             block = np.linalg.qr(block)[0]
-            product = np.zeros_like(block)
-            np.add.at(product, self._h_row, entries[:, None] * block[self._h_column])
+            # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
+            product = np.add.reduceat(entries[:, None] * block[self._h_row], starts, axis=0)
             new, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
-            if abs(new[0] - smallest[0]) <= 1e-8 * max(abs(new[0]), abs(shift)):
+            if abs(new[0] - smallest[0]) <= 1e-7 * max(abs(new[0]), abs(shift)):
                 return new, block[:, 0]
             smallest = new
         return smallest, block[:, 0]
