@@ -168,7 +168,7 @@ def _report_step(step: Equilibrium) -> None:
 
 
 def _vector(values: Any) -> str:
-    return "(" + ", ".join(f"{value:.9g}" for value in values) + ")"
+    return "(" + ", ".join(f"{value + 0.0:.9g}" for value in values) + ")"
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -16,7 +16,6 @@ from .errors import SolveError
 from .model import Loading
 from .newton import Corrected
 from .prepared import Prepared
-from .stability import Stability
 
 __all__ = ["Followed", "follow"]
 
@@ -47,7 +46,6 @@ class Followed:
     ----------
     state : State
         State at the end of the way, or where it was lost.
-    stability : Stability
     reached : bool
         Whether the end of the way was reached.
     left : tuple of float
@@ -55,7 +53,6 @@ class Followed:
     """
 
     state: State
-    stability: Stability
     reached: bool
     left: tuple[float, ...]
 
@@ -68,10 +65,9 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
     done, step = 0.0, 0.5
     left: list[float] = []
     now = prepared.correct(state, way(0.0))
-    stability = prepared.stability(now)
     for _ in range(MOST):
         if done >= 1.0:
-            return Followed(now.state, stability, True, tuple(left))
+            return Followed(now.state, True, tuple(left))
         trial = min(1.0, done + step)
         there = prepared.correct(now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION)
         if not there.converged:
@@ -81,33 +77,30 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
             if not leave:
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
-            snapped = _left(prepared, now, stability, way(trial))
+            snapped = _left(prepared, now, way(trial))
             if snapped is None:
                 break
-            now, stability = snapped
+            now = snapped
             left.append(done)
             done, step = trial, 0.1
             continue
-        after = prepared.stability(there)
-        if after.negative > 0 and leave:
+        if leave and prepared.negative(there) > 0:
             if trial - done > NARROW * done:
                 step = 0.5 * (trial - done)
                 continue
-            escaped = _left(prepared, there, after, way(trial))
+            escaped = _left(prepared, there, way(trial))
             if escaped is None:
                 break
-            there, after = escaped
+            there = escaped
             left.append(trial)
             step = 0.1
-        now, stability, done = there, after, trial
+        now, done = there, trial
         step *= 4.0 if there.second < 0.05 else 2.0
-    return Followed(now.state, stability, done >= 1.0, tuple(left))
+    return Followed(now.state, done >= 1.0, tuple(left))
 
 
-def _left(
-    prepared: Prepared, found: Corrected, stability: Stability, loading: Loading
-) -> tuple[Corrected, Stability] | None:
+def _left(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:
     try:
-        return prepared.leave(found.state, stability, loading)
+        return prepared.leave(found.state, prepared.stability(found), loading)[0]
     except SolveError:
         return None

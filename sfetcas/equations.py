@@ -334,7 +334,8 @@ class Equations:
     @functools.cached_property
     def solver(self) -> SparseSolver:
         """Solver of the Newton matrix."""
-        return SparseSolver(self.total, self.row, self.column)
+        # Chains with few closings are banded; the bordered matrices of frames need a better ordering.
+        return SparseSolver(self.total, self.row, self.column, "mumps" if self.rows > FEW_ROWS else "csparse")
 
     def moved(self, state: State, step: Array) -> State:
         """The state after a step of all unknowns and multipliers."""
@@ -349,6 +350,10 @@ class Equations:
             q = state.q + turn
         y = state.y + step[self.turning_unknowns : self.unknowns]
         return State(q, y, state.lam + step[self.unknowns :])
+
+
+FEW_ROWS = 12
+"""Up to this many closings csparse is faster than MUMPS, beyond it can be ten times slower (measured)."""
 
 
 def _positive_part(matrices: Array) -> Array:

@@ -37,26 +37,28 @@ class SparseSolver:
         if self._places is None:
             self._sparsity = ca.Sparsity(n, n, _pointers(n, column), row.tolist())
             self._solver = ca.Linsol("newton", plugin, self._sparsity)
-            self._analysed = False
+            # A MUMPS that is never used prints when it is destroyed: its first memory is used once, on a matrix
+            # that is easy; solutions take a second one.
+            if plugin == "mumps":
+                self._solver.nfact(ca.DM(self._sparsity, (row == column).astype(float)))
 
     def factor(self, entries: Array) -> None:
-        """Factorise; a singular matrix raises ``LinAlgError`` here or in :meth:`solve`."""
+        """Take a matrix; it is factorised when it is solved with (CasADi does so at each call anyway)."""
         if self._places is not None:
             self._matrix: Any = np.zeros(self.n * self.n)
             self._matrix[self._places] = entries
             self._matrix = self._matrix.reshape(self.n, self.n)
-            return
-        self._matrix = ca.DM(self._sparsity, entries)
-        try:
-            if not self._analysed:
-                self._solver.sfact(self._matrix)
-                self._analysed = True
-            self._solver.nfact(self._matrix)
-        except RuntimeError:
-            raise np.linalg.LinAlgError("singular matrix") from None
+        else:
+            self._matrix = ca.DM(self._sparsity, entries)
 
     def solve(self, b: Array) -> Array:
-        """Solution for the matrix given last; b of shape (n,) or (n, k)."""
+        """Solution for the matrix given last; b of shape (n,) or (n, k).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            The matrix is singular.
+        """
         if self._places is not None:
             return np.asarray(np.linalg.solve(self._matrix, b))
         try:

@@ -97,27 +97,31 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
         line = scene.center_lines[name]
         softest = float(np.nanmin(scene.sections[member.section].stiffness(np.linspace(0.0, 1.0, 5))))
         expected = line.turning + max(rotations, default=0.0) + moments * line.length / softest
-        count = int(min(max(2.0, np.ceil(expected / turning)), 400.0))
+        count = int(min(max(2.0, np.ceil(expected / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
         cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
     return Mesh(order, cuts)
 
 
 def _largest_force(scene: Scene) -> float:
-    """Bound of the force that loads of factor 1 (or the largest of the steps) can cause in any member."""
+    """Sum of all loads at the largest factor: no member of a tree carries more."""
+    factors = scene.analysis.steps
+    largest = max(abs(factor) for factor in factors)
     total = 0.0
     for load in scene.loads.values():
         if load.type != "moment":
             length = scene.center_lines[load.member].length if load.type == "distributed" and load.member else 1.0
-            total += float(np.linalg.norm(load.vector)) * length
+            history = None if load.history is None else scene.histories[load.history]
+            share = largest if history is None else max(abs(history.factor(factor)) for factor in factors)
+            total += float(np.linalg.norm(load.vector)) * length * share
     if scene.gravity is not None:
         x = np.linspace(0.0, 1.0, 5)
         masses = [
             float(scene.sections[m.section].mass(x).mean()) * scene.center_lines[n].length
             for n, m in scene.members.items()
         ]
-        total += float(np.linalg.norm(scene.gravity)) * sum(masses)
-    return total * max(abs(factor) for factor in scene.analysis.steps)
+        total += float(np.linalg.norm(scene.gravity)) * sum(masses) * largest
+    return total
 
 
 def _graded(cuts: Array, breaks: Array, layer: float) -> Array:

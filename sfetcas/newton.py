@@ -250,9 +250,8 @@ def redundant_rows(equations: Equations, point: Point) -> list[int]:
     chosen = (equations.row >= n) & (equations.column < n)
     rows = np.zeros((equations.rows, n))
     rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
-    left, sizes, _ = np.linalg.svd(rows, full_matrices=True)
-    sizes = np.append(sizes, np.zeros(equations.rows - len(sizes)))
-    loose = left[:, sizes < SLACK * sizes.max(initial=1e-300)]
+    squares, left = np.linalg.eigh(rows @ rows.T)
+    loose = left[:, squares < SLACK**2 * squares[-1]]
     return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist()
 
 

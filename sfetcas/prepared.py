@@ -68,6 +68,10 @@ class Prepared:
         """The stability test at a state."""
         return self._test.test(found.point)
 
+    def negative(self, found: Corrected) -> int:
+        """Number of negative eigenvalues at a state."""
+        return self._test.negative(found.point)
+
     def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
         """IPOPT from a state, then Newton's method to rounding; the equilibrium and IPOPT's iterations.
 

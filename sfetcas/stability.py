@@ -19,7 +19,6 @@ import casadi as ca
 import numpy as np
 
 from .equations import Equations, Point
-from .linear import SparseSolver
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -105,7 +104,7 @@ class StabilityTest:
         entries, rows = self._weighted(point), self._rows(point)
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
         find = self._dense if self._n <= DENSE else self._sparse
-        values, vector, negative = find(entries, rows, limit)
+        values, vector, negative = find(point, entries, rows, limit)
         if not len(values):
             return Stability(True, 0, np.inf, np.zeros(self._n))
         stable: bool | str = bool(values[0] > limit)
@@ -116,25 +115,39 @@ class StabilityTest:
         peak = shape[np.argmax(np.abs(shape))]
         return Stability(stable, negative, quotient, shape / peak)
 
-    def _dense(self, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
+    def negative(self, point: Point) -> int:
+        """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
+        if self._n == 0:
+            return 0
+        entries, rows = self._weighted(point), self._rows(point)
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        if self._n > DENSE:
+            return self._below(entries, rows, -limit)
+        return int((np.linalg.eigvalsh(self._projected(entries, rows)[0]) < -limit).sum())
+
+    def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
+        """The full matrix on the null space of the rows, and a basis of that."""
         h = np.zeros((self._n, self._n))
         h[self._h_row, self._h_column] = entries
-        basis = np.eye(self._n)
-        if len(rows):
-            _, sizes, right = np.linalg.svd(rows)
-            rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
-            basis = right[rank:].T
-        values, vectors = np.linalg.eigh(basis.T @ h @ basis)
+        if not len(rows):
+            return h, np.eye(self._n)
+        _, sizes, right = np.linalg.svd(rows)
+        basis = right[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
+        return basis.T @ h @ basis, basis
+
+    def _dense(self, point: Point, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
+        projected, basis = self._projected(entries, rows)
+        values, vectors = np.linalg.eigh(projected)
         if not len(values):
             return values, np.zeros(self._n), 0
         return values, basis @ vectors[:, 0], int((values < -limit).sum())
 
-    def _sparse(self, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
+    def _sparse(self, point: Point, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
         negative = self._below(entries, rows, -limit)
         shift = -limit
         while negative and self._below(entries, rows, shift) > 0:
             shift *= 8.0 if shift < -0.1 else 1000.0
-        values, vector = self._subspace(entries, rows, shift)
+        values, vector = self._subspace(point, entries, shift)
         if negative == 0 and values[0] < -limit:
             values[0] = -limit
         return values, vector, negative
@@ -144,14 +157,12 @@ class StabilityTest:
         shifted = entries.copy()
         shifted[self._diagonal] -= shift
         matrix = ca.DM(self._pattern, shifted)
-        self._ldl.sfact(matrix)
         self._ldl.nfact(matrix)
-        count = int(self._ldl.neig(matrix))
-        if len(rows):
-            schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
-            values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
-            count -= int((values < -RANK * np.abs(values).max()).sum())
-        return count
+        if not len(rows):
+            return int(self._ldl.neig(matrix))
+        schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
+        values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
+        return int(self._ldl.neig(matrix)) - int((values < -RANK * np.abs(values).max()).sum())
 
     @functools.cached_property
     def _pattern(self) -> ca.Sparsity:
@@ -160,26 +171,27 @@ class StabilityTest:
 
     @functools.cached_property
     def _ldl(self) -> ca.Linsol:
-        return ca.Linsol("inertia", "ldl", self._pattern)
+        solver = ca.Linsol("inertia", "ldl", self._pattern)
+        solver.sfact(ca.DM(self._pattern, 1.0))
+        return solver
 
-    def _subspace(self, entries: Array, rows: Array, shift: float) -> tuple[Array, Array]:
-        """Smallest eigenvalues above the shift by inverse iteration of a small subspace."""
-        n, r = self._n, len(rows)
-        a_row, a_column = np.nonzero(rows)
-        row = np.concatenate([self._h_row, n + a_row, a_column, np.arange(n, n + r)])
-        column = np.concatenate([self._h_column, a_column, n + a_row, np.arange(n, n + r)])
-        shifted = entries.copy()
-        shifted[self._diagonal] -= shift
-        values = rows[a_row, a_column]
+    def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
+        """Smallest eigenvalues above the shift by inverse iteration of a small subspace.
+
+        The Newton matrix, shifted, keeps the vectors on the closings; it is as sparse as that of a solve.
+        """
+        equations, n = self.equations, self._n
+        shifted = point.entries.copy()
+        shifted[equations.diagonal[:n]] -= shift * self.weight
         # A tiny negative diagonal keeps redundant rows from making the matrix singular.
-        all_values = np.concatenate([shifted, values, values, np.full(r, -1e-14)])
-        order = np.lexsort((row, column))
-        solver = SparseSolver(n + r, row[order], column[order])
-        solver.factor(all_values[order])
-        block = np.random.default_rng(0).standard_normal((n, 4))
+        shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
+        equations.solver.factor(shifted)
+        root = np.sqrt(self.weight)[:, None]
+        block = np.random.default_rng(0).standard_normal((n, min(4, n)))
+        padding = np.zeros((equations.total - n, block.shape[1]))
         smallest, starts = np.array([np.inf]), np.searchsorted(self._h_column, np.arange(n))
         for _ in range(60):
-            block = solver.solve(np.vstack([block, np.zeros((r, 4))]))[:n]
+            block = root * equations.solver.solve(np.vstack([root * block, padding]))[:n]
             block = np.linalg.qr(block)[0]
             # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
             product = np.add.reduceat(entries[:, None] * block[self._h_row], starts, axis=0)
