@@ -19,11 +19,11 @@ from .prepared import Prepared
 
 __all__ = ["Followed", "follow"]
 
-STEP_ROTATION = 0.6
+STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
 
-CONTRACTION = 0.5
-"""... or do not halve from one to the next."""
+CONTRACTION = 0.35
+"""... or do not shrink at least by this from one to the next."""
 
 SHORTEST = 1e-4
 """Steps below this share of the way done end the search on this branch."""
@@ -69,7 +69,9 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
         if done >= 1.0:
             return Followed(now.state, True, tuple(left))
         trial = min(1.0, done + step)
-        there = prepared.correct(now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION)
+        there = prepared.correct(
+            now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
+        )
         if not there.converged:
             if step > max(SHORTEST * done, TINY):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25

@@ -57,8 +57,8 @@ class Point:
         Potential energy (zero for the undeformed, unloaded scene) and its elastic part.
     residual : ndarray (unknowns + rows,)
         Out-of-balance moments and forces, then closing gaps.
-    size : ndarray (unknowns + rows,)
-        Sums of the absolute values of what the residual adds up, to judge its rounding.
+    scale : float
+        Largest moment or force that the residual adds up, to judge its rounding.
     entries : ndarray
         Entries of the Newton matrix, in the order of :attr:`Equations.row` and :attr:`Equations.column`.
     """
@@ -66,7 +66,7 @@ class Point:
     potential: float
     strain: float
     residual: Array
-    size: Array
+    scale: float
     entries: Array
 
 
@@ -82,6 +82,7 @@ class Equations:
         self._kernel = Batch(compiled_where_it_pays(element.turning, calls), n)
         self._kernel.set(1, model.stiffness)
         self._kernel.set(2, model.tangent)
+        self._longest = float(model.weight.sum(axis=1).max())
         self._first = np.array([model.first[name] for name in model.members])
         self._rest = np.add.reduceat(model.tangent.sum(axis=1), self._first, axis=0)
         self._z = positions.Z.reshape(len(positions.rows), len(model.members), element.axes)
@@ -215,7 +216,8 @@ class Equations:
         model, positions = self.model, self.model.positions
         constant = self.member_pulls(state.lam, loading)[model.owner]
         self._kernel.set(0, state.q[model.turns])
-        self._kernel.set(3, loading.pull + constant[:, None, :])
+        pull = loading.pull + constant[:, None, :]
+        self._kernel.set(3, pull)
         strain, work, moments, stiffness, reach, spin = self._kernel()
         moments, stiffness, spin = self._local_parts(moments, stiffness, spin)
         if convex:
@@ -224,19 +226,18 @@ class Equations:
 
         potential = float(strain.sum() + work.sum() - (constant * reach).sum() - (loading.pull * model.tangent).sum())
         potential -= float(loading.force.ravel() @ nodal)
-        used = moments.ravel()[self._used]
-        residual = np.bincount(self._used_numbers, weights=used, minlength=self.total)
-        size = np.bincount(self._used_numbers, weights=np.abs(used), minlength=self.total)
+        residual = np.bincount(self._used_numbers, weights=moments.ravel()[self._used], minlength=self.total)
+        # Held nodes count: their moments are what a structure of one element carries.
+        scale = max(_largest(moments), _largest(pull) * self._longest, _largest(loading.couple))
         if not model.space:
             potential -= float(loading.couple @ state.q[:, 0])
             couple = loading.couple[self._free]
             residual[: self.turning_unknowns] -= couple
-            size[: self.turning_unknowns] += np.abs(couple)
         lam, force = state.lam[: len(positions.rows)], loading.force.ravel()
         if self.displacement_unknowns:
             displacement = slice(self.turning_unknowns, self.unknowns)
             residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
-            size[displacement] = np.abs(positions.W.T) @ np.abs(lam) + np.abs(positions.Y.T) @ np.abs(force)
+            scale = max(scale, _largest(lam), _largest(force))
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
         parts = [stiffness.ravel(), *self._closing_parts(spin), self._w_entries, self._w_entries]
@@ -244,7 +245,7 @@ class Equations:
             parts += self._hinge_parts(state, residual)
         values = np.concatenate([*parts, self._zeros])[self._valid]
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
-        return Point(potential, float(strain.sum()), residual, size, entries)
+        return Point(potential, float(strain.sum()), residual, scale, entries)
 
     def end_moments(self, state: State, loading: Loading) -> dict[str, Array]:
         """Moment (3,) about the fixed axes that the surroundings exert on the first end of each member."""
@@ -354,6 +355,10 @@ class Equations:
 
 FEW_ROWS = 12
 """Up to this many closings csparse is faster than MUMPS, beyond it can be ten times slower (measured)."""
+
+
+def _largest(a: Array) -> float:
+    return float(np.abs(a).max(initial=0.0))
 
 
 def _positive_part(matrices: Array) -> Array:

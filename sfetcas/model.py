@@ -18,7 +18,7 @@ from __future__ import annotations
 import enum
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -110,6 +110,11 @@ class Loading:
     def scaled(self, factor: float) -> Loading:
         """All loads and motions times a factor."""
         return Loading(*(factor * getattr(self, name) for name in PARTS))
+
+    def unloaded(self) -> Loading:
+        """The motions alone."""
+        zero = {name: np.zeros_like(getattr(self, name)) for name in ("force", "couple", "pull", "spread")}
+        return replace(self, **zero)
 
     def plus(self, other: Loading) -> Loading:
         """The sum of two loadings."""

@@ -60,7 +60,7 @@ class Prepared:
         """A state to start from, and the gap of its closings."""
         return first_guess(self.equations, loading, self._test.weight)
 
-    def correct(self, state: State, loading: Loading, **limits: float) -> Corrected:
+    def correct(self, state: State, loading: Loading, **limits: Any) -> Corrected:
         """Newton's method from a near state."""
         return correct(self.equations, state, loading, self._test.weight, **limits)
 

@@ -291,8 +291,7 @@ class _Run:
         """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
         model = pilot.model
         if last is not None and last[0] * (factor - last[0]) >= 0.0 and (last[0] != 0.0 or not self.scene.histories):
-            before, state = last[0], last[1].corrected.state
-            found = self._followed(pilot, lambda t: model.loading(before + t * (factor - before)), state)
+            found = self._through(pilot, last[0], factor, last[1].corrected.state)
             if found is not None:
                 return found
         zero = pilot.equations.start(model.loading(0.0, 0.0))
@@ -306,7 +305,19 @@ class _Run:
             if first is None:
                 return None
             zero = first.corrected.state
-        return self._followed(pilot, lambda t: model.loading(t * factor), zero)
+        return self._through(pilot, 0.0, factor, zero)
+
+    def _through(self, pilot: Prepared, begin: float, end: float, state: State) -> _Found | None:
+        """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
+        knots = {t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)}
+        stops = [begin, *sorted(knots, reverse=end < begin), end]
+        found: _Found | None = None
+        for a, b in zip(stops, stops[1:], strict=False):
+            part = self._followed(pilot, lambda t, a=a, b=b: pilot.model.loading(a + t * (b - a)), state)
+            if part is None:
+                return None
+            found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
+        return found
 
     def _grown_from_bent(self, pilot: Prepared, factor: float) -> _Found | None:
         """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
