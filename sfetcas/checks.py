@@ -74,10 +74,12 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
         along = step.along(parts[1], [at])
         return _entry(along, parts[2])[0]
     if parts[0] == "nodes" and len(parts) == 3:
-        entry = {"position": step.position(parts[1])}
+        entry: dict[str, Any] = {"position": step.position(parts[1])}
         turned = step.quaternion(parts[1])
         if turned is not None:
-            entry |= {"quaternion": turned} if step.model.space else {"quaternion": turned, "angle": step.angle(parts[1])}
+            entry |= (
+                {"quaternion": turned} if step.model.space else {"quaternion": turned, "angle": step.angle(parts[1])}
+            )
         return _entry(entry, parts[2])
     if parts[0] == "reactions" and len(parts) == 3:
         force, moment = step.reaction(parts[1])

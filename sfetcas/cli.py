@@ -46,7 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="sfetcas", description="Equilibria of very flexible beams under large motion.")
+    parser = argparse.ArgumentParser(
+        prog="sfetcas", description="Equilibria of very flexible beams under large motion."
+    )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="solve a scene and print a short report")
     run.add_argument("file", type=Path, help="scene file, .toml or .json")
@@ -140,7 +142,9 @@ def _report(solution: Solution, seconds: float) -> None:
     model = solution.last.model
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(f"  {model.mesh.elements} elements {model.element.name}, {model.unknowns} unknowns, {model.assembly} assembly")
+    print(
+        f"  {model.mesh.elements} elements {model.element.name}, {model.unknowns} unknowns, {model.assembly} assembly"
+    )
     for step in solution.steps:
         _report_step(step)
     split = f"model {solution.seconds['model']:.3f} s, solve {solution.seconds['solve']:.3f} s"
@@ -158,7 +162,7 @@ def _report_step(step: Equilibrium) -> None:
             force, moment = step.reaction(name)
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
     proof = step.certificate
-    kind = {True: "stable", False: f"unstable ({proof.negative} ways out)"}.get(proof.stable, "neutral")  # type: ignore[call-overload]
+    kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
     print(
         f"  {kind}, smallest eigenvalue {proof.smallest:.4g} N, residual {proof.residual:.1e}, "
         f"estimated error {proof.error_estimate:.1e} of the size"

@@ -88,9 +88,7 @@ class Screw(Curve):
         forward = np.sin(2.0 * math.pi * rest) / total if total else x
         aside = 2.0 * np.sin(math.pi * rest) ** 2 / total if total else 0.0 * x
         return np.asarray(
-            np.outer(x, along)
-            + np.outer(forward, tangent - along)
-            + np.outer(aside, np.cross(self.axis, tangent))
+            np.outer(x, along) + np.outer(forward, tangent - along) + np.outer(aside, np.cross(self.axis, tangent))
         )
 
     def quaternions(self, x: Floats) -> Floats:

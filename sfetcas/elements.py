@@ -24,15 +24,13 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from . import interpolation
+from .arrays import Array
 from .quaternion import product, turned
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["ELEMENTS", "Element", "element_by_name"]
 
@@ -235,6 +233,7 @@ class Element:
             "reach_spin": ca.densify(ca.mtimes(ca.jacobian(reach, q), spin)),
         }
         return self._function("turning", [q, *data], results)
+
 
 ARGUMENTS = ("q", "stiffness", "tangent", "pull")
 ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))

@@ -12,18 +12,15 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from . import interpolation, quaternion
+from .arrays import Array, Index
 from .joints import hinge
 from .kernels import Batch, compiled_where_it_pays
 from .linear import SparseSolver
 from .model import Loading, Model, Turn
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-Index = np.ndarray[Any, np.dtype[np.intp]]
 
 __all__ = ["Equations", "Point", "State"]
 
@@ -256,7 +253,9 @@ class Equations:
         moments = self._kernel()[2]
         turns = model.element.turns
         first = [moments[model.first[name], :turns] for name in model.members]
-        return {n: m.copy() if turns == 3 else np.array([0.0, 0.0, m[0]]) for n, m in zip(model.members, first, strict=True)}
+        return {
+            n: m.copy() if turns == 3 else np.array([0.0, 0.0, m[0]]) for n, m in zip(model.members, first, strict=True)
+        }
 
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from . import interpolation, quaternion
+from .arrays import Array
 from .equations import Equations, State
 from .model import Loading
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -143,7 +142,7 @@ class Fields:
         on_element = -(self._loading.pull[part] + inside)[:, 0] - after[1:]
         return np.concatenate([on_element[:1], on_element])
 
-    @functools.lru_cache(maxsize=None)  # noqa: B019 - lives as long as the fields
+    @functools.cache  # noqa: B019 - lives as long as the fields
     def _element_starts(self, member: str) -> tuple[Array, Array]:
         """Displacement and moment at the start of each element of a member (and its end)."""
         model = self.model

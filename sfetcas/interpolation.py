@@ -7,13 +7,12 @@ Source: Abramowitz and Stegun 25.4.29 and 25.4.32; barycentric formulas as in Be
 from __future__ import annotations
 
 import functools
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from .arrays import Array
 
 __all__ = ["differentiation", "evaluation", "gauss", "integration", "legendre_tail", "lobatto"]
 

@@ -21,7 +21,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from .arrays import Array
 
 __all__ = ["Batch", "cache_folder", "compiled", "compiled_where_it_pays"]
 
@@ -118,13 +118,15 @@ class Batch:
 
     def __init__(self, function: ca.Function, n: int) -> None:
         self._function = function.map(n) if n > 1 else function
-        self._buffer, self._call = self._function.buffer()
+        buffer: Any
+        buffer, self._call = self._function.buffer()
+        self._buffer = buffer
         self._arguments: list[Array] = [np.zeros((n, function.nnz_in(i))) for i in range(function.n_in())]
         self.results: list[Array] = [np.zeros((n, function.nnz_out(i))) for i in range(function.n_out())]
         for i, array in enumerate(self._arguments):
-            self._buffer.set_arg(i, memoryview(array))
+            self._buffer.set_arg(i, array.data)
         for i, array in enumerate(self.results):
-            self._buffer.set_res(i, memoryview(array))
+            self._buffer.set_res(i, array.data)
 
     def set(self, i: int, values: Array) -> None:
         """Give argument i, any shape with n first."""

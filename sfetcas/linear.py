@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from .arrays import Array
 
 __all__ = ["SparseSolver"]
 

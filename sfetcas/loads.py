@@ -37,9 +37,7 @@ class History(Record):
         if (self.value is None) == (self.polynomial is None):
             raise SceneError("accepted: either value or polynomial, one of them")
         if self.value is not None and len(self.value) != len(self.t):
-            raise SceneError(
-                f"found {len(self.value)} numbers, accepted: {len(self.t)}, one for each t", ("value",)
-            )
+            raise SceneError(f"found {len(self.value)} numbers, accepted: {len(self.t)}, one for each t", ("value",))
         if self.polynomial is not None and not len(self.polynomial) == len(self.t) - 1 > 0:
             accepted = "one list of coefficients for each interval of t, at least one"
             raise SceneError(
@@ -102,34 +100,24 @@ class Load(Staged):
             accepted = "[x, y] or [x, y, z]; only a moment may be one number"
             raise SceneError(f"found {self.value:g}, accepted: {accepted}", ("value",))
         if self.type != "distributed" and self.profile is not None:
-            raise SceneError(
-                f"not accepted with a {self.type}; only a distributed load has a profile", ("profile",)
-            )
+            raise SceneError(f"not accepted with a {self.type}; only a distributed load has a profile", ("profile",))
         return self
 
     def _check_place(self) -> None:
         if self.type == "distributed":
             return self._check_distributed()
         if self.node is None and self.member is None:
-            raise SceneError(
-                "neither node nor member is given, accepted: one of them, on which the load acts"
-            )
+            raise SceneError("neither node nor member is given, accepted: one of them, on which the load acts")
         if self.node is not None and self.member is not None:
             raise SceneError(f"found node {self.node!r} and member {self.member!r}, accepted: one of them")
         if self.node is not None and self.at is not None:
-            raise SceneError(
-                f"found {self.at:g}, accepted: only with a member, and here a node is given", ("at",)
-            )
+            raise SceneError(f"found {self.at:g}, accepted: only with a member, and here a node is given", ("at",))
         if self.member is not None and self.at is None:
-            raise SceneError(
-                f"the key 'at' is missing: the fraction of the length where the {self.type} acts"
-            )
+            raise SceneError(f"the key 'at' is missing: the fraction of the length where the {self.type} acts")
 
     def _check_distributed(self) -> None:
         if self.node is not None:
-            raise SceneError(
-                f"found {self.node!r}, accepted: a member, as the load is distributed", ("node",)
-            )
+            raise SceneError(f"found {self.node!r}, accepted: a member, as the load is distributed", ("node",))
         if self.member is None:
             raise SceneError("the key 'member' is missing: a distributed load acts along a member")
         if self.at is not None:

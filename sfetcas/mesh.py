@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from .arrays import Array
 from .scene import Scene
 from .sections import breaks as kinks
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["Mesh", "breaks_of", "first_mesh", "uniform_mesh"]
 

@@ -24,14 +24,12 @@ from typing import Any, Literal
 import numpy as np
 
 from . import quaternion
+from .arrays import Array, Index
 from .elements import Element, element_by_name
 from .errors import SceneError
 from .mesh import SAME, Mesh
 from .scene import Load, Node, Scene
 from .sections import evaluate
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-Index = np.ndarray[Any, np.dtype[np.intp]]
 
 __all__ = ["Block", "Loading", "Model", "Positions", "Scales", "Turn", "assemble"]
 
@@ -295,7 +293,9 @@ def _scales(scene: Scene) -> Scales:
 
 
 def _element_data(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> dict[str, Any]:
-    stiffness, tangent, weight, owner, first = [], [], [], [], {}
+    stiffness, tangent, weight = [], [], []
+    owner: list[Index] = []
+    first: dict[str, int] = {}
     for number, (name, member) in enumerate(scene.members.items()):
         cuts, line = mesh.cuts[name], scene.center_lines[name]
         x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.points
@@ -331,7 +331,7 @@ def _rotations(scene: Scene, mesh: Mesh, element: Element) -> dict[str, Any]:
     """Number the rotations along the members and say how each may change."""
     kind: list[Turn] = []
     axis: list[tuple[float, float, float]] = []
-    node_turn: dict[str, int | None] = {name: None for name in scene.nodes}
+    node_turn: dict[str, int | None] = dict.fromkeys(scene.nodes)
     at_node: dict[str, list[tuple[str, int]]] = {name: [] for name in scene.nodes}
 
     def new(turn: Turn, about: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> int:
@@ -610,7 +610,8 @@ def _add_moment(
         if number is None:
             raise SceneError(f"nothing turns with node {load.node!r}, so no moment can act on it", ("loads", name))
     else:
-        assert load.member is not None and load.at is not None
+        assert load.member is not None
+        assert load.at is not None
         number = _chain(load.member, mesh, element, rotations, data)[_cut(mesh, load.member, load.at) * element.order]
     group.couple[number] += load.vector[2] / scales.moment
 

@@ -15,9 +15,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import Array
 from .errors import Status
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["NLP", "Ipopt", "NLPResult", "Solver"]
 
@@ -215,7 +214,13 @@ class Ipopt:
             "obj_scaling_factor": self.objective_scale,
             **self.extra,
         }
-        options = {"print_time": False, "calc_lam_p": False, "calc_lam_x": False, "error_on_fail": False, "no_nlp_grad": True}
+        options = {
+            "print_time": False,
+            "calc_lam_p": False,
+            "calc_lam_x": False,
+            "error_on_fail": False,
+            "no_nlp_grad": True,
+        }
         return Solver("ipopt", {**options, "ipopt": ipopt}).prepare(nlp)
 
     def solve(self, nlp: NLP) -> NLPResult:

@@ -8,12 +8,12 @@ solve it with any nlpsol plugin, read the answer by name.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import Array
 from .equations import State
 from .errors import SceneError, SolveError, Status
 from .model import Model
@@ -21,8 +21,6 @@ from .nlp import NLP, Ipopt, NLPResult, Solver
 from .prepared import Prepared
 from .problem import EquilibriumProblem
 from .records import nearest
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["OpenAnswer", "OpenProblem", "equilibrium_nlp"]
 
@@ -95,7 +93,9 @@ class OpenProblem:
 
     # -- extensions -----------------------------------------------------------------------------
 
-    def with_row(self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None, *, unit: float = 1.0) -> OpenProblem:
+    def with_row(
+        self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None, *, unit: float = 1.0
+    ) -> OpenProblem:
         """With rows ``lower <= row <= upper``; ``unit`` is the size of the row, to make it dimensionless."""
         scaled = None if upper is None else np.asarray(upper, dtype=float) / unit
         nlp = self.nlp.with_row(name, row / unit, np.asarray(lower, dtype=float) / unit, scaled)
@@ -131,7 +131,9 @@ class OpenAnswer:
     def value(self, expression: ca.MX) -> Array:
         """Value of any expression of the problem."""
         nlp = self.problem.nlp
-        return np.asarray(ca.Function("value", [nlp.x, nlp.p], [expression])(self.result.x, nlp.p_value).full()).squeeze()
+        return np.asarray(
+            ca.Function("value", [nlp.x, nlp.p], [expression])(self.result.x, nlp.p_value).full()
+        ).squeeze()
 
     def position(self, node: str) -> Array:
         """Position of a node, (3,) m."""

@@ -12,13 +12,12 @@ import numpy as np
 from . import quaternion
 from .equations import Equations, State
 from .errors import SolveError, Status
+from .guess import first_guess, restore
 from .model import Loading, Model
-from .newton import Corrected, correct, first_guess, restore
+from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem
 from .stability import Stability, StabilityTest
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["Prepared"]
 

@@ -10,23 +10,22 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from . import interpolation, quaternion
+from .arrays import Array
 from .equations import State
 from .joints import hinge_rows
 from .kernels import compiled_where_it_pays
 from .model import Loading, Model, Turn
 from .nlp import NLP
 from .quaternion import product
-from .quaternion import turned
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
-__all__ = ["EquilibriumProblem", "equilibrium_nlp"]
+__all__ = ["EquilibriumProblem"]
 
 
 def _matrix(rows: Array, columns: Array, values: Array, shape: tuple[int, int]) -> ca.DM:
@@ -105,8 +104,13 @@ class EquilibriumProblem:
         n, points = model.weight.shape
         turning = self._reduction.unknowns
         self.x = ca.MX.sym("x", turning + positions.Y.shape[1])
-        sizes = (n * points * element.axes, len(model.kind) * element.components, len(positions.rows))
-        sizes = (*sizes, self.x.numel(), positions.B.shape[1])
+        sizes = (
+            n * points * element.axes,
+            len(model.kind) * element.components,
+            len(positions.rows),
+            self.x.numel(),
+            positions.B.shape[1],
+        )
         self.p = ca.MX.sym("p", sum(sizes))
         pull, held, offset, force, shift = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
         self._pull = ca.reshape(pull, element.axes, n * points)
@@ -196,11 +200,11 @@ class EquilibriumProblem:
     def _hinge_cells(self) -> Array:
         return np.asarray((self.model.hinges[:, :, None] * 4 + np.arange(4)).reshape(len(self.model.hinges), 8))
 
-    def _hinge_call(self, lam: ca.MX | None = None) -> list[ca.MX]:
+    def _hinge_call(self, lam: ca.MX | None = None) -> Any:
         n = len(self.model.hinges)
         q = ca.reshape(self._q[self._hinge_cells.ravel().tolist()], 8, n)
         normals = ca.MX(ca.DM(self.model.hinge_axes.reshape(2 * n, 3).T))
-        result: list[ca.MX] = self._hinge(q, normals, ca.MX.zeros(2, n) if lam is None else ca.reshape(lam, 2, n))
+        result: Any = self._hinge(q, normals, ca.MX.zeros(2, n) if lam is None else ca.reshape(lam, 2, n))
         return result
 
     def _hinges(self) -> ca.MX:

@@ -250,9 +250,7 @@ def sentence(error: ValidationError, record: type[BaseModel]) -> SceneError:
         case "value_error":
             return SceneError(str(context["error"]), where)
         case "extra_forbidden":
-            return SceneError(
-                f"unknown key {say(where[-1])}; {nearest(where[-1], record.model_fields)}", where[:-1]
-            )
+            return SceneError(f"unknown key {say(where[-1])}; {nearest(where[-1], record.model_fields)}", where[:-1])
         case "missing":
             return SceneError(f"the key {where[-1]!r} is missing", where[:-1])
         case "union_tag_not_found":
@@ -274,8 +272,4 @@ def _place(loc: tuple[int | str, ...], record: type[BaseModel]) -> tuple[str, ..
 
 def _choice(found: Any, expected: str) -> str:
     words = re.findall("'([^']*)'", expected)
-    return (
-        unknown(found, words)
-        if isinstance(found, str)
-        else f"found {say(found)}, accepted: {', '.join(words)}"
-    )
+    return unknown(found, words) if isinstance(found, str) else f"found {say(found)}, accepted: {', '.join(words)}"

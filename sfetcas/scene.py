@@ -191,9 +191,7 @@ def _check_members(scene: Scene) -> None:
     used = {node for member in scene.members.values() for node in member.nodes}
     for name in scene.nodes:
         if name not in used:
-            raise SceneError(
-                "node without member, accepted: a node where at least one member ends", ("nodes", name)
-            )
+            raise SceneError("node without member, accepted: a node where at least one member ends", ("nodes", name))
 
 
 def _check_driven(scene: Scene) -> None:
@@ -217,9 +215,7 @@ def _check_axes(scene: Scene) -> None:
     used = hinged(scene.nodes, scene.members)
     for name, node in scene.nodes.items():
         if node.axis != (0.0, 0.0, 1.0) and name not in used:
-            message = (
-                "neither the support nor the joint nor a member end released here is a hinge with this axis"
-            )
+            message = "neither the support nor the joint nor a member end released here is a hinge with this axis"
             raise SceneError(message, ("nodes", name, "axis"))
 
 
@@ -254,9 +250,7 @@ def _check_moments(scene: Scene) -> None:
             raise SceneError(message, ("loads", name, "node"))
         later = refusal(SPACE_MOMENT)
         if later and scene.resolved_dimension == "space":
-            raise SceneError(
-                f"{later}; the scene is in space as {scene.dimension_reason}", ("loads", name, "type")
-            )
+            raise SceneError(f"{later}; the scene is in space as {scene.dimension_reason}", ("loads", name, "type"))
 
 
 def _check_motions(scene: Scene) -> None:

@@ -99,9 +99,7 @@ def _read(path: Path) -> str:
     except IsADirectoryError:
         raise SceneError("this is a folder, accepted: a scene file") from None
     except UnicodeDecodeError as error:
-        raise SceneError(
-            f"found a byte that is not UTF-8 at position {error.start}, accepted: UTF-8"
-        ) from None
+        raise SceneError(f"found a byte that is not UTF-8 at position {error.start}, accepted: UTF-8") from None
     except (OSError, ValueError) as error:
         raise SceneError(f"the file cannot be read: {_reason(error)}") from None
 

@@ -255,8 +255,8 @@ class CrossSection(Record):
     EI2: Above | None = None
     EI3: Above | None = None
     GJ: Above | None = None
-    rhoA: Above | None = None  # noqa: N815 - the symbol of the field
-    rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None  # noqa: N815
+    rhoA: Above | None = None
+    rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     shape: Literal["rectangle", "circle", "tube"] | None = None
     E: Above | None = None
     nu: Annotated[Number, AfterValidator(_poisson)] | None = None
@@ -279,9 +279,7 @@ class CrossSection(Record):
                 )
             self._check_shape(self.shape)
         elif outlined := self._given(_MATERIAL + _DIMENSIONS):
-            raise SceneError(
-                f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}"
-            )
+            raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
         elif not numbers:
             raise SceneError(f"found nothing in it, accepted: {', '.join(_NUMBERS)} or a shape")
         return self

@@ -382,9 +382,7 @@ def _arc(shape: Arc, start: Floats, chord: Floats, b2: Floats | None) -> tuple[f
 def _check_start(start: Floats, tangent: Floats) -> None:
     angle = math.atan2(_norm(np.cross(_unit(start), tangent)), _unit(start) @ tangent)
     if angle > NEAR:
-        found = (
-            f"found {_say(start)}, {angle:.3g} rad off the tangent {_say(tangent)} that angle and nodes give"
-        )
+        found = f"found {_say(start)}, {angle:.3g} rad off the tangent {_say(tangent)} that angle and nodes give"
         raise SceneError(f"{found}, accepted: up to {NEAR:g} rad, or no start", ("shape", "start"))
 
 
@@ -402,9 +400,7 @@ def _helix(shape: Helix, start: Floats, b2: Floats | None) -> tuple[float, Curve
     return length, Screw(first=first, axis=axis, turns=shape.turns)
 
 
-def _given_curvature(
-    shape: Curvature, start: Floats, chord: Floats, b2: Floats | None
-) -> tuple[float, Curve]:
+def _given_curvature(shape: Curvature, start: Floats, chord: Floats, b2: Floats | None) -> tuple[float, Curve]:
     if shape.start is None:
         if any(shape.kappa3) or any(shape.kappa2):
             needed = "a bent line needs its tangent at the first node"

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from . import quaternion
+from .arrays import Array
 from .equations import Equations, Point, State
 from .errors import SceneError, Status
 from .fields import Fields
 from .model import Loading, Model
 from .records import nearest
 from .stability import Stability
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["Certificate", "Equilibrium", "Solution"]
 

@@ -13,14 +13,12 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from .arrays import Array
 from .equations import Equations, Point
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["Stability", "StabilityTest"]
 

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from . import interpolation
+from .arrays import Array
 from .continuation import follow
 from .elements import ELEMENTS
 from .equations import State
@@ -30,8 +31,6 @@ from .scene import Scene
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
 
@@ -208,7 +207,7 @@ class _Run:
 
     def _choose_meshes(self) -> None:
         scene, settings = self.scene, self.settings
-        names = {m.element for m in scene.members.values() if m.element is not None}
+        names: set[str] = {m.element for m in scene.members.values() if m.element is not None}
         if settings.element is not None:
             names = {settings.element}
         if len(names) > 1:
@@ -263,7 +262,9 @@ class _Run:
             reached.iterations = alone.iterations
             apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
             if apart and not reached.notes and alone.stability.negative == 0:
-                reached.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
+                reached.notes += (
+                    "the loads growing from zero lead here, not to the minimum nearest to the start guess",
+                )
         return reached
 
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[_Found | None, SolveError | None]:
@@ -274,9 +275,7 @@ class _Run:
             return None, error
         return _Found(pilot, corrected, pilot.stability(corrected), iterations=iterations), None
 
-    def _accepted(
-        self, pilot: Prepared, alone: _Found | None, failure: SolveError | None, loading: Loading
-    ) -> _Found:
+    def _accepted(self, pilot: Prepared, alone: _Found | None, failure: SolveError | None, loading: Loading) -> _Found:
         """What IPOPT found, an unstable state left if that is wanted."""
         if alone is None:
             assert failure is not None
@@ -309,7 +308,9 @@ class _Run:
 
     def _through(self, pilot: Prepared, begin: float, end: float, state: State) -> _Found | None:
         """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
-        knots = {t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)}
+        knots = {
+            t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)
+        }
         stops = [begin, *sorted(knots, reverse=end < begin), end]
         found: _Found | None = None
         for a, b in zip(stops, stops[1:], strict=False):
@@ -421,7 +422,9 @@ class _Run:
     def _difference(self, coarse: _Found, fine: _Found, factor: float) -> float:
         """Largest distance of positions at ends and middles of the coarse elements, over the scene's size."""
         largest = 0.0
-        sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (coarse, fine)]
+        sides = [
+            Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (coarse, fine)
+        ]
         for name, cuts in coarse.prepared.model.mesh.cuts.items():
             x = np.sort(np.concatenate([cuts, 0.5 * (cuts[1:] + cuts[:-1])]))
             a, b = (side.along(name, x, dimensionless=True)["position"] for side in sides)
@@ -435,7 +438,9 @@ class _Run:
         fields = Fields(found.prepared.equations, found.corrected.state, loading)
         q = found.corrected.state.q[model.turns]
         angles = np.linalg.norm(np.einsum("j,ejc->ec", interpolation.legendre_tail(element.nodes), q), axis=1)
-        turned = np.einsum("k,eka->ea", interpolation.legendre_tail(element.points), fields.turned / element.weights[:, None])
+        turned = np.einsum(
+            "k,eka->ea", interpolation.legendre_tail(element.points), fields.turned / element.weights[:, None]
+        )
         reach = np.linalg.norm(turned, axis=1) * model.scales.length / self.scene.size
         rough = (2.0 if model.space else 1.0) * angles + reach > smooth
         return {

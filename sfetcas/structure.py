@@ -75,9 +75,7 @@ class Node(Staged):
         if self.support == "slider" and self.direction is None:
             raise SceneError("the key 'direction' is missing: a slider needs the direction of its guide")
         if self.support != "slider" and self.direction is not None:
-            raise SceneError(
-                f"only a slider has a direction, and the support is {self.support!r}", ("direction",)
-            )
+            raise SceneError(f"only a slider has a direction, and the support is {self.support!r}", ("direction",))
         if self.support != "slider" and self.rotation != "fixed":
             raise SceneError(
                 f"found {self.rotation!r}, accepted: only for a slider, and the support is {self.support!r}",
@@ -125,9 +123,7 @@ class Member(Staged):
     @model_validator(mode="after")
     def _check(self) -> Member:
         if self.nodes[0] == self.nodes[1]:
-            raise SceneError(
-                f"found {self.nodes[0]!r} at both ends, accepted: two different nodes", ("nodes",)
-            )
+            raise SceneError(f"found {self.nodes[0]!r} at both ends, accepted: two different nodes", ("nodes",))
         return self
 
 

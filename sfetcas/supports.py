@@ -72,9 +72,7 @@ def check_floating(
     SceneError
         Names the nodes of the part and how it can move.
     """
-    moved = {
-        motion.node: motion.displacement for motion in motions.values() if motion.displacement is not None
-    }
+    moved = {motion.node: motion.displacement for motion in motions.values() if motion.displacement is not None}
     for part in components(nodes, members):
         held = np.vstack([held_directions(nodes[name], moved.get(name)) for name in part])
         free = free_directions(held, dimension)
@@ -136,9 +134,7 @@ def _check_rotation(motion: Motion, node: Node, dimension: str, reason: str) -> 
         message = f"node {motion.node!r} has no rotation of its own, as its joint is a {node.joint}"
         raise SceneError(message, where)
     if node.turn == "ball":
-        accepted = (
-            "only nodes that are clamped, a hinge or a slider that does not turn as a ball can be turned"
-        )
+        accepted = "only nodes that are clamped, a hinge or a slider that does not turn as a ball can be turned"
         raise SceneError(f"node {motion.node!r} turns freely as a ball; {accepted}", where)
     if node.turn == "hinge" and not number:
         raise SceneError(f"found {found}, accepted: a number, the angle about the axis of the hinge", where)
