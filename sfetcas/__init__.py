@@ -19,7 +19,7 @@ from .errors import SceneError, SolveError, Status
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Model, assemble
 from .nlp import NLP, Ipopt, NLPResult, Solver
-from .open_problem import OpenProblem, equilibrium_nlp
+from .open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
 from .prepared import Prepared
 from .scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
 from .scenefile import dump, load
@@ -49,6 +49,7 @@ __all__ = [
     "Motion",
     "NLPResult",
     "Node",
+    "OpenAnswer",
     "OpenProblem",
     "Prepared",
     "Scene",

@@ -18,7 +18,7 @@ import numpy as np
 from . import interpolation, quaternion
 from .arrays import Array, Index
 from .joints import hinge
-from .kernels import Batch, compiled_where_it_pays
+from .kernels import Batch, Kernels, chosen
 from .linear import SparseSolver
 from .model import Loading, Model, Turn
 
@@ -70,13 +70,13 @@ class Point:
 class Equations:
     """The stationarity equations of one model, prepared for repeated evaluation."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
         self.model = model
         element, positions = model.element, model.positions
         self._number_unknowns()
         n = len(model.turns)
         calls = 12.0 * n
-        self._kernel = Batch(compiled_where_it_pays(element.turning, calls), n)
+        self._kernel = Batch(chosen(element.turning, calls, kernels), n)
         self._kernel.set(1, model.stiffness)
         self._kernel.set(2, model.tangent)
         self._longest = float(model.weight.sum(axis=1).max())

@@ -16,14 +16,17 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from .arrays import Array
 
-__all__ = ["Batch", "cache_folder", "compiled", "compiled_where_it_pays"]
+__all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled"]
+
+Kernels = Literal["auto", "compiled", "interpreted"]
+"""How element functions are evaluated."""
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 """-O1 compiles three times faster than -O2 and the kernels, straight-line code, run as fast."""
@@ -94,12 +97,16 @@ def compiled(function: ca.Function) -> ca.Function:
     return _load(function, path) or function
 
 
-def compiled_where_it_pays(function: ca.Function, calls: float) -> ca.Function:
-    """The compiled function where it is in the cache or where ``calls`` of it take longer than compiling.
+def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca.Function:
+    """The function interpreted or compiled, as asked or as it pays.
 
-    $SFETCAS_KERNELS forces one way: ``compiled`` or ``interpreted``; anything else means as above.
+    Parameters
+    ----------
+    calls : float
+        How often it will be called: ``auto`` compiles where that takes longer than compiling, and takes what is
+        in the cache where it is worth looking.  $SFETCAS_KERNELS changes what ``auto`` means to one of the others.
     """
-    way = os.environ.get("SFETCAS_KERNELS", "")
+    way = os.environ.get("SFETCAS_KERNELS", "auto") if kernels == "auto" else kernels
     if way == "interpreted":
         return function
     instructions = function.n_instructions()

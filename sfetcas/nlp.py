@@ -114,7 +114,8 @@ class Solver:
     options : mapping
         Options of nlpsol and of the plugin, as CasADi takes them.
     exact : bool
-        Hand the record's derivatives over; False lets CasADi differentiate the expressions again.
+        Hand the record's derivatives over where the plugin takes them (IPOPT does); otherwise CasADi
+        differentiates the expressions again.
     """
 
     plugin: str = "ipopt"
@@ -124,7 +125,7 @@ class Solver:
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
         """A function (p, guess, lam) -> NLPResult; each argument defaults to that of the record."""
         options = dict(self.options)
-        if self.exact:
+        if self.exact and self.plugin == "ipopt":
             options |= _derivatives(nlp)
         function = ca.nlpsol("nlp", self.plugin, {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}, options)
 

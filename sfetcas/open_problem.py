@@ -37,7 +37,7 @@ def equilibrium_nlp(model: Model | Prepared, factor: float = 1.0) -> OpenProblem
     prepared = model if isinstance(model, Prepared) else Prepared(model)
     loading = prepared.model.loading(factor)
     guess, _ = prepared.guess(loading)
-    return OpenProblem(prepared, factor, EquilibriumProblem(prepared.model, loading, guess))
+    return OpenProblem(prepared, factor, EquilibriumProblem(prepared.model, loading, guess, kernels="interpreted"))
 
 
 @dataclass(frozen=True, eq=False)

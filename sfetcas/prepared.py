@@ -13,6 +13,7 @@ from . import quaternion
 from .equations import Equations, State
 from .errors import SolveError, Status
 from .guess import first_guess, restore
+from .kernels import Kernels
 from .model import Loading, Model
 from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
@@ -29,15 +30,24 @@ ESCAPES = 8
 
 
 class Prepared:
-    """Solvers of one model; each is made when it is first needed."""
+    """Solvers of one model; each is made when it is first needed.
 
-    def __init__(self, model: Model) -> None:
+    Parameters
+    ----------
+    model : Model
+    kernels : str
+        ``auto`` compiles element functions where that pays in one run; ``compiled`` always, for many solves;
+        ``interpreted`` never.  Without a compiler everything is interpreted.
+    """
+
+    def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
         self.model = model
+        self.kernels: Kernels = kernels
 
     @functools.cached_property
     def equations(self) -> Equations:
         """The stationarity equations in rotations."""
-        return Equations(self.model)
+        return Equations(self.model, kernels=self.kernels)
 
     @functools.cached_property
     def _test(self) -> StabilityTest:
@@ -46,7 +56,7 @@ class Prepared:
     @functools.cached_property
     def _problem(self) -> EquilibriumProblem:
         loading = self.model.loading(1.0)
-        return EquilibriumProblem(self.model, loading, self.equations.start(loading))
+        return EquilibriumProblem(self.model, loading, self.equations.start(loading), kernels=self.kernels)
 
     def _ipopt(self, scale: float) -> Callable[..., NLPResult]:
         return self._solvers(10.0 ** round(np.log10(scale)))

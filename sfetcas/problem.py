@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-
 from typing import Any
 
 import casadi as ca
@@ -20,7 +19,7 @@ from . import interpolation, quaternion
 from .arrays import Array
 from .equations import State
 from .joints import hinge_rows
-from .kernels import compiled_where_it_pays
+from .kernels import Kernels, chosen
 from .model import Loading, Model, Turn
 from .nlp import NLP
 from .quaternion import product
@@ -73,11 +72,14 @@ class EquilibriumProblem:
     Attributes
     ----------
     nlp : NLP
-        The program at load factor 1; its objective is the potential energy over ``model.scales.moment``.
+        The program of a loading; its objective is the potential energy over ``model.scales.moment``.
+    kernels : str
+        As of :class:`~sfetcas.prepared.Prepared`; only interpreted ones can be differentiated again by CasADi.
     """
 
-    def __init__(self, model: Model, loading: Loading, guess: State) -> None:
+    def __init__(self, model: Model, loading: Loading, guess: State, *, kernels: Kernels = "auto") -> None:
         self.model = model
+        self._kernels: Kernels = kernels
         self._reduction = _reduction(model)
         self._symbols()
         self.nlp = NLP(
@@ -143,8 +145,8 @@ class EquilibriumProblem:
         return rows, columns
 
     def _map(self, name: str, calls: float = 12.0) -> ca.Function:
-        n = len(self.model.turns)
-        return compiled_where_it_pays(getattr(self.model.element, name), calls * n).map(n)
+        n, function = len(self.model.turns), getattr(self.model.element, name)
+        return chosen(function, calls * n, self._kernels).map(n)
 
     @property
     def _data(self) -> tuple[ca.MX, ca.MX, ca.MX]:

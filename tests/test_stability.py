@@ -1,0 +1,195 @@
+"""Stability against Euler's columns, closed forms and a second route."""
+
+import numpy as np
+import pytest
+from scenes import SOFT, ZOO, cantilever, made, model_of
+
+import sfetcas
+from sfetcas import stability as stability_module
+from sfetcas.prepared import Prepared
+from sfetcas.statics import solve_model
+
+EI = SOFT["EI3"]
+
+
+def column(support_a="clamped", slider="ball", load=1.0, space=False, guided=True, gj=0.8):
+    table = cantilever((-load, 0.0))
+    table["sections"]["s"] = {**SOFT, "GJ": gj}
+    table["nodes"]["A"]["support"] = support_a
+    if guided:
+        table["nodes"]["B"] |= {"support": "slider", "direction": [1, 0], "rotation": slider}
+    table["dimension"] = "space" if space else "plane"
+    return table
+
+
+CRITICAL = {
+    "clamped-free": (column(guided=False), np.pi**2 / 4),
+    "pinned-pinned": (column("hinge"), np.pi**2),
+    "clamped-clamped": (column(slider="fixed"), 4 * np.pi**2),
+    # tan(x) = x, first root
+    "clamped-pinned": (column(slider="ball"), 4.493409457909064**2),
+}
+
+
+def straight(table, load, elements=4, order=6):
+    """The stability of the straight column under a load, without asking whether it is a minimum."""
+    prepared = Prepared(model_of(table, elements, order))
+    loading = prepared.model.loading(load)
+    found = prepared.correct(prepared.equations.start(loading), loading)
+    assert found.converged
+    return prepared.stability(found), prepared
+
+
+@pytest.mark.parametrize("name", CRITICAL)
+def test_smallest_eigenvalue_changes_sign_at_the_critical_load(name):
+    table, critical = CRITICAL[name]
+    below, prepared = straight(table, critical * (1 - 1e-6))
+    above, _ = straight(table, critical * (1 + 1e-6))
+    assert below.smallest > 0.0 > above.smallest
+    assert (below.stable, below.negative) == (True, 0)
+    assert (above.stable, above.negative) == (False, 1)
+    # EI phi'^2 - P phi^2 over phi^2: the eigenvalue falls linearly with the load while the mode stays.
+    unit = prepared.model.scales.force
+    for share in (0.0, 0.5, 2.0):
+        assert straight(table, share * critical)[0].smallest * unit == pytest.approx((1 - share) * critical, rel=1e-7)
+
+
+def test_pinned_pinned_counts_its_modes():
+    for load, count in ((0.9, 0), (3.0, 1), (5.0, 2), (10.0, 3)):
+        assert straight(column("hinge"), load * np.pi**2)[0].negative == count
+
+
+def test_unloaded_cantilever_has_the_eigenvalue_of_a_quarter_wave():
+    """pi^2/4 EI/L^2 in N, in other units of length and force too."""
+    for length, ei in ((1.0, 1.0), (25.0, 3e4)):
+        table = cantilever((1e-9, 0.0))
+        table["nodes"]["B"]["position"] = [length, 0]
+        table["sections"]["s"] = {"EI3": ei}
+        table["loads"]["tip"]["value"] = [ei / length**2 * 1e-12, 0.0]
+        step = solve_model(model_of(table, 4, 6))
+        assert step.certificate.smallest == pytest.approx(np.pi**2 / 4 * ei / length**2, rel=1e-8)
+        assert step.certificate.stable is True
+
+
+@pytest.mark.parametrize("name", ["clamped-free", "pinned-pinned", "clamped-clamped"])
+def test_escape_shape_is_the_mode(name):
+    table, critical = CRITICAL[name]
+    result, prepared = straight(table, 1.2 * critical)
+    s = prepared.model.along("m")
+    free = prepared.equations.number[prepared.model.chain("m"), 0]
+    shape = np.where(free >= 0, result.shape[free], 0.0)
+    mode = {"clamped-free": np.sin(0.5 * np.pi * s), "pinned-pinned": np.cos(np.pi * s)}.get(name, np.sin(2 * np.pi * s))
+    assert np.abs(shape).max() == pytest.approx(1.0)
+    sign = np.sign(shape @ mode)
+    # The peak of the mode need not be at a node: the scale is off by a per mille at most.
+    scale = np.abs(mode).max()
+    np.testing.assert_allclose(sign * shape, mode / scale, atol=1e-6)
+
+
+def test_escape_shape_by_name_in_the_certificate():
+    step = sfetcas.solve(made(column(guided=False, load=5.0) | {"analysis": {"unstable": "stay"}})).last
+    shape = step.certificate.escape["m"]
+    s = step.model.along("m")
+    assert len(shape) == len(s)
+    np.testing.assert_allclose(np.abs(np.ravel(shape)), np.sin(0.5 * np.pi * s), atol=1e-4)
+
+
+def test_column_beyond_euler_is_left_or_kept():
+    table = column(guided=False, load=2 * np.pi**2 / 4)
+    left = sfetcas.solve(made(table)).last
+    assert left.certificate.stable is True
+    assert any("left an unstable equilibrium" in note for note in left.notes)
+    assert abs(left.position("B")[1]) > 0.5
+    kept = sfetcas.solve(made(table | {"analysis": {"unstable": "stay"}})).last
+    assert (kept.certificate.stable, kept.certificate.negative) == (False, 1)
+    np.testing.assert_allclose(kept.position("B"), [1, 0, 0], atol=1e-12)
+    assert left.energy["total"] < kept.energy["total"]
+    # The buckled elastica: sqrt(P) = K(sin(a/2)); its tip by quadrature.
+    a = left.angle("B")
+    k = np.sin(0.5 * abs(a))
+    phi, w = np.polynomial.legendre.leggauss(60)
+    phi, w = 0.25 * np.pi * (phi + 1), 0.25 * np.pi * w
+    assert (w / np.sqrt(1 - k**2 * np.sin(phi) ** 2)).sum() == pytest.approx(np.sqrt(2 * np.pi**2 / 4), rel=1e-4)
+
+
+def test_isotropic_column_in_space_is_neutral_once_buckled():
+    step = sfetcas.solve(made(column(guided=False, load=2 * np.pi**2 / 4, space=True))).last
+    assert step.certificate.stable == "neutral"
+    assert step.certificate.negative == 0
+    # It may buckle to any side: neutral is the turn about the column's axis.
+    assert np.hypot(*step.position("B")[1:]) > 0.5
+    unlike = column(guided=False, load=2 * np.pi**2 / 4, space=True)
+    unlike["sections"]["s"] = {**SOFT, "EI2": 1.7}
+    assert sfetcas.solve(made(unlike)).last.certificate.stable is True
+
+
+def test_beam_on_two_balls_spins_about_its_axis():
+    table = column("ball", load=0.5 * np.pi**2, space=True)
+    step = sfetcas.solve(made(table)).last
+    assert step.certificate.stable == "neutral"
+    table["nodes"]["A"]["support"] = "clamped"
+    assert sfetcas.solve(made(table)).last.certificate.stable is True
+
+
+def test_straight_column_in_space_buckles_about_both_axes():
+    assert straight(column(guided=False, space=True), 5.0)[0].negative == 2
+    assert straight(column(guided=False, space=True), 2.0)[0].negative == 0
+
+
+@pytest.mark.parametrize("name", [*ZOO, "pinned", "fixed"])
+@pytest.mark.parametrize("assembly", ["closing", "nodal"])
+def test_sparse_count_is_the_dense_count(name, assembly, monkeypatch):
+    """LDL^T and Schur complement against all eigenvalues on the null space, also far from stable."""
+    table = {"pinned": column("hinge"), "fixed": column(slider="fixed")}.get(name) or ZOO[name]()
+    factor = 90.0 if name in ("pinned", "fixed") else 1.0
+    prepared = Prepared(model_of(table, 2, 4, assembly=assembly))
+    loading = prepared.model.loading(factor)
+    start = prepared.equations.start(loading)
+    state = prepared.correct(start, loading).state if factor > 1 else solve_model(prepared).state
+    points = [prepared.equations.at(state, loading)]
+    if factor == 1.0:
+        # The same state under a load turned round: no equilibrium, and for some scenes not convex.
+        points.append(prepared.equations.at(state, loading.scaled(-6.0)))
+    for point in points:
+        monkeypatch.setattr(stability_module, "DENSE", 10_000)
+        dense = prepared._test.test(point)
+        monkeypatch.setattr(stability_module, "DENSE", 0)
+        sparse = prepared._test.test(point)
+        assert (sparse.stable, sparse.negative) == (dense.stable, dense.negative)
+        # Inverse iteration to 1e-8 of the eigenvalue; shapes to the root of that over the gap.
+        assert sparse.smallest == pytest.approx(dense.smallest, rel=1e-6, abs=1e-7)
+        assert min(np.abs(sparse.shape - sign * dense.shape).max() for sign in (1, -1)) < 1e-3
+    if factor > 1.0:
+        assert dense.negative >= 2
+
+
+@pytest.mark.parametrize("name", ZOO)
+def test_count_is_that_of_the_bordered_matrix(name):
+    """Inertia of [[H, A^T], [A, 0]] has one negative value a row more: another way to count."""
+    prepared = Prepared(model_of(ZOO[name](), 2, 4, assembly="nodal"))
+    state, equations = solve_model(prepared).state, prepared.equations
+    for factor in (1.0, -8.0):
+        point = equations.at(state, prepared.model.loading(1.0).scaled(factor))
+        matrix = np.zeros((equations.total, equations.total))
+        matrix[equations.row, equations.column] = point.entries
+        negative = int((np.linalg.eigvalsh(matrix) < 0).sum())
+        assert prepared._test.test(point).negative == negative - equations.rows
+
+
+def test_smallest_eigenvalue_does_not_depend_on_the_mesh():
+    values = [solve_model(model_of(ZOO["bend_45"](), n, p)).certificate.smallest for n, p in ((4, 4), (9, 5), (5, 7))]
+    # Lumped mass and order 2p: six digits on the coarsest.
+    np.testing.assert_allclose(values, values[-1], rtol=1e-5)
+
+
+def test_what_the_leaving_finds_has_less_energy():
+    """Shallow arch pushed beyond its limit point: the other side is the answer, and it is stable."""
+    table = {
+        "sections": {"s": SOFT},
+        "nodes": {"A": {"position": [0, 0], "support": "ball"}, "B": {"position": [1, 0], "support": "ball"}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": -0.8}}},
+        "loads": {"down": {"type": "force", "member": "m", "at": 0.5, "value": [0.0, -60.0]}},
+    }
+    left = sfetcas.solve(made(table)).last
+    assert left.certificate.stable is True
+    assert left.along("m", 0.5)["position"][0, 1] < -0.05

@@ -1,0 +1,377 @@
+"""The whole way from a scene to a certified answer of the accuracy asked for."""
+
+import json
+
+import numpy as np
+import pytest
+from scenes import SOFT, UNLIKE, ZOO, arch, bend_45, cantilever, elastica, guided, helix, made, model_of
+
+import sfetcas
+from sfetcas import SolveError, Status
+from sfetcas.fields import Fields, transferred
+from sfetcas.prepared import Prepared
+from sfetcas.statics import Settings, pilot_of, solve, solve_model
+
+
+def together(travel, *, space=False, **analysis):
+    """A straight member clamped at both ends, one of which is moved towards the other."""
+    table = cantilever()
+    del table["loads"]
+    table["nodes"]["B"]["support"] = "clamped"
+    table["motions"] = {"shorten": {"node": "B", "displacement": [-travel, 0]}}
+    if space:
+        table["dimension"] = "space"
+        table["sections"]["s"] = UNLIKE
+    return table | {"analysis": analysis}
+
+
+def clamped_elastica(travel):
+    """(height of the middle, force) of a clamped-clamped elastica with ends moved together: quarter waves."""
+    x, w = np.polynomial.legendre.leggauss(80)
+    phi, w = 0.25 * np.pi * (x + 1), 0.25 * np.pi * w
+
+    def integrals(k):
+        root = np.sqrt(1 - (k * np.sin(phi)) ** 2)
+        return (w / root).sum(), (w * root).sum()
+
+    low, high = 1e-6, 1 - 1e-9
+    for _ in range(200):
+        k = 0.5 * (low + high)
+        first, second = integrals(k)
+        low, high = (k, high) if 2 - 2 * second / first < travel else (low, k)
+    # A quarter of the length is K / sqrt(P); its rise is 2 k / sqrt(P) in two quarters.
+    return k / first, (4 * first) ** 2
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_ends_moved_together_by_half(space):
+    """From the straight member, whose closing has no slack to first order; by the scene alone."""
+    step = solve(made(together(0.5, space=space, accuracy=1e-7))).last
+    height, force = clamped_elastica(0.5)
+    middle = step.along("m", 0.5)["position"][0]
+    assert np.hypot(*middle[1:]) == pytest.approx(height, abs=1e-7)
+    ei = min(SOFT["EI3"], UNLIKE["EI3"])
+    np.testing.assert_allclose(step.reaction("B")[0], [-ei * force, 0, 0], atol=1e-4)
+    assert step.certificate.stable is True
+    assert step.certificate.residual < 1e-12
+
+
+@pytest.mark.parametrize("travel", [1e-6, 1e-3, 0.1, 0.9])
+def test_ends_moved_together_by_any_part(travel):
+    step = solve(made(together(travel, accuracy=1e-6))).last
+    height, force = clamped_elastica(travel)
+    assert abs(step.along("m", 0.5)["position"][0, 1]) == pytest.approx(height, abs=1e-6)
+    # By symmetry the force is that of 4 x quarter waves; near-critical for small travel.
+    assert -step.reaction("B")[0][0] == pytest.approx(force, rel=1e-4)
+
+
+@pytest.mark.parametrize("turns", [1, 5, 50])
+def test_roll_up_is_exact(turns):
+    """M = 2 pi n EI/L: the tip comes back to the root; the angle is linear, so any element is exact in it."""
+    table = cantilever()
+    table["loads"] = {"m": {"type": "moment", "node": "B", "value": 2 * np.pi * turns * SOFT["EI3"]}}
+    table["analysis"] = {"accuracy": 1e-9}
+    step = solve(made(table)).last
+    np.testing.assert_allclose(step.position("B"), 0.0, atol=1e-9)
+    assert step.angle("B") == pytest.approx(2 * np.pi * turns, rel=1e-12)
+    assert step.energy["elastic"] == pytest.approx(0.5 * (2 * np.pi * turns) ** 2, rel=1e-12)
+    np.testing.assert_allclose(step.reaction("A")[1], [0, 0, -2 * np.pi * turns], rtol=1e-10)
+    x = np.linspace(0, 1, 23)
+    circle = np.stack([np.sin(2 * np.pi * turns * x), 1 - np.cos(2 * np.pi * turns * x)], axis=1) / (2 * np.pi * turns)
+    np.testing.assert_allclose(step.along("m", x)["position"][:, :2], circle, atol=2e-8)
+    assert step.certificate.stable is True
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+@pytest.mark.parametrize("alpha", [1e-6, 1e-3, 0.1, 1.0, 10.0, 100.0, 1e4, 1e6, 1e8])
+def test_cantilever_under_any_load(alpha, space):
+    """One step, the branch that the growing load leads to, compared with elliptic integrals."""
+    table = cantilever((0.0, alpha), dimension="space" if space else "plane", analysis={"accuracy": 1e-8})
+    step = solve(made(table)).last
+    tip = [1.0, alpha / 3.0] if alpha <= 1e-3 else elastica(alpha)
+    # F L^2/EI = 1e-3 leaves 1e-7 of 1 - x and 1e-7 times 1e-3 of y.
+    np.testing.assert_allclose(step.position("B")[:2], tip, atol=1e-8 if alpha > 1e-3 else 1e-7)
+    if alpha <= 1e-3:
+        assert step.position("B")[1] == pytest.approx(alpha / 3, rel=1e-6)
+    assert step.certificate.stable is True
+    assert step.certificate.error_estimate <= 1e-8
+
+
+@pytest.mark.parametrize("load", [5.0, 50.0, 1e4])
+def test_oblique_pull_and_push(load):
+    """A nearly axial push of any size ends turned round, without loops: angles stay within half a turn."""
+    step = solve(made(cantilever((-load, 1e-3 * load), analysis={"accuracy": 1e-6}))).last
+    angles = step.along("m", np.linspace(0, 1, 41))["angle"]
+    # Below the accuracy asked for, interpolation may waver.
+    assert np.all(np.diff(angles) > -1e-5)
+    assert 0.5 < angles[-1] < np.pi
+    assert step.certificate.stable is True
+
+
+SCENES = {
+    **{name: table for name, table in ZOO.items()},
+    "stiff": lambda: cantilever((0.0, 1e3)),
+    "long way": lambda: cantilever((-30.0, 1.0)),
+    "moved": lambda: together(0.3),
+    "column": lambda: cantilever((-5.0, 0.0)),
+    "spatial": lambda: cantilever((0.0, 40.0), dimension="space"),
+}
+
+
+def reference(table, step):
+    """The same branch on elements of order 7 that are four times as fine: from the answer's own state."""
+    mesh = step.model.mesh
+    finer = sfetcas.Mesh(7, mesh.refined().refined().cuts)
+    from_there = transferred(step.model, step.state, sfetcas.assemble(step.model.scene, finer))
+    prepared = Prepared(sfetcas.assemble(step.model.scene, finer, assembly=step.model.assembly))
+    found = prepared.correct(from_there, prepared.model.loading(step.factor), iterations=30)
+    assert found.residual < 1e-10  # many small elements: rounding of their stiffness
+    return Fields(prepared.equations, found.state, prepared.model.loading(step.factor))
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("name", SCENES)
+def test_estimate_bounds_the_error_and_the_accuracy_is_reached(name, accuracy):
+    table = SCENES[name]()
+    solution = solve(made(table), accuracy=accuracy)
+    step = solution.last
+    estimate, size = step.certificate.error_estimate, step.model.scene.size
+    assert solution.status is Status.SOLVED
+    assert estimate <= accuracy
+    fine = reference(table, step)
+    x = np.linspace(0.0, 1.0, 33)
+    error = max(
+        np.linalg.norm(step.along(m, x)["position"] - fine.along(m, x)["position"], axis=1).max()
+        for m in step.model.members
+    )
+    # Rounding of the fine answer itself, 1e-13 to 1e-12 with stiffness over force up to 1e3.
+    assert error / size <= max(estimate, 2e-12)
+
+
+@pytest.mark.parametrize("element", ["SFET2", "SFET3", "SFET5", "SFET9"])
+@pytest.mark.parametrize("gauss", [False, True])
+def test_element_and_number_asked_for_are_used_exactly(element, gauss):
+    solution = solve(made(cantilever((0, 3.0))), element=element, elements=3, gauss=gauss)
+    model = solution.last.model
+    assert model.element.name == element
+    assert model.element.gauss is gauss
+    np.testing.assert_allclose(model.mesh.cuts["m"], [0, 1 / 3, 2 / 3, 1], atol=1e-15)
+    # The estimate is that of this mesh: it contains the difference to the elastica.
+    error = np.linalg.norm(solution.last.position("B")[:2] - elastica(3.0)) / solution.last.model.scene.size
+    assert error <= 1.5 * solution.last.certificate.error_estimate
+    assert solution.status is Status.SOLVED  # no accuracy was asked for
+
+
+def test_accuracy_not_reached_on_a_given_mesh_is_told():
+    solution = solve(made(cantilever((0, 30.0))), element="SFET2", elements=2, accuracy=1e-6)
+    assert solution.status is Status.SHORT
+    assert solution.last.certificate.error_estimate > 1e-6
+
+
+def test_members_keep_their_own_numbers_of_elements():
+    table = ZOO["four_bar"]()
+    for name, count in (("left", 2), ("top", 3), ("right", 5)):
+        table["members"][name] |= {"element": "SFET4", "elements": count}
+    model = solve(made(table)).last.model
+    assert {n: len(c) - 1 for n, c in model.mesh.cuts.items()} == {"left": 2, "top": 3, "right": 5}
+    assert model.element.name == "SFET4"
+    table["members"]["top"]["element"] = "SFET5"
+    with pytest.raises(sfetcas.SceneError, match="one for all members"):
+        solve(made(table))
+
+
+def test_many_elements_are_estimated_from_half_of_them():
+    solution = solve(made(cantilever((0, 10.0))), element="SFET2", elements=2050)
+    error = np.linalg.norm(solution.last.position("B")[:2] - elastica(10.0)) / solution.last.model.scene.size
+    assert solution.last.model.mesh.elements == 2050
+    estimate = solution.last.certificate.error_estimate
+    assert error <= estimate < 5 * error
+
+
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [("accuracy", 0.0), ("accuracy", 0.2), ("element", "SFET1"), ("elements", 0), ("assembly", "both")],
+)
+def test_settings_refuse_in_sentences(word, value):
+    with pytest.raises(sfetcas.SceneError, match=f"{word}: found .*, accepted: "):
+        Settings(**{word: value})
+
+
+def test_start_chooses_among_equilibria():
+    """A clamped arch, unloaded but for a trifle: its own shape, or snapped through where ``start`` says so."""
+    heights = []
+    for start in ([0.5, 0.4], [0.5, -0.4]):
+        table = together(0.5)
+        table["nodes"]["M"] = {"position": [0.5, 0], "start": [start[0] - 0.25, start[1]]}
+        table["members"] = {
+            "left": {"nodes": ["A", "M"], "section": "s"},
+            "right": {"nodes": ["M", "B"], "section": "s"},
+        }
+        step = solve(made(table)).last
+        heights.append(step.position("M")[1])
+        assert step.certificate.stable is True
+    height = clamped_elastica(0.5)[0]
+    np.testing.assert_allclose(heights, [height, -height], atol=1e-4)
+
+
+def test_steps_are_answers_of_their_own():
+    factors = [0.1, 1.0, 10.0, 100.0, -10.0]
+    solution = solve(made(cantilever((0, 1.0), analysis={"steps": factors, "accuracy": 1e-7})))
+    assert [step.factor for step in solution.steps] == factors
+    for step in solution.steps:
+        tip = elastica(abs(step.factor)) * [1, np.sign(step.factor)]
+        np.testing.assert_allclose(step.position("B")[:2], tip, atol=1e-7)
+    assert solution.last is solution.steps[-1]
+
+
+def test_hysteresis_needs_the_way():
+    """Loads down and back up again along the steps: an answer beyond a fold is continued, not started anew."""
+    table = cantilever((0.0, 1.0))
+    table["loads"] = {"m": {"type": "moment", "node": "B", "value": 2 * np.pi}}
+    table["analysis"] = {"steps": [1.0, 3.0, 2.0]}
+    angles = [step.angle("B") for step in solve(made(table)).steps]
+    np.testing.assert_allclose(angles, 2 * np.pi * np.array([1.0, 3.0, 2.0]), rtol=1e-10)
+
+
+def test_histories_replace_the_factor():
+    table = cantilever((0.0, 4.0))
+    table["loads"] |= {"dead": {"type": "force", "node": "B", "value": [-1.0, 0.0], "history": "always"}}
+    table["histories"] = {"always": {"t": [0.0, 1.0], "value": [1.0, 1.0]}}
+    table["analysis"] = {"steps": [0.0, 0.5, 1.0], "accuracy": 1e-8}
+    solution = solve(made(table))
+    np.testing.assert_allclose(solution.steps[0].position("B"), [1, 0, 0], atol=1e-8)  # below Euler's load
+    for step, force in zip(solution.steps[1:], (2.0, 4.0), strict=True):
+        plain = solve(made(cantilever((-1.0, force), analysis={"accuracy": 1e-8}))).last
+        np.testing.assert_allclose(step.position("B"), plain.position("B"), atol=3e-8)
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_ends_farther_apart_than_the_member_is_long(space):
+    with pytest.raises(SolveError) as caught:
+        solve(made(together(-0.1, space=space)))
+    assert caught.value.status is Status.INFEASIBLE
+    assert "no shape of the members" in str(caught.value)
+
+
+def test_fully_stretched_member_is_refused():
+    """An arch pulled to exactly its length: no finite reaction holds an inextensible member straight."""
+    table = arch()
+    line = made(table).center_lines["m"].length
+    chord = np.array([1.0, 0.2])
+    table["motions"] = {"pull": {"node": "B", "displacement": ((line / np.linalg.norm(chord) - 1) * chord).tolist()}}
+    with pytest.raises(SolveError):
+        solve(made(table))
+
+
+def test_straight_member_between_balls_under_a_load_across_is_refused():
+    table = cantilever()
+    table["nodes"]["A"]["support"] = table["nodes"]["B"]["support"] = "ball"
+    table["loads"] = {"q": {"type": "distributed", "member": "m", "value": [0, -1.0]}}
+    with pytest.raises(SolveError, match="stretched"):
+        solve(made(table))
+
+
+def test_a_solve_that_fails_returns_no_numbers(monkeypatch):
+    """Whatever IPOPT claims, an answer without balance is an error."""
+
+    def lying(self, loading, state):
+        found = self.correct(state, loading, iterations=0)
+        raise SolveError(Status.ITERATIONS, "IPOPT: pretended", found.state)
+
+    monkeypatch.setattr(Prepared, "minimise", lying)
+    with pytest.raises(SolveError, match="pretended"):
+        solve_model(model_of(cantilever((0, 10.0))))
+
+
+def test_every_answer_has_a_certificate():
+    for table in ZOO.values():
+        step = solve(made(table())).last
+        certificate = step.certificate
+        assert certificate.residual < 1e-12
+        assert certificate.stable is True
+        assert certificate.negative == 0
+        assert certificate.smallest > 0
+        assert 0 <= certificate.error_estimate <= 1e-4
+        shapes = [np.abs(shape).max() for shape in certificate.escape.values()]
+        assert max(shapes) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_prepared_model_solves_again_and_warm():
+    prepared = Prepared(model_of(bend_45(), 4, 5))
+    first = solve_model(prepared, 1.0)
+    warm = solve_model(prepared, 1.05, start=first)
+    cold = solve_model(prepared, 1.05)
+    assert warm.iterations == 0
+    np.testing.assert_allclose(warm.position("B"), cold.position("B"), atol=1e-11)
+    again = solve_model(prepared, 1.0)
+    np.testing.assert_allclose(again.position("B"), first.position("B"), atol=1e-12)
+
+
+def test_pilot_is_coarser_than_the_answer():
+    scene = made(cantilever((0, 1e4)))
+    assert pilot_of(scene).elements <= solve(scene, accuracy=1e-9).last.model.mesh.elements
+
+
+def test_redundant_supports_are_told():
+    """Two parallel guides across a rigid bar of members in space leave a multiplier without meaning."""
+    table = ZOO["four_bar"]()
+    table["dimension"] = "space"
+    table["nodes"]["C"]["axis"] = [0, 0, 1]
+    table["nodes"]["D"] |= {"support": "hinge"}
+    step = solve(made(table)).last
+    # In the plane the same structure is determinate in the plane: positions agree.
+    plane = solve(made(ZOO["four_bar"]())).last
+    np.testing.assert_allclose(step.position("B"), plane.position("B"), atol=2e-4)
+
+
+@pytest.mark.parametrize("factory", [guided, helix])
+def test_branch_check_can_be_left_out(factory):
+    table = factory()
+    with_check, without = (solve(made(table), branch=b, accuracy=1e-7).last for b in (True, False))
+    for node in with_check.model.nodes:
+        np.testing.assert_allclose(without.position(node), with_check.position(node), atol=1e-6)
+
+
+def test_energies_and_answer_as_plain_data():
+    solution = solve(made(ZOO["hinged_space"]()))
+    answer = solution.to_dict()
+    assert json.loads(json.dumps(answer, allow_nan=False)) == answer
+    step = answer["steps"][0]
+    assert set(step["nodes"]) == set(solution.last.model.nodes)
+    assert set(step["reactions"]) == {"A", "D", "E"}
+    assert answer["unknowns"] == solution.last.model.unknowns
+    assert "quaternion" not in step["nodes"]["B"]  # a hinge joint has no rotation of its own
+    assert step["nodes"]["C"]["quaternion"] == solution.last.quaternion("C").tolist()
+
+
+def test_names_that_are_not_there():
+    step = solve(made(cantilever())).last
+    with pytest.raises(sfetcas.SceneError, match="found node 'tipp'"):
+        step.position("tipp")
+    with pytest.raises(sfetcas.SceneError, match="found member 'n'"):
+        step.along("n", 0.5)
+
+
+def test_checks_compare_with_the_answer():
+    table = cantilever((0, 10.0), analysis={"accuracy": 1e-8, "steps": [0.5, 1.0]})
+    table["expect"] = [
+        {"quantity": "nodes.B.position", "value": elastica(10.0).tolist(), "tolerance": 1e-8},
+        {"quantity": "nodes.B.position", "value": elastica(5.0).tolist(), "tolerance": 1e-8, "step": 0.5},
+        {"quantity": "members.m.moment", "at": 0.0, "value": -10 * elastica(10.0)[0], "tolerance": 1e-6},
+        {"quantity": "members.m.moment", "at": 0.0, "value": 10 * elastica(10.0)[0], "tolerance": 1e-6},
+        {"quantity": "certificate.stable", "value": True},
+        {"quantity": "certificate.stable", "value": "neutral"},
+        {"quantity": "certificate.negative", "value": 0},
+        {"quantity": "reactions.A.force", "value": [0, -10, 0], "tolerance": 1e-9},
+        {"quantity": "nodes.B.position", "value": [0.445, 0.81], "tolerance": 1e-4},
+    ]
+    scene = made(table)
+    results = sfetcas.check(scene, solve(scene))
+    passed = [r.passed for r in results]
+    # The moment of what is beyond on what is before at the root is that of the force at the tip: above zero.
+    assert passed == [True, True, False, True, True, False, True, True, False]
+    assert results[8].error == pytest.approx(0.81060902 - 0.81, abs=1e-6)
+    table["expect"] = [{"quantity": "energy.elastik", "value": 1.0, "tolerance": 1.0}]
+    scene = made(table)
+    with pytest.raises(sfetcas.SceneError, match="did you mean 'elastic'"):
+        sfetcas.check(scene, solve(scene))
