@@ -116,8 +116,8 @@ def loads() -> None:
         for exponent in range(-6, 9, 2):
             scene = cantilever([0.0, 10.0**exponent], dimension)
             seconds, step = _median(lambda scene=scene: solve(scene, accuracy=1e-6).last, 1)  # type: ignore[misc]
-            quaternion = step.quaternion("tip")
-            angle = 2.0 * np.arctan2(quaternion[3], quaternion[0])
+            turned = step.along("beam", [1.0])["quaternion"][0]
+            angle = 2.0 * np.arctan2(turned[3], turned[0])
             print(_line(f"{dimension} 1e{exponent}", angle, step, seconds))
     for turns in (1, 5, 50):
         seconds, step = _median(lambda turns=turns: solve(rolled(turns), accuracy=1e-6).last, 1)  # type: ignore[misc]

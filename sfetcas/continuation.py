@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from .equations import State
 from .errors import SolveError
-from .model import Loading
+from .loading import Loading
 from .newton import Corrected
 from .prepared import Prepared
 

@@ -20,7 +20,9 @@ from .arrays import Array, Index
 from .joints import hinge
 from .kernels import Batch, Kernels, chosen
 from .linear import SparseSolver
-from .model import Loading, Model, Turn
+from .loading import Loading
+from .model import Model
+from .rotations import Turn
 
 __all__ = ["Equations", "Point", "State"]
 
@@ -74,25 +76,25 @@ class Equations:
         self.model = model
         element, positions = model.element, model.positions
         self._number_unknowns()
-        n = len(model.turns)
+        n = len(model.rotations.turns)
         calls = 12.0 * n
         self._kernel = Batch(chosen(element.turning, calls, kernels), n)
-        self._kernel.set(1, model.stiffness)
-        self._kernel.set(2, model.tangent)
-        self._longest = float(model.weight.sum(axis=1).max())
-        self._first = np.array([model.first[name] for name in model.members])
-        self._rest = np.add.reduceat(model.tangent.sum(axis=1), self._first, axis=0)
+        self._kernel.set(1, model.beams.stiffness)
+        self._kernel.set(2, model.beams.tangent)
+        self._longest = float(model.beams.weight.sum(axis=1).max())
+        self._first = np.array([model.beams.first[name] for name in model.members])
+        self._rest = np.add.reduceat(model.beams.tangent.sum(axis=1), self._first, axis=0)
         self._z = positions.Z.reshape(len(positions.rows), len(model.members), element.axes)
         self._pattern()
-        if len(model.hinges):
-            self._hinge = Batch(hinge(), len(model.hinges))
-            self._hinge.set(1, model.hinge_axes)
+        if len(model.rotations.hinges):
+            self._hinge = Batch(hinge(), len(model.rotations.hinges))
+            self._hinge.set(1, model.rotations.hinge_axes)
 
     # -- numbering ------------------------------------------------------------------------------
 
     def _number_unknowns(self) -> None:
         model, turns = self.model, self.model.element.turns
-        count = np.where(model.kind == Turn.FREE, turns, np.where(model.kind == Turn.AXIS, 1, 0))
+        count = np.where(model.rotations.kind == Turn.FREE, turns, np.where(model.rotations.kind == Turn.AXIS, 1, 0))
         ends = np.cumsum(count)
         self.number = np.full((len(count), turns), -1, dtype=np.intp)
         for i in range(turns):
@@ -100,20 +102,22 @@ class Equations:
             self.number[here, i] = (ends - count)[here] + i
         self.turning_unknowns = int(ends[-1]) if len(ends) else 0
         self.displacement_unknowns = model.positions.Y.shape[1]
-        self.rows = len(model.positions.rows) + 2 * len(model.hinges)
+        self.rows = len(model.positions.rows) + 2 * len(model.rotations.hinges)
         self.unknowns = self.turning_unknowns + self.displacement_unknowns
-        about = np.flatnonzero(model.kind == Turn.AXIS) if model.space else np.array([], dtype=np.intp)
-        self._basis = {int(i): _basis(model.axis[i]) for i in about}
-        self._on_axes = np.argwhere(np.isin(model.turns, about)).tolist()
+        about = np.flatnonzero(model.rotations.kind == Turn.AXIS) if model.space else np.array([], dtype=np.intp)
+        self._basis = {int(i): _basis(model.rotations.axis[i]) for i in about}
+        self._on_axes = np.argwhere(np.isin(model.rotations.turns, about)).tolist()
         self._free = np.flatnonzero(self.number[:, 0] >= 0)
 
     @functools.cached_property
     def mass(self) -> Array:
         """Length that belongs to each turning unknown, for norms that do not depend on the mesh."""
         model = self.model
-        lump = np.zeros(len(model.kind))
-        w = model.weight if not model.element.gauss else model.weight.sum(axis=1, keepdims=True) * _lobatto(model)
-        np.add.at(lump, model.turns.ravel(), w.ravel())
+        lump = np.zeros(len(model.rotations.kind))
+        w = model.beams.weight
+        if model.element.gauss:
+            w = w.sum(axis=1, keepdims=True) * interpolation.lobatto(model.element.order + 1)[1]
+        np.add.at(lump, model.rotations.turns.ravel(), w.ravel())
         mass = np.zeros(self.turning_unknowns)
         used = self.number >= 0
         mass[self.number[used]] = np.broadcast_to(lump[:, None], self.number.shape)[used]
@@ -122,7 +126,8 @@ class Equations:
     @property
     def row_names(self) -> tuple[str, ...]:
         """Names of the closing and hinge rows."""
-        hinges = (f"hinge {i}, {side} direction" for i in range(len(self.model.hinges)) for side in ("first", "second"))
+        count = len(self.model.rotations.hinges)
+        hinges = (f"hinge {i}, {side} direction" for i in range(count) for side in ("first", "second"))
         return (*self.model.positions.rows, *hinges)
 
     # -- pattern of the Newton matrix -----------------------------------------------------------
@@ -130,7 +135,7 @@ class Equations:
     def _pattern(self) -> None:
         """Row and column of every contribution, and where it goes among the entries of the matrix."""
         model = self.model
-        local = self.number[model.turns].reshape(len(model.turns), -1)
+        local = self.number[model.rotations.turns].reshape(len(model.rotations.turns), -1)
         self._local = local
         rows, columns = [], []
 
@@ -158,8 +163,8 @@ class Equations:
         add(first_row + r, self.turning_unknowns + c)
         add(self.turning_unknowns + c, first_row + r)
         self._w_entries = model.positions.W[r, c]
-        if len(model.hinges):
-            cells = self.number[model.hinges].reshape(len(model.hinges), -1)
+        if len(model.rotations.hinges):
+            cells = self.number[model.rotations.hinges].reshape(len(model.rotations.hinges), -1)
             size = (len(cells), 6, 6)
             add(np.broadcast_to(cells[:, None, :], size), np.broadcast_to(cells[:, :, None], size))
             labels = first_row + len(model.positions.rows) + np.arange(2 * len(cells)).reshape(-1, 2)
@@ -191,7 +196,7 @@ class Equations:
 
     def holding(self, state: State, loading: Loading) -> State:
         """The state with held rotations moved to their prescribed values."""
-        q = np.where((self.model.kind == Turn.HELD)[:, None], self.model.held(loading), state.q)
+        q = np.where((self.model.rotations.kind == Turn.HELD)[:, None], self.model.held(loading), state.q)
         return replace(state, q=q)
 
     def member_pulls(self, lam: Array, loading: Loading) -> Array:
@@ -211,8 +216,8 @@ class Equations:
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
         """The equations at a state; with ``convex`` the element matrices made positive."""
         model, positions = self.model, self.model.positions
-        constant = self.member_pulls(state.lam, loading)[model.owner]
-        self._kernel.set(0, state.q[model.turns])
+        constant = self.member_pulls(state.lam, loading)[model.beams.owner]
+        self._kernel.set(0, state.q[model.rotations.turns])
         pull = loading.pull + constant[:, None, :]
         self._kernel.set(3, pull)
         strain, work, moments, stiffness, reach, spin = self._kernel()
@@ -221,7 +226,8 @@ class Equations:
             stiffness = _positive_part(stiffness)
         nodal, gap = self.displacements(state, loading, reach)
 
-        potential = float(strain.sum() + work.sum() - (constant * reach).sum() - (loading.pull * model.tangent).sum())
+        potential = float(strain.sum() + work.sum() - (constant * reach).sum())
+        potential -= float((loading.pull * model.beams.tangent).sum())
         potential -= float(loading.force.ravel() @ nodal)
         residual = np.bincount(self._used_numbers, weights=moments.ravel()[self._used], minlength=self.total)
         # Held nodes count: their moments are what a structure of one element carries.
@@ -238,7 +244,7 @@ class Equations:
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
         parts = [stiffness.ravel(), *self._closing_parts(spin), self._w_entries, self._w_entries]
-        if len(model.hinges):
+        if len(model.rotations.hinges):
             parts += self._hinge_parts(state, residual)
         values = np.concatenate([*parts, self._zeros])[self._valid]
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
@@ -247,12 +253,12 @@ class Equations:
     def end_moments(self, state: State, loading: Loading) -> dict[str, Array]:
         """Moment (3,) about the fixed axes that the surroundings exert on the first end of each member."""
         model = self.model
-        self._kernel.set(0, state.q[model.turns])
-        constant = self.member_pulls(state.lam, loading)[model.owner]
+        self._kernel.set(0, state.q[model.rotations.turns])
+        constant = self.member_pulls(state.lam, loading)[model.beams.owner]
         self._kernel.set(3, loading.pull + constant[:, None, :])
         moments = self._kernel()[2]
         turns = model.element.turns
-        first = [moments[model.first[name], :turns] for name in model.members]
+        first = [moments[model.beams.first[name], :turns] for name in model.members]
         return {
             n: m.copy() if turns == 3 else np.array([0.0, 0.0, m[0]]) for n, m in zip(model.members, first, strict=True)
         }
@@ -260,11 +266,11 @@ class Equations:
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
         model, positions = self.model, self.model.positions
-        self._kernel.set(0, state.q[model.turns])
+        self._kernel.set(0, state.q[model.rotations.turns])
         self._kernel.set(3, loading.pull)
         _, _, moments, stiffness, reach, spin = self._kernel()
         spin = self._local_parts(moments, stiffness, spin)[2]
-        maps = positions.E[chosen].reshape(len(chosen), len(model.members), -1)[:, model.owner]
+        maps = positions.E[chosen].reshape(len(chosen), len(model.members), -1)[:, model.beams.owner]
         values = np.einsum("rea,eca->rec", maps, spin).reshape(len(chosen), -1)
         jacobian = np.zeros((len(chosen), self.unknowns))
         used = self._local.ravel() >= 0
@@ -275,10 +281,10 @@ class Equations:
     def elastic_entries(self) -> Array:
         """Entries of the Newton matrix of the strain energy alone at the undeformed state, without closings."""
         model = self.model
-        rest = np.zeros((*model.turns.shape, model.element.components))
+        rest = np.zeros((*model.rotations.turns.shape, model.element.components))
         rest[..., 0] = 1.0 if model.space else 0.0
         self._kernel.set(0, rest)
-        self._kernel.set(3, np.zeros_like(model.tangent))
+        self._kernel.set(3, np.zeros_like(model.beams.tangent))
         _, _, moments, stiffness, _, spin = self._kernel()
         stiffness = self._local_parts(moments, stiffness, spin)[1].ravel()
         values = np.zeros(self._size)
@@ -296,19 +302,19 @@ class Equations:
     def _hinge_parts(self, state: State, residual: Array) -> list[Array]:
         model = self.model
         first = len(model.positions.rows)
-        self._hinge.set(0, state.q[model.hinges])
+        self._hinge.set(0, state.q[model.rotations.hinges])
         self._hinge.set(2, state.lam[first:])
         rows, spin, stiffness = self._hinge()
         n = len(rows)
         stiffness, spin = stiffness.reshape(n, 6, 6).copy(), spin.reshape(n, 6, 2).copy()
         moments = np.einsum("ncr,nr->nc", spin, state.lam[first:].reshape(n, 2))
-        for h, side in np.argwhere(np.isin(model.hinges, list(self._basis))):
-            basis, part = self._basis[int(model.hinges[h, side])], slice(3 * side, 3 * side + 3)
+        for h, side in np.argwhere(np.isin(model.rotations.hinges, list(self._basis))):
+            basis, part = self._basis[int(model.rotations.hinges[h, side])], slice(3 * side, 3 * side + 3)
             moments[h, part] = moments[h, part] @ basis
             stiffness[h, part] = basis.T @ stiffness[h, part]
             stiffness[h, :, part] = stiffness[h, :, part] @ basis
             spin[h, part] = basis.T @ spin[h, part]
-        cells = self.number[model.hinges].reshape(n, -1)
+        cells = self.number[model.rotations.hinges].reshape(n, -1)
         np.add.at(residual, cells[cells >= 0], moments[cells >= 0])
         residual[self.unknowns + first :] = rows.ravel()
         return [stiffness.ravel(), spin.ravel(), spin.ravel()]
@@ -316,7 +322,7 @@ class Equations:
     def _turn_bases(self, moments: Array, stiffness: Array, spin: Array) -> None:
         """Turn the components of rotations about a held axis, in place, so that the first is about it."""
         for e, k in self._on_axes:
-            basis, part = self._basis[int(self.model.turns[e, k])], slice(3 * k, 3 * k + 3)
+            basis, part = self._basis[int(self.model.rotations.turns[e, k])], slice(3 * k, 3 * k + 3)
             moments[e, part] = moments[e, part] @ basis
             stiffness[e, part] = basis.T @ stiffness[e, part]
             stiffness[e, :, part] = stiffness[e, :, part] @ basis
@@ -371,7 +377,3 @@ def _positive_part(matrices: Array) -> Array:
 def _basis(axis: Array) -> Array:
     """Orthonormal basis whose first column is the axis."""
     return np.column_stack([axis, *np.linalg.svd(axis[None, :])[2][1:]])
-
-
-def _lobatto(model: Model) -> Array:
-    return interpolation.lobatto(model.element.order + 1)[1][None, :]

@@ -15,7 +15,7 @@ import numpy as np
 from . import interpolation, quaternion
 from .arrays import Array
 from .equations import Equations, State
-from .model import Loading
+from .loading import Loading
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -31,7 +31,7 @@ class Fields:
         reach = self.turned.sum(axis=1)
         nodal, _ = equations.displacements(state, loading, reach)
         self._nodal = nodal.reshape(len(model.nodes), -1)
-        self._pull = loading.pull + equations.member_pulls(state.lam, loading)[model.owner][:, None, :]
+        self._pull = loading.pull + equations.member_pulls(state.lam, loading)[model.beams.owner][:, None, :]
         self._start_moments = equations.end_moments(state, loading)
 
     # -- nodes ----------------------------------------------------------------------------------
@@ -43,7 +43,7 @@ class Fields:
 
     def rotation(self, node: str) -> Array | None:
         """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
-        number = self.model.node_turn[node]
+        number = self.model.rotations.node_turn[node]
         return None if number is None else self._state.q[number]
 
     def reaction(self, node: str) -> tuple[Array, Array]:
@@ -51,7 +51,7 @@ class Fields:
         model = self.model
         force = -_three(self._outer_force(node))
         moment = np.zeros(3)
-        number = model.node_turn[node]
+        number = model.rotations.node_turn[node]
         if number is not None:
             moment[2] -= self._loading.couple[number]
         for name, member in model.scene.members.items():
@@ -91,7 +91,7 @@ class Fields:
         e, xi = _located(cuts, x)
         to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
         turned, spread = self.turned[part], self._loading.spread[part]
-        rest = model.tangent[part]
+        rest = model.beams.tangent[part]
         here = np.einsum("nk,nka->na", to_x, (turned - rest)[e])
         start, moments = self._element_starts(member)
         line = model.scene.center_lines[member]
@@ -149,10 +149,10 @@ class Fields:
         part = model.elements_of(member)
         turned = self.turned[part]
         first = self._nodal[model.nodes.index(model.scene.members[member].nodes[0])]
-        steps = (turned - model.tangent[part]).sum(axis=1)
+        steps = (turned - model.beams.tangent[part]).sum(axis=1)
         starts = first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
         gains = _cross(turned, self._pull[part]).sum(axis=1)
-        chain = model.turns[part]
+        chain = model.rotations.turns[part]
         # A couple at a cut is a jump of the moment.
         gains[:-1, 2] -= self._loading.couple[chain[1:, 0]]
         moment = -self._start_moments[member]
@@ -185,20 +185,20 @@ def _cross(a: Array, b: Array) -> Array:
 def _turned_tangents(equations: Equations, state: State) -> Array:
     """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
     model, element = equations.model, equations.model.element
-    q = state.q[model.turns]
+    q = state.q[model.rotations.turns]
     if element.gauss:
         q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)
     if model.space:
-        return quaternion.rotate(q / np.linalg.norm(q, axis=-1, keepdims=True), model.tangent)
+        return quaternion.rotate(q / np.linalg.norm(q, axis=-1, keepdims=True), model.beams.tangent)
     c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
-    t = model.tangent
+    t = model.beams.tangent
     return np.stack([c * t[..., 0] - s * t[..., 1], s * t[..., 0] + c * t[..., 1]], axis=-1)
 
 
 def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
     """Rotations at fractions x of a member, (n, 4) unit or (n, 1)."""
     e, xi = _located(model.mesh.cuts[member], x)
-    nodal = q[model.turns[model.elements_of(member)]]
+    nodal = q[model.rotations.turns[model.elements_of(member)]]
     rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
     values = np.einsum("nj,njc->nc", rows, nodal[e])
     return values / np.linalg.norm(values, axis=-1, keepdims=True) if model.space else values
@@ -206,10 +206,10 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
 
 def transferred(source: Any, state: State, target: Any) -> State:
     """A state of one mesh on another mesh of the same scene."""
-    q = np.zeros((len(target.kind), target.element.components))
+    q = np.zeros((len(target.rotations.kind), target.element.components))
     for name in target.members:
         q[target.chain(name)] = rotations_along(source, state.q, name, target.along(name))
-    for name, number in target.node_turn.items():
-        if number is not None and source.node_turn[name] is not None:
-            q[number] = state.q[source.node_turn[name]]
+    for name, number in target.rotations.node_turn.items():
+        if number is not None and source.rotations.node_turn[name] is not None:
+            q[number] = state.q[source.rotations.node_turn[name]]
     return State(q, state.y.copy(), state.lam.copy())

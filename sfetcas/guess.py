@@ -9,8 +9,10 @@ import numpy as np
 from . import quaternion
 from .arrays import Array
 from .equations import Equations, State
-from .model import Loading, Model, Turn
+from .loading import Loading
+from .model import Model
 from .newton import TURN, descend, redundant_rows
+from .rotations import Turn
 
 __all__ = ["first_guess", "lead", "restore"]
 
@@ -143,7 +145,7 @@ def _distances(model: Model) -> Array:
             start, end = member.nodes
             to_node[start] = min(to_node[start], to_node[end] + lengths[name])
             to_node[end] = min(to_node[end], to_node[start] + lengths[name])
-    distances = np.full(len(model.kind), np.inf)
+    distances = np.full(len(model.rotations.kind), np.inf)
     for name, member in model.scene.members.items():
         part = model.along(name) * lengths[name]
         a, b = (to_node[node] for node in member.nodes)
@@ -154,7 +156,7 @@ def _distances(model: Model) -> Array:
 
 def _turned_by(equations: Equations, state: State, vectors: Array) -> Array:
     """Rotations of a state turned further by rotation vectors where they are free."""
-    vectors = np.where((equations.model.kind == Turn.FREE)[:, None], vectors, 0.0)
+    vectors = np.where((equations.model.rotations.kind == Turn.FREE)[:, None], vectors, 0.0)
     if equations.model.space:
         return quaternion.multiply(quaternion.from_rotation_vector(vectors), state.q)
     return np.asarray(state.q + vectors[:, 2:3])
@@ -174,14 +176,14 @@ def _wished(equations: Equations) -> Array | None:
 def _carried(equations: Equations, loading: Loading) -> State:
     """Prescribed rotation vectors spread over the scene like heat, members being rods."""
     model = equations.model
-    count = len(model.kind)
-    ends = np.array([model.ends[name] for name in model.members])
+    count = len(model.rotations.kind)
+    ends = np.array([model.rotations.ends[name] for name in model.members])
     used, index = np.unique(ends, return_inverse=True)
     index = index.reshape(ends.shape)
     laplacian = np.zeros((len(used), len(used)))
     for a, b in index:
         laplacian[[a, b, a, b], [a, b, b, a]] += [1.0, 1.0, -1.0, -1.0]
-    held = model.kind[used] == Turn.HELD
+    held = model.rotations.kind[used] == Turn.HELD
     vectors = loading.turn[used]
     free = ~held
     if free.any():
@@ -193,8 +195,8 @@ def _carried(equations: Equations, loading: Loading) -> State:
         part = model.along(name)[:, None]
         field[chain] = (1.0 - part) * vectors[i] + part * vectors[j]
         field[a], field[b] = vectors[i], vectors[j]
-    about = model.kind == Turn.AXIS
-    field[about] = (field[about] * model.axis[about]).sum(axis=1, keepdims=True) * model.axis[about]
+    about = model.rotations.kind == Turn.AXIS
+    field[about] = (field[about] * model.rotations.axis[about]).sum(axis=1, keepdims=True) * model.rotations.axis[about]
     q = quaternion.from_rotation_vector(field) if model.space else field[:, 2:3]
     return equations.holding(replace(equations.start(loading), q=q), loading)
 
@@ -209,7 +211,7 @@ def _bent(equations: Equations, state: State, loading: Loading) -> State:
 def _bow(equations: Equations, state: State, sign: float) -> Array:
     """Rotations of a state with a slight bow of the straight members."""
     model = equations.model
-    vectors = np.zeros((len(model.kind), 3))
+    vectors = np.zeros((len(model.rotations.kind), 3))
     for name, member in model.scene.members.items():
         line = model.scene.center_lines[name]
         if line.turning > 0.05:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .arrays import Array
 from .equations import Equations, Point, State
-from .model import Loading
+from .loading import Loading
 
 __all__ = ["Corrected", "correct", "descend", "redundant_rows", "relative_residual"]
 

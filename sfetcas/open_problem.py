@@ -78,7 +78,7 @@ class OpenProblem:
 
     def rotation(self, node: str) -> ca.MX:
         """Angle of a node since the undeformed scene (plane, rad) or its quaternion (4,)."""
-        number = self.model.node_turn[_known(node, self.model.nodes, "node")]
+        number = self.model.rotations.node_turn[_known(node, self.model.nodes, "node")]
         if number is None:
             raise SceneError(f"node {node!r} has no rotation of its own")
         return self.parts.rotation(number)

@@ -14,7 +14,8 @@ from .equations import Equations, State
 from .errors import SolveError, Status
 from .guess import first_guess, restore
 from .kernels import Kernels
-from .model import Loading, Model
+from .loading import Loading
+from .model import Model
 from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem

@@ -20,9 +20,11 @@ from .arrays import Array
 from .equations import State
 from .joints import hinge_rows
 from .kernels import Kernels, chosen
-from .model import Loading, Model, Turn
+from .loading import Loading
+from .model import Model
 from .nlp import NLP
 from .quaternion import product
+from .rotations import Turn
 
 __all__ = ["EquilibriumProblem"]
 
@@ -60,9 +62,9 @@ def _reduction(model: Model) -> _Reduction:
     free = np.flatnonzero(widths == components)
     for c in range(components):
         index[free, c, 0], weight[free, c, 0] = first[free] + c, 1.0
-    for i in np.flatnonzero((model.kind == Turn.AXIS) & (widths == 2)):
+    for i in np.flatnonzero((model.rotations.kind == Turn.AXIS) & (widths == 2)):
         index[i, 0, 0], weight[i, 0, 0] = first[i], 1.0
-        index[i, 1:, 0], weight[i, 1:, 0] = first[i] + 1, model.axis[i]
+        index[i, 1:, 0], weight[i, 1:, 0] = first[i] + 1, model.rotations.axis[i]
     return _Reduction(index.reshape(-1, 2), weight.reshape(-1, 2), int(widths.sum()), first)
 
 
@@ -103,12 +105,12 @@ class EquilibriumProblem:
 
     def _symbols(self) -> None:
         model, element, positions = self.model, self.model.element, self.model.positions
-        n, points = model.weight.shape
+        n, points = model.beams.weight.shape
         turning = self._reduction.unknowns
         self.x = ca.MX.sym("x", turning + positions.Y.shape[1])
         sizes = (
             n * points * element.axes,
-            len(model.kind) * element.components,
+            len(model.rotations.kind) * element.components,
             len(positions.rows),
             self.x.numel(),
             positions.B.shape[1],
@@ -122,13 +124,13 @@ class EquilibriumProblem:
         self._spread = _matrix(rows, index, weight, (len(index), self.x.numel()))
         self._q = held + ca.mtimes(self._spread, self.x)
         components = element.components
-        of_elements = (model.turns.ravel()[:, None] * components + np.arange(components)).ravel()
+        of_elements = (model.rotations.turns.ravel()[:, None] * components + np.arange(components)).ravel()
         self._cells = of_elements
         self._q_elements = ca.reshape(self._q[of_elements.tolist()], components, n * points)
-        self._stiffness = ca.MX(ca.DM(model.stiffness.reshape(n * points, -1).T))
-        self._tangent = ca.MX(ca.DM(model.tangent.reshape(n * points, -1).T))
+        self._stiffness = ca.MX(ca.DM(model.beams.stiffness.reshape(n * points, -1).T))
+        self._tangent = ca.MX(ca.DM(model.beams.tangent.reshape(n * points, -1).T))
         norms = [f"norm of rotation {i}" for i in self._unit]
-        hinges = [f"hinge {i}, {c}" for i in range(len(model.hinges)) for c in "ab"]
+        hinges = [f"hinge {i}, {c}" for i in range(len(model.rotations.hinges)) for c in "ab"]
         self.row_names = (*norms, *positions.rows, *hinges)
 
     @functools.cached_property
@@ -145,7 +147,7 @@ class EquilibriumProblem:
         return rows, columns
 
     def _map(self, name: str, calls: float = 12.0) -> ca.Function:
-        n, function = len(self.model.turns), getattr(self.model.element, name)
+        n, function = len(self.model.rotations.turns), getattr(self.model.element, name)
         return chosen(function, calls * n, self._kernels).map(n)
 
     @property
@@ -173,7 +175,7 @@ class EquilibriumProblem:
     def _to_rows(self) -> ca.DM:
         """Takes the reaches of the elements to the closing rows."""
         model, axes = self.model, self.model.element.axes
-        z = model.positions.Z.reshape(len(model.positions.rows), len(model.members), axes)[:, model.owner]
+        z = model.positions.Z.reshape(len(model.positions.rows), len(model.members), axes)[:, model.beams.owner]
         row, element, axis = np.nonzero(z)
         return _matrix(row, element * axes + axis, z[row, element, axis], (z.shape[0], z.shape[1] * axes))
 
@@ -196,21 +198,23 @@ class EquilibriumProblem:
         rows = hinge_rows(ca.vertsplit(q[:4]), ca.vertsplit(q[4:]), normals)
         jacobian, hessian = ca.jacobian(rows, q), ca.hessian(ca.dot(lam, rows), q)[0]
         outputs = [rows, ca.densify(jacobian), ca.densify(hessian)]
-        return ca.Function("hinge_row", [q, normals, lam], outputs).map(len(self.model.hinges))
+        return ca.Function("hinge_row", [q, normals, lam], outputs).map(len(self.model.rotations.hinges))
 
     @functools.cached_property
     def _hinge_cells(self) -> Array:
-        return np.asarray((self.model.hinges[:, :, None] * 4 + np.arange(4)).reshape(len(self.model.hinges), 8))
+        return np.asarray(
+            (self.model.rotations.hinges[:, :, None] * 4 + np.arange(4)).reshape(len(self.model.rotations.hinges), 8)
+        )
 
     def _hinge_call(self, lam: ca.MX | None = None) -> Any:
-        n = len(self.model.hinges)
+        n = len(self.model.rotations.hinges)
         q = ca.reshape(self._q[self._hinge_cells.ravel().tolist()], 8, n)
-        normals = ca.MX(ca.DM(self.model.hinge_axes.reshape(2 * n, 3).T))
+        normals = ca.MX(ca.DM(self.model.rotations.hinge_axes.reshape(2 * n, 3).T))
         result: Any = self._hinge(q, normals, ca.MX.zeros(2, n) if lam is None else ca.reshape(lam, 2, n))
         return result
 
     def _hinges(self) -> ca.MX:
-        return ca.vec(self._hinge_call()[0]) if len(self.model.hinges) else ca.MX(0, 1)
+        return ca.vec(self._hinge_call()[0]) if len(self.model.rotations.hinges) else ca.MX(0, 1)
 
     def _scattered(self, parts: list[tuple[Array, Array, Array, ca.MX]], shape: tuple[int, int]) -> ca.MX:
         """Sparse matrix from (row, column, weight, values) with several entries (…, k) for each value."""
@@ -238,9 +242,9 @@ class EquilibriumProblem:
             blocks.append(self._scattered(norm, (len(self._unit), width)))
         if positions.rows:
             blocks.append(self._closing_jacobian())
-        if len(model.hinges):
+        if len(model.rotations.hinges):
             jacobian = self._hinge_call()[1]
-            cells, n = self._hinge_cells, len(model.hinges)
+            cells, n = self._hinge_cells, len(model.rotations.hinges)
             labels = np.arange(2 * n).reshape(n, 1, 2, 1)
             index, weight = self._reduction.index[cells], self._reduction.weight[cells]
             shape = (n, 8, 2, 2)
@@ -253,7 +257,7 @@ class EquilibriumProblem:
         model, positions = self.model, self.model.positions
         axes, turning = model.element.axes, self._reduction.unknowns
         jacobian = self._map("reach_jacobian")(self._q_elements, self._tangent)[1]
-        n, width = model.turns.shape[0], model.turns.shape[1] * model.element.components
+        n, width = model.rotations.turns.shape[0], model.rotations.turns.shape[1] * model.element.components
         cells = self._cells.reshape(n, width)
         index, weight = self._reduction.index[cells], self._reduction.weight[cells]
         z = positions.Z.reshape(len(positions.rows), len(model.members), axes)
@@ -261,7 +265,7 @@ class EquilibriumProblem:
         # Each reach component goes to at most `most` rows: padded lists of rows and weights.
         order = np.argsort(z == 0.0, axis=0, kind="stable")[:most]
         value = np.take_along_axis(z, order, axis=0)
-        rows, values = order.transpose(1, 2, 0)[model.owner], value.transpose(1, 2, 0)[model.owner]
+        rows, values = order.transpose(1, 2, 0)[model.beams.owner], value.transpose(1, 2, 0)[model.beams.owner]
         shape = (n, width, axes, most, 2)
         r = np.broadcast_to(rows[:, None, :, :, None], shape)
         c = np.broadcast_to(index[:, :, None, None, :], shape)
@@ -275,7 +279,7 @@ class EquilibriumProblem:
 
     def _hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
         model, element = self.model, self.model.element
-        n, points = model.weight.shape
+        n, points = model.beams.weight.shape
         norms, closings = len(self._unit), len(model.positions.rows)
         pull = lam_f * self._pull
         if closings:
@@ -287,7 +291,7 @@ class EquilibriumProblem:
         if norms:
             rows, columns = self._norm_parts
             parts.append((columns, columns, np.full(len(rows), 2.0), lam_g[rows.tolist()]))
-        if len(model.hinges):
+        if len(model.rotations.hinges):
             own = self._hinge_call(lam_g[norms + closings :])[2]
             parts.append((*self._pairs(self._hinge_cells), own))
         return self._scattered(parts, (self.x.numel(), self.x.numel()))
@@ -310,12 +314,12 @@ class EquilibriumProblem:
         """Displacement of a node, dimensionless."""
         model, positions, axes = self.model, self.model.positions, self.model.element.axes
         rows = slice(node * axes, (node + 1) * axes)
-        e = positions.E[rows].reshape(axes, len(model.members), axes)[:, model.owner]
+        e = positions.E[rows].reshape(axes, len(model.members), axes)[:, model.beams.owner]
         row, element, axis = np.nonzero(e)
-        adder = _matrix(row, element * axes + axis, e[row, element, axis], (axes, len(model.owner) * axes))
+        adder = _matrix(row, element * axes + axis, e[row, element, axis], (axes, len(model.beams.owner) * axes))
         reach = self._map("reach")(self._q_elements, self._tangent)
         rest = np.zeros((len(model.members), axes))
-        np.add.at(rest, model.owner, model.tangent.sum(axis=1))
+        np.add.at(rest, model.beams.owner, model.beams.tangent.sum(axis=1))
         constant = ca.DM(-positions.E[rows] @ rest.ravel()) + ca.mtimes(ca.DM(positions.B[rows]), self._b)
         kept = ca.mtimes(ca.DM(positions.Y[rows]), self.x[self._reduction.unknowns :])
         return ca.densify(ca.mtimes(adder, ca.vec(reach)) + kept + constant)
@@ -330,7 +334,7 @@ class EquilibriumProblem:
         model, element = self.model, self.model.element
         cuts = model.mesh.cuts[member]
         e = int(np.clip(np.searchsorted(cuts, at, side="right") - 1, 0, len(cuts) - 2))
-        length = model.weight[model.elements_of(member)][e].sum()
+        length = model.beams.weight[model.elements_of(member)][e].sum()
         xi = np.array([(at - cuts[e]) / (cuts[e + 1] - cuts[e])])
         points = len(element.nodes)
         number = model.elements_of(member).start + e
@@ -349,12 +353,12 @@ class EquilibriumProblem:
     def parameters(self, loading: Loading) -> Array:
         """Values of the parameters for a loading."""
         model, positions = self.model, self.model.positions
-        held = np.where((model.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
+        held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
         rest = np.zeros((len(model.members), model.element.axes))
-        np.add.at(rest, model.owner, model.tangent.sum(axis=1))
+        np.add.at(rest, model.beams.owner, model.beams.tangent.sum(axis=1))
         offset = positions.BZ @ loading.shift - positions.Z @ rest.ravel()
         constant = -(positions.E.T @ loading.force.ravel()).reshape(rest.shape)
-        pull = loading.pull + constant[model.owner][:, None, :]
+        pull = loading.pull + constant[model.beams.owner][:, None, :]
         force = np.zeros(self.x.numel())
         if not model.space:
             free = np.flatnonzero(model.widths)
@@ -374,9 +378,9 @@ class EquilibriumProblem:
     def state(self, x: Array, lam: Array, loading: Loading) -> State:
         """The state of a solution; quaternions are made exactly unit."""
         model = self.model
-        held = np.where((model.kind == Turn.HELD)[:, None], model.held(loading), 0.0).ravel()
+        held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0).ravel()
         weight, index = self._reduction.weight, self._reduction.index
-        q = (held + (weight * x[index]).sum(axis=1)).reshape(len(model.kind), -1)
+        q = (held + (weight * x[index]).sum(axis=1)).reshape(len(model.rotations.kind), -1)
         if model.space:
             q = q / np.linalg.norm(q, axis=-1, keepdims=True)
         rows = self.rows_of_equations

@@ -14,7 +14,8 @@ from .arrays import Array
 from .equations import Equations, Point, State
 from .errors import SceneError, Status
 from .fields import Fields
-from .model import Loading, Model
+from .loading import Loading
+from .model import Model
 from .records import nearest
 from .stability import Stability
 

@@ -71,13 +71,13 @@ class StabilityTest:
         """The weight M of the module's docstring, (turning unknowns,)."""
         model = self.equations.model
         x = np.linspace(0.0, 1.0, 5)
-        stiffness = np.zeros(len(model.kind))
+        stiffness = np.zeros(len(model.rotations.kind))
         for name, member in model.scene.members.items():
             line = model.scene.center_lines[name]
             values = model.scene.sections[member.section].stiffness(x)
             values = values if model.space else values[:, [1 if line.bending_axis == 2 else 2]]
             relative = np.nanmin(values) / (model.scales.moment * model.scales.length)
-            turns = np.unique(model.turns[model.elements_of(name)])
+            turns = np.unique(model.rotations.turns[model.elements_of(name)])
             stiffness[turns] = np.maximum(stiffness[turns], relative / (line.length / model.scales.length) ** 2)
         number, weight = self.equations.number, np.zeros(self._n)
         weight[number[number >= 0]] = np.broadcast_to(stiffness[:, None], number.shape)[number >= 0]

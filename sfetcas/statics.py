@@ -23,8 +23,9 @@ from .elements import ELEMENTS
 from .equations import State
 from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
+from .loading import Loading
 from .mesh import Mesh, first_mesh, uniform_mesh
-from .model import Loading, assemble
+from .model import assemble
 from .newton import Corrected, redundant_rows
 from .prepared import Prepared
 from .scene import Scene
@@ -436,7 +437,7 @@ class _Run:
         model = found.prepared.model
         element = model.element
         fields = Fields(found.prepared.equations, found.corrected.state, loading)
-        q = found.corrected.state.q[model.turns]
+        q = found.corrected.state.q[model.rotations.turns]
         angles = np.linalg.norm(np.einsum("j,ejc->ec", interpolation.legendre_tail(element.nodes), q), axis=1)
         turned = np.einsum(
             "k,eka->ea", interpolation.legendre_tail(element.points), fields.turned / element.weights[:, None]
