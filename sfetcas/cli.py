@@ -25,6 +25,9 @@ __all__ = ["main"]
 SOLVED, SHORT, BAD_INPUT, NO_SOLUTION = 0, 1, 2, 3
 """Exit codes."""
 
+MOST_NODES = 20
+"""Nodes in the printed report at most."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code is returned."""
@@ -153,10 +156,12 @@ def _report(solution: Solution, seconds: float) -> None:
 
 def _report_step(step: Equilibrium) -> None:
     print(f"factor {step.factor:g}")
-    for name in step.model.nodes:
+    for name in step.model.nodes[:MOST_NODES]:
         angle = step.angle(name)
         turned = f"  angle {angle:.9g} rad" if angle is not None else ""
         print(f"  node {name}: position {_vector(step.position(name))} m{turned}")
+    if len(step.model.nodes) > MOST_NODES:
+        print(f"  ... and {len(step.model.nodes) - MOST_NODES} more nodes, see --json")
     for name, node in step.model.scene.nodes.items():
         if node.support != "free":
             force, moment = step.reaction(name)

@@ -21,6 +21,7 @@ from .interpolation import gauss
 from .quaternion import conjugate, multiply, product, rotate
 
 __all__ = [
+    "FORWARD",
     "POINTS",
     "Curve",
     "Panels",

@@ -121,7 +121,7 @@ def _placed(equations: Equations, state: State, loading: Loading, weight: Array,
 
     best = tried((0.5, -0.5))
     # Where both ends are held, curls would change the twist that motions prescribe.
-    if best[0] > 0.0 and not equations.rows:
+    if best[0] > 0.0 and equations.rows <= equations.displacement_unknowns:
         best = min(best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0)), key=lambda side: side[:2])
     return replace(best[2], lam=np.zeros(equations.rows))
 

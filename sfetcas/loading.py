@@ -216,8 +216,9 @@ class _Writer:
             group.turn[turn] += self._rotation_vector(motion)
 
     def _rotation_vector(self, motion: Motion) -> Array:
-        if np.ndim(motion.rotation) == 1:
+        if isinstance(motion.rotation, tuple):
             return np.asarray(motion.rotation, dtype=float)
+        assert motion.rotation is not None
         axis = np.asarray(self.scene.nodes[motion.node].axis, dtype=float)
         return np.asarray(motion.rotation * axis / np.linalg.norm(axis))
 

@@ -10,7 +10,7 @@ from .arrays import Array
 from .equations import Equations, Point, State
 from .loading import Loading
 
-__all__ = ["Corrected", "correct", "descend", "redundant_rows", "relative_residual"]
+__all__ = ["TURN", "Corrected", "correct", "descend", "redundant_rows", "relative_residual"]
 
 PROXIMAL = 1e-10
 """Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""

@@ -76,7 +76,8 @@ class NLP:
 
         def hessian(lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
             own = ca.hessian(ca.dot(lam_g[before:], row), self.x)[0]
-            return old(lam_f, lam_g[:before]) + own
+            # An empty slice of a column is no column.
+            return old(lam_f, lam_g[:before] if before else ca.MX(0, 1)) + own
 
         low = np.broadcast_to(np.asarray(lower, dtype=float), (size,))
         high = low if upper is None else np.broadcast_to(np.asarray(upper, dtype=float), (size,))

@@ -19,7 +19,7 @@ from .model import Model
 from .records import nearest
 from .stability import Stability
 
-__all__ = ["Certificate", "Equilibrium", "Solution"]
+__all__ = ["Certificate", "Equilibrium", "Solution", "equilibrium"]
 
 MOST_PLACES = 400
 """Places listed along a member at most; with more elements only their ends, thinned out."""

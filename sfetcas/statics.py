@@ -41,6 +41,9 @@ FINE = 1e-8
 PILOT_ELEMENTS = 60
 """A mesh that was asked for is its own pilot up to this many elements."""
 
+PILOT_ORDER = 4
+"""Coarse meshes of lower order have equilibria that no beam has."""
+
 HUGE = 2000
 """From this many elements on the error is estimated from the mesh with half the elements, not with twice."""
 
@@ -200,6 +203,7 @@ class _Run:
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
         self.seconds = {"model": 0.0, "solve": 0.0}
+        self.assembly: Any = settings.assembly
         self.leave = scene.analysis.unstable == "leave"
         self.started = any(node.start is not None for node in scene.nodes.values())
         self._choose_meshes()
@@ -222,14 +226,16 @@ class _Run:
         equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
         cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in scene.members}
         self.target = Mesh(order, cuts, settings.gauss)
-        if self.target.elements <= PILOT_ELEMENTS or not self.fixed:
+        if order >= PILOT_ORDER and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
             self.pilot_mesh = self.target
         else:
-            self.pilot_mesh = first_mesh(scene, max(order, 4), turning=1.0)
+            self.pilot_mesh = first_mesh(scene, max(order, PILOT_ORDER), turning=1.0)
 
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
-        prepared = Prepared(assemble(self.scene, mesh, assembly=self.settings.assembly))
+        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly))
+        # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
+        self.assembly = prepared.model.assembly
         _ = prepared.equations
         self.seconds["model"] += time.perf_counter() - begin
         return prepared
@@ -290,7 +296,7 @@ class _Run:
     def _grown(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found | None:
         """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
         model = pilot.model
-        if last is not None and last[0] * (factor - last[0]) >= 0.0 and (last[0] != 0.0 or not self.scene.histories):
+        if last is not None and last[0] * (factor - last[0]) >= 0.0:
             found = self._through(pilot, last[0], factor, last[1].corrected.state)
             if found is not None:
                 return found

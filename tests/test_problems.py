@@ -1,0 +1,51 @@
+"""The problems are solved to what the literature says of them."""
+
+from pathlib import Path
+
+import pytest
+
+from sfetcas import Scene, load, solve
+from sfetcas.checks import Check, check
+
+FILES = sorted((Path(__file__).parent.parent / "problems").glob("*.toml"))
+by_name = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+
+
+def failures(scene: Scene) -> list[Check]:
+    return [found for found in check(scene, solve(scene)) if not found.passed]
+
+
+def falsified(scene: Scene, change: float) -> Scene:
+    """The scene with the first number of its first expectation off by ``change``."""
+    first, *others = scene.expect
+    wrong = first.model_copy(update={"value": (first.value[0] + change, *first.value[1:])})
+    return scene.model_copy(update={"expect": (wrong, *others)})
+
+
+def test_there_are_problems() -> None:
+    assert len(FILES) > 40
+
+
+@by_name
+def test_problem_names_its_source_and_the_reasons_of_its_tolerances(file: Path) -> None:
+    scene = load(file)
+    assert scene.title
+    assert scene.source
+    assert scene.expect
+    for expect in scene.expect:
+        assert expect.tolerance is None or (expect.tolerance > 0.0 and expect.why), expect.quantity
+
+
+@by_name
+def test_problem_is_solved(file: Path) -> None:
+    assert not failures(load(file))
+
+
+def test_falsified_reference_fails() -> None:
+    scene = load(FILES[0].parent / "cantilever_tip_force.toml")
+    tolerance = scene.expect[0].tolerance
+    assert tolerance is not None
+    assert not failures(falsified(scene, 0.5 * tolerance))
+    (failure,) = failures(falsified(scene, 2.0 * tolerance))
+    assert failure.expect.quantity == scene.expect[0].quantity
+    assert failure.error == pytest.approx(2.0 * tolerance, rel=1e-3)
