@@ -1,0 +1,216 @@
+"""The command line as other programs use it: exit codes, one sentence, answers, nothing half-written."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sfetcas.cli import main
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+
+BEAM = """
+title = "beam"
+[sections.strip]
+EI3 = 1.0
+[nodes.A]
+position = [0, 0]
+support = "clamped"
+[nodes.B]
+position = [1, 0]
+[members.beam]
+nodes = ["A", "B"]
+section = "strip"
+[loads.tip]
+type = "force"
+node = "B"
+value = [0, 1]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene file with its text changed."""
+
+    def write(*changes, name="scene.toml", more=""):
+        text = BEAM
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / name
+        path.write_text(text + more)
+        return path
+
+    return write
+
+
+def test_run_prints_a_report_and_writes_the_answer(scene, tmp_path, capsys):
+    out = tmp_path / "answer.json"
+    assert main(["run", str(scene()), "--json", str(out), "--accuracy", "1e-8"]) == 0
+    printed = capsys.readouterr().out
+    for part in ("beam", "plane: all positions", "node B", "reaction A", "stable", "solved in"):
+        assert part in printed
+    answer = json.loads(out.read_text())
+    assert answer["status"] == "solved"
+    assert answer["dimension"] == "plane"
+    assert answer["unknowns"] > 0
+    assert set(answer["seconds"]) == {"model", "solve"}
+    (step,) = answer["steps"]
+    # The elliptic-integral tip of a cantilever under F L^2/EI = 1; the accuracy asked for is 1e-8.
+    np.testing.assert_allclose(step["nodes"]["B"]["position"], [0.943566763716623, 0.301720773799814, 0], atol=1e-8)
+    np.testing.assert_allclose(step["nodes"]["B"]["angle"], 0.461351949711879, atol=1e-7)
+    half = step["nodes"]["B"]["angle"] / 2
+    np.testing.assert_allclose(step["nodes"]["B"]["quaternion"], [np.cos(half), 0, 0, np.sin(half)], atol=1e-15)
+    np.testing.assert_allclose(step["reactions"]["A"]["force"], [0, -1, 0], atol=1e-12)
+    np.testing.assert_allclose(step["reactions"]["A"]["moment"], [0, 0, -0.943566763716623], atol=1e-7)
+    beam = step["members"]["beam"]
+    assert beam["s"][0] == 0
+    assert beam["s"][-1] == 1
+    assert {len(v) for v in beam.values()} == {len(beam["s"])}
+    np.testing.assert_allclose(beam["moment"][0], [0, 0, 0.943566763716623], atol=1e-7)
+    np.testing.assert_allclose(beam["curvature"][0], beam["moment"][0], atol=1e-12)
+    np.testing.assert_allclose(beam["force"][0], [0, 1, 0], atol=1e-12)
+    assert step["energy"]["elastic"] + step["energy"]["loads"] == pytest.approx(step["energy"]["total"])
+    proof = step["certificate"]
+    assert proof["stable"] is True
+    assert proof["negative"] == 0
+    assert 0 <= proof["residual"] < 1e-12
+    assert 0 < proof["error_estimate"] <= 1e-8
+
+
+def test_json_scene_is_the_toml_scene(scene, tmp_path, capsys):
+    import sfetcas
+
+    path = tmp_path / "scene.json"
+    sfetcas.dump(sfetcas.load(scene()), path)
+    assert main(["run", str(path)]) == 0
+    from_json = capsys.readouterr().out
+    assert main(["run", str(scene())]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if not line.startswith("solved in")]
+    assert [line for line in from_json.splitlines() if not line.startswith("solved in")] == lines
+
+
+def test_overrides_choose_the_mesh(scene, tmp_path):
+    out = tmp_path / "answer.json"
+    assert main(["run", str(scene()), "--element", "SFET3", "--elements", "5", "--json", str(out)]) == 0
+    assert len(json.loads(out.read_text())["steps"][0]["members"]["beam"]["s"]) == 11
+
+
+def test_short_of_the_accuracy_asked_for_is_exit_1(scene, capsys):
+    assert main(["run", str(scene()), "--element", "SFET2", "--elements", "2", "--accuracy", "1e-9"]) == 1
+    assert "solved, but not to the accuracy asked for" in capsys.readouterr().out
+
+
+EXPECT = """
+[[expect]]
+quantity = "nodes.B.position"
+value = [0.9435, 0.3017]
+tolerance = {tolerance}
+why = "printed with 4 digits"
+"""
+
+
+@pytest.mark.parametrize(("tolerance", "code", "word"), [("1e-4", 0, "ok"), ("1e-6", 1, "FAILED")])
+def test_check_compares(scene, capsys, tolerance, code, word):
+    path = scene(more=EXPECT.format(tolerance=tolerance))
+    assert main(["check", str(path)]) == code
+    printed = capsys.readouterr().out
+    assert word in printed
+    assert "nodes.B.position" in printed
+    assert "0.9435" in printed
+
+
+def test_info_shows_blocks_and_reasons(scene, capsys):
+    assert main(["info", str(scene())]) == 0
+    printed = capsys.readouterr().out
+    assert "angles: 1 for each" in printed
+    assert "all positions, shapes" in printed
+    assert main(["info", str(PROBLEMS / "spatial_loop_hinge.toml")]) == 0
+    printed = capsys.readouterr().out
+    for block in ("quaternions", "norms", "closings"):
+        assert block in printed
+
+
+BAD = {
+    "unknown key": ((('section = "strip"', 'section = "strip"\nshap = 1'),), "did you mean 'shape'"),
+    "wrong type": ((("EI3 = 1.0", 'EI3 = "stiff"'),), "sections.strip.EI3"),
+    "nan": ((("EI3 = 1.0", "EI3 = nan"),), "nan"),
+    "negative stiffness": ((("EI3 = 1.0", "EI3 = -1.0"),), "EI3"),
+    "no support": ((('support = "clamped"\n', ""),), "free to move"),
+    "no load": ((('[loads.tip]\ntype = "force"\nnode = "B"\nvalue = [0, 1]\n', ""),), "without load"),
+    "space without GJ": ((("value = [0, 1]", "value = [0, 1, 1]"),), "EI2"),
+    "later key": ((("value = [0, 1]", "value = [0, 1]\n[springs.s]\nnode = 'A'"),), "springs"),
+    "syntax": ((("[nodes.A]", "[nodes.A"),), "line"),
+}
+
+
+@pytest.mark.parametrize(("changes", "part"), BAD.values(), ids=BAD)
+def test_bad_input_is_one_sentence_and_exit_2(scene, tmp_path, capsys, changes, part):
+    out = tmp_path / "answer.json"
+    path = scene(*changes)
+    assert main(["run", str(path), "--json", str(out)]) == 2
+    caught = capsys.readouterr()
+    assert caught.out == ""
+    assert len(caught.err.strip().splitlines()) == 1
+    assert str(path) in caught.err
+    assert part in caught.err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("option", [["--accuracy", "2"], ["--elements", "0"]])
+def test_bad_overrides_are_exit_2(scene, capsys, option):
+    assert main(["run", str(scene()), *option]) == 2
+    assert "accepted" in capsys.readouterr().err
+
+
+def test_missing_file_and_folder_are_exit_2(tmp_path, capsys):
+    assert main(["run", str(tmp_path / "no.toml")]) == 2
+    assert main(["run", str(tmp_path)]) == 2
+    assert main(["run", str(tmp_path / "empty.toml")]) == 2
+    (tmp_path / "empty.toml").write_text("")
+    assert main(["run", str(tmp_path / "empty.toml")]) == 2
+    assert capsys.readouterr().err.count("\n") == 4
+
+
+def test_no_solution_is_exit_3_without_numbers(scene, tmp_path, capsys):
+    out = tmp_path / "answer.json"
+    pulled = scene(
+        ("position = [1, 0]", 'position = [1, 0]\nsupport = "clamped"'),
+        more="[motions.pull]\nnode = 'B'\ndisplacement = [0.5, 0]\n",
+    )
+    assert main(["run", str(pulled), "--json", str(out)]) == 3
+    caught = capsys.readouterr()
+    assert "no solution" in caught.err
+    assert "position" not in caught.out
+    assert not out.exists()
+
+
+def test_output_that_cannot_be_written_is_exit_2_and_leaves_the_old_one(scene, tmp_path, capsys):
+    assert main(["run", str(scene()), "--json", str(tmp_path / "no" / "answer.json")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert main(["run", str(scene()), "--json", str(tmp_path)]) == 2
+    out = tmp_path / "answer.json"
+    out.write_text("old")
+    unsolvable = scene(("EI3 = 1.0", "EI3 = 0"))
+    assert main(["run", str(unsolvable), "--json", str(out)]) == 2
+    assert out.read_text() == "old"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["answer.json", "scene.toml"]
+
+
+def test_command_line_as_a_process(scene):
+    run = [sys.executable, "-m", "sfetcas", "run", str(scene())]
+    done = subprocess.run(
+        run, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONWARNINGS": "error"}
+    )
+    assert done.stderr == ""
+    assert "stable" in done.stdout
+
+
+def test_importing_costs_no_matplotlib():
+    code = "import sys, sfetcas, sfetcas.cli; print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
