@@ -57,7 +57,8 @@ class Point:
     residual : ndarray (unknowns + rows,)
         Out-of-balance moments and forces, then closing gaps.
     scale : float
-        Largest moment or force that the residual adds up, to judge its rounding.
+        Largest moment or force that the residual adds up, and no less than a hundredth of the stiffness: what
+        rounding is judged by.
     entries : ndarray
         Entries of the Newton matrix, in the order of :attr:`Equations.row` and :attr:`Equations.column`.
     """
@@ -89,6 +90,8 @@ class Equations:
         if len(model.rotations.hinges):
             self._hinge = Batch(hinge(), len(model.rotations.hinges))
             self._hinge.set(1, model.rotations.hinge_axes)
+        # Moment below which rounding of the rotations shows: 1e-14 of it is what a unit quaternion leaves.
+        self._noise = 0.01 * _largest(self.elastic_entries())
 
     # -- numbering ------------------------------------------------------------------------------
 
@@ -231,7 +234,7 @@ class Equations:
         potential -= float(loading.force.ravel() @ nodal)
         residual = np.bincount(self._used_numbers, weights=moments.ravel()[self._used], minlength=self.total)
         # Held nodes count: their moments are what a structure of one element carries.
-        scale = max(_largest(moments), _largest(pull) * self._longest, _largest(loading.couple))
+        scale = max(_largest(moments), _largest(pull) * self._longest, _largest(loading.couple), self._noise)
         if not model.space:
             potential -= float(loading.couple @ state.q[:, 0])
             couple = loading.couple[self._free]

@@ -51,8 +51,7 @@ def relative_residual(equations: Equations, point: Point) -> float:
     off = np.abs(point.residual)
     balance = float(off[:n].max(initial=0.0))
     gap = float(off[n:].max(initial=0.0))
-    # An unloaded scene is balanced: nothing is added up that a residual could be compared with.
-    return max(balance / point.scale if balance > 1e-15 else 0.0, gap)
+    return max(balance / point.scale, gap)
 
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
