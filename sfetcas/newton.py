@@ -99,7 +99,8 @@ def correct(
     first = second = last = np.inf
     count = 0
     for count in range(iterations):
-        if residual <= ROUNDING:
+        # One step is always taken: under a tiny load even the whole answer is below rounding of the stiffness.
+        if residual == 0.0 or (count and residual <= ROUNDING):
             break
         try:
             here = replace(point, entries=tangent) if tangent is not None and count == 0 else point
