@@ -26,6 +26,7 @@ class Fields:
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
         self.model, self._state, self._loading = equations.model, state, loading
         self._equations = equations
+        self.q = state.q
         model = self.model
         self.turned = _turned_tangents(equations, state)
         reach = self.turned.sum(axis=1)

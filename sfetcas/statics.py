@@ -10,13 +10,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from . import interpolation
+from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
 from .continuation import follow
 from .elements import ELEMENTS
@@ -396,7 +395,7 @@ class _Run:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.target
         if mesh.elements > HUGE:
-            half = Mesh(mesh.order, {n: _every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss)
+            half = Mesh(mesh.order, {n: every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss)
             coarse = self._onto(half, pilot, factor)
             now = self._onto(mesh, coarse, factor)
             # The error falls by 4^p a halving; twice that share for not being there yet.
@@ -427,33 +426,16 @@ class _Run:
         )
 
     def _difference(self, coarse: _Found, fine: _Found, factor: float) -> float:
-        """Largest distance of positions at ends and middles of the coarse elements, over the scene's size."""
-        largest = 0.0
         sides = [
             Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (coarse, fine)
         ]
-        for name, cuts in coarse.prepared.model.mesh.cuts.items():
-            x = np.sort(np.concatenate([cuts, 0.5 * (cuts[1:] + cuts[:-1])]))
-            a, b = (side.along(name, x, dimensionless=True)["position"] for side in sides)
-            largest = max(largest, float(np.linalg.norm(a - b, axis=1).max()))
-        return largest / self.scene.size
+        return largest_difference(*sides)
 
-    def _marked(self, found: _Found, loading: Loading, smooth: float) -> Mapping[str, Array]:
-        """Elements whose rotations or tangents have a highest Legendre coefficient above ``smooth``."""
+    def _marked(self, found: _Found, loading: Loading, smooth: float) -> dict[str, Array]:
+        """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""
+        rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
-        element = model.element
-        fields = Fields(found.prepared.equations, found.corrected.state, loading)
-        q = found.corrected.state.q[model.rotations.turns]
-        angles = np.linalg.norm(np.einsum("j,ejc->ec", interpolation.legendre_tail(element.nodes), q), axis=1)
-        turned = np.einsum(
-            "k,eka->ea", interpolation.legendre_tail(element.points), fields.turned / element.weights[:, None]
-        )
-        reach = np.linalg.norm(turned, axis=1) * model.scales.length / self.scene.size
-        rough = (2.0 if model.space else 1.0) * angles + reach > smooth
-        return {
-            name: rough[model.elements_of(name)] if name not in self.fixed else np.zeros(len(cuts) - 1, bool)
-            for name, cuts in model.mesh.cuts.items()
-        }
+        return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
 
 def _redundancy(prepared: Prepared, corrected: Corrected) -> tuple[str, ...]:
@@ -476,7 +458,3 @@ def _redundancy(prepared: Prepared, corrected: Corrected) -> tuple[str, ...]:
 
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
-
-
-def _every_other(cuts: Array) -> Array:
-    return cuts if len(cuts) < 3 else np.unique(np.append(cuts[::2], cuts[-1]))
