@@ -110,8 +110,7 @@ def test_unknown_keys(place, sentence):
         (
             "nodes/A/support",
             "clampd",
-            "nodes.A.support: found 'clampd', accepted: ball, clamped, free, hinge, "
-            "slider; did you mean 'clamped'?",
+            "nodes.A.support: found 'clampd', accepted: ball, clamped, free, hinge, slider; did you mean 'clamped'?",
         ),
         ("nodes/A/support", 1, "nodes.A.support: found 1, accepted: free, clamped, hinge, ball, slider"),
         (
@@ -713,9 +712,7 @@ def test_round_trip_through_a_table():
     assert type(found.expect[2].value) is int
 
 
-@pytest.mark.parametrize(
-    "copied", [copy.copy, copy.deepcopy, lambda found: pickle.loads(pickle.dumps(found))]
-)
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda found: pickle.loads(pickle.dumps(found))])
 def test_copies_are_equal(copied):
     found = made(RICH)
     assert copied(found) == found
@@ -737,9 +734,7 @@ def test_replaced_values_are_checked():
         found.replace(loads={})
 
 
-@pytest.mark.parametrize(
-    "pick", [lambda s: s, lambda s: s.nodes["A"], lambda s: s.loads["tip"], lambda s: s.analysis]
-)
+@pytest.mark.parametrize("pick", [lambda s: s, lambda s: s.nodes["A"], lambda s: s.loads["tip"], lambda s: s.analysis])
 def test_records_are_frozen(pick):
     record = pick(made({}))
     key = next(iter(type(record).model_fields))
@@ -747,9 +742,7 @@ def test_records_are_frozen(pick):
         setattr(record, key, getattr(record, key))
 
 
-@pytest.mark.parametrize(
-    "key", ["sections", "nodes", "members", "loads", "motions", "histories", "center_lines"]
-)
+@pytest.mark.parametrize("key", ["sections", "nodes", "members", "loads", "motions", "histories", "center_lines"])
 def test_tables_are_read_only(key):
     with pytest.raises(TypeError, match="does not support item assignment"):
         getattr(made({}), key)["new"] = None

@@ -132,9 +132,7 @@ SPOKEN = Scene(
             elements=8,
             release=["rigid", "hinge"],
         ),
-        "bow": Member(
-            nodes=["B", "C"], section="waisted", shape={"type": "arc", "angle": 1.57, "normal": [0, 0, 1]}
-        ),
+        "bow": Member(nodes=["B", "C"], section="waisted", shape={"type": "arc", "angle": 1.57, "normal": [0, 0, 1]}),
     },
     loads={
         "tip": Load(type="force", node="B", value=[0, 1], history="ramp"),
@@ -242,9 +240,7 @@ def test_a_format_is_toml_or_json():
 def test_files_that_cannot_be_written(tmp_path):
     with pytest.raises(SceneError, match=r"scene\.txt: found the ending '\.txt', accepted: \.toml, \.json"):
         dump(SPOKEN, tmp_path / "scene.txt")
-    with pytest.raises(
-        SceneError, match=r"scene\.json: the file cannot be written: No such file or directory"
-    ):
+    with pytest.raises(SceneError, match=r"scene\.json: the file cannot be written: No such file or directory"):
         dump(SPOKEN, tmp_path / "none" / "scene.json")
 
 

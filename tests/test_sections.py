@@ -240,9 +240,7 @@ def test_thin_tube_keeps_its_digits():
     assert tube.stiffness([0.0])[0, 1] == pytest.approx(math.pi * radius**3 * wall, rel=3e-12)
 
 
-@pytest.mark.parametrize(
-    ("width", "height"), [(0.01277, 0.0032024), (0.0032024, 0.01277), (1.0, 1.0), (3.0, 0.01)]
-)
+@pytest.mark.parametrize(("width", "height"), [(0.01277, 0.0032024), (0.0032024, 0.01277), (1.0, 1.0), (3.0, 0.01)])
 def test_torsion_of_rectangles_against_the_plain_series(width, height):
     a, b = max(width, height), min(width, height)
     n = np.arange(1.0, 40001.0, 2.0)[::-1]

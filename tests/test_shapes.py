@@ -31,9 +31,7 @@ def marched(shape, start, quaternion, steps=3000):
 
     def rate(x, state):
         q = state[3:]
-        kappa = [
-            shape.length * np.polynomial.Polynomial(c)(x) for c in (shape.twist, shape.kappa2, shape.kappa3)
-        ]
+        kappa = [shape.length * np.polynomial.Polynomial(c)(x) for c in (shape.twist, shape.kappa2, shape.kappa3)]
         return np.concatenate([shape.length * matrix(q)[:, 0], 0.5 * multiply(q, [0.0, *kappa])])
 
     state, h = np.concatenate([start, quaternion]), 1.0 / steps
@@ -46,9 +44,7 @@ def marched(shape, start, quaternion, steps=3000):
     return state[:3], state[3:]
 
 
-BENT = Curvature(
-    kappa3=[2.0, -6.0, 5.0], kappa2=[0.5, 0.0, -3.0], twist=[1.0, 2.0], length=1.3, start=[0, 0.6, 0.8]
-)
+BENT = Curvature(kappa3=[2.0, -6.0, 5.0], kappa2=[0.5, 0.0, -3.0], twist=[1.0, 2.0], length=1.3, start=[0, 0.6, 0.8])
 # Its start frame: b2 = z x t = -x, b3 = t x b2
 BENT_FIRST = np.column_stack([[0.0, 0.6, 0.8], [-1.0, 0.0, 0.0], [0.0, -0.8, 0.6]])
 POINTS = [[0, 0, 0], [1, 0.5, 0.2], [2, 1.5, -0.1], [2.5, 3, 1]]
@@ -264,9 +260,7 @@ def test_arc_is_the_part_of_a_circle(angle, heading):
     expected = np.array([1, 1]) + line.length / angle * turn
     assert line.positions(X)[:, :2] == pytest.approx(expected, abs=lost * line.length)
     assert line.positions(X)[:, 2] == pytest.approx(np.full(len(X), 5.0), abs=0.0)
-    assert line.curvatures(X) == pytest.approx(
-        np.tile([0, 0, angle / line.length], (len(X), 1)), abs=ROUNDING
-    )
+    assert line.curvatures(X) == pytest.approx(np.tile([0, 0, angle / line.length], (len(X), 1)), abs=ROUNDING)
     assert line.end_gap == pytest.approx(np.zeros(3), abs=ROUNDING * line.length)
     assert line.turning == pytest.approx(abs(angle), rel=ROUNDING)
     assert (line.planar, line.bending_axis) == (True, 3)
@@ -461,10 +455,7 @@ def reference_spline(points):
     return knots, np.linalg.solve(np.array(rows), np.array(right)).reshape(count, 4, 3)
 
 
-MANY = [
-    [math.cos(t) * (1 + 0.2 * t), math.sin(t) + 0.01 * t**3, 0.3 * t]
-    for t in (0, 0.4, 1.1, 1.7, 2.9, 3.3, 4.4)
-]
+MANY = [[math.cos(t) * (1 + 0.2 * t), math.sin(t) + 0.01 * t**3, 0.3 * t] for t in (0, 0.4, 1.1, 1.7, 2.9, 3.3, 4.4)]
 
 
 def test_spline_against_another_solution():

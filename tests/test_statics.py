@@ -109,7 +109,7 @@ def test_oblique_pull_and_push(load):
 
 
 SCENES = {
-    **{name: table for name, table in ZOO.items()},
+    **ZOO,
     "stiff": lambda: cantilever((0.0, 1e3)),
     "long way": lambda: cantilever((-30.0, 1.0)),
     "moved": lambda: together(0.3),

@@ -1,0 +1,183 @@
+"""Compiled kernels against the virtual machine, and a cache that nothing can spoil."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from sfetcas import kernels
+from sfetcas.elements import Element
+
+ELEMENT = Element(2, True)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SFETCAS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.delenv("SFETCAS_KERNELS", raising=False)
+    kernels._loaded.cache_clear()
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def compiler():
+    if kernels._compiler() is None:
+        pytest.skip("no compiler here")
+
+
+def small(factor=2.0, name="small"):
+    x = ca.SX.sym("x", 3)
+    return ca.Function(name, [x], [factor * ca.sin(x) * ca.sumsqr(x)], ["x"], ["y"])
+
+
+def arguments(function, seed=0):
+    rng = np.random.default_rng(seed)
+    return [rng.normal(size=function.size_in(i)) for i in range(function.n_in())]
+
+
+def files(folder):
+    return sorted(p.name for p in folder.iterdir()) if folder.exists() else []
+
+
+@pytest.mark.parametrize("name", ["energy", "gradient", "hessian", "reach_jacobian", "turning"])
+def test_compiled_equals_virtual_machine(cache, compiler, name):
+    function = getattr(ELEMENT, name)
+    machine = kernels.compiled(function)
+    assert machine.class_name() != function.class_name()
+    for seed in range(3):
+        given = arguments(function, seed)
+        a, b = function(*given), machine(*given)
+        for x, y in zip(*((r if isinstance(r, tuple) else (r,)) for r in (a, b)), strict=True):
+            x, y = x.full(), y.full()
+            # Same operations; contraction to fused multiply-adds changes last digits of sums of such size.
+            np.testing.assert_allclose(x, y, rtol=1e-12, atol=1e-13 * max(1.0, np.abs(x).max()))
+
+
+def test_second_call_takes_the_file(cache, compiler, monkeypatch):
+    kernels.compiled(small())
+    before = files(cache)
+    assert len(before) == 1
+    assert before[0].startswith("small-")
+    monkeypatch.setattr(kernels.subprocess, "run", lambda *a, **k: pytest.fail("compiled again"))
+    kernels._loaded.cache_clear()
+    assert kernels.compiled(small())([1, 2, 3]).full() == pytest.approx(small()([1, 2, 3]).full())
+
+
+def test_key_is_the_content(cache, compiler):
+    two, three = kernels.compiled(small(2.0)), kernels.compiled(small(3.0))
+    assert len(files(cache)) == 2
+    # Same name and shapes, other content: never the other's file.
+    np.testing.assert_allclose(three([1, 2, 3]).full(), 1.5 * two([1, 2, 3]).full(), rtol=1e-15)
+
+
+def test_corrupt_file_falls_back(cache, compiler):
+    path = kernels._library(small())
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"\x7fELF but nothing else")
+    result = kernels.compiled(small())([1, 2, 3]).full()
+    np.testing.assert_allclose(result, small()([1, 2, 3]).full(), rtol=1e-14)
+
+
+def test_interrupted_write_leaves_nothing(cache, compiler, monkeypatch):
+    def interrupted(command, **_):
+        Path(command[command.index("-o") + 1]).write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(kernels.subprocess, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        kernels.compiled(small())
+    assert files(cache) == []
+
+
+def test_failing_compiler_and_none_at_all(cache, monkeypatch):
+    def fails(command, **_):
+        raise subprocess.CalledProcessError(1, command)
+
+    monkeypatch.setattr(kernels, "_compiler", lambda: "cc")
+    monkeypatch.setattr(kernels.subprocess, "run", fails)
+    function = small()
+    assert kernels.compiled(function) is function
+    monkeypatch.setattr(kernels, "_compiler", lambda: None)
+    assert kernels.compiled(function) is function
+    assert files(cache) == []
+
+
+def test_folder_that_cannot_be_written(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    monkeypatch.setenv("SFETCAS_CACHE", str(blocked))
+    function = small()
+    assert kernels.compiled(function) is function
+
+
+def test_concurrent_processes(cache, compiler):
+    code = (
+        "import casadi as ca, numpy as np\n"
+        "from sfetcas import kernels\n"
+        "x = ca.SX.sym('x', 3)\n"
+        "f = ca.Function('small', [x], [2.0 * ca.sin(x) * ca.sumsqr(x)], ['x'], ['y'])\n"
+        "g = kernels.compiled(f)\n"
+        "assert g is not f\n"
+        "np.testing.assert_allclose(g([1, 2, 3]).full(), f([1, 2, 3]).full(), rtol=1e-14)\n"
+    )
+    source = str(Path(kernels.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": source}
+    running = [
+        subprocess.Popen([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE) for _ in range(3)
+    ]
+    for process in running:
+        error = process.communicate(timeout=60)[1]
+        assert process.returncode == 0, error.decode()
+    assert len(files(cache)) == 1  # no folder or half file is left
+
+
+def test_where_it_pays(cache, compiler, monkeypatch):
+    function = small()
+    assert kernels.chosen(function, 10.0) is function
+    assert files(cache) == []
+    assert kernels.chosen(function, 1e9) is not function
+    assert len(files(cache)) == 1
+    # Once it is there it is taken as soon as time is spent at all, and compiling alone would not pay.
+    calls = 0.5 * kernels.COMPILE_SECONDS_PER_INSTRUCTION / kernels.SECONDS_PER_INSTRUCTION
+    large = ELEMENT.turning
+    assert kernels.chosen(large, calls) is large
+    kernels.compiled(large)
+    assert kernels.chosen(large, calls) is not large
+    monkeypatch.setenv("SFETCAS_KERNELS", "interpreted")
+    assert kernels.chosen(function, 1e9) is function
+    monkeypatch.setenv("SFETCAS_KERNELS", "compiled")
+    assert kernels.chosen(function, 1.0) is not function
+    # What is asked for by argument comes before the environment.
+    assert kernels.chosen(function, 1e9, "interpreted") is function
+    monkeypatch.delenv("SFETCAS_KERNELS")
+    assert kernels.chosen(function, 1.0, "compiled") is not function
+
+
+def test_cache_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv("SFETCAS_CACHE", "/somewhere/else")
+    assert kernels.cache_folder() == Path("/somewhere/else")
+    monkeypatch.delenv("SFETCAS_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert kernels.cache_folder() == tmp_path / "sfetcas"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert kernels.cache_folder() == tmp_path / ".cache" / "sfetcas"
+
+
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_batch_is_the_function_n_times(n):
+    function = ELEMENT.turning
+    batch = kernels.Batch(function, n)
+    rng = np.random.default_rng(n)
+    for _ in range(2):
+        given = [rng.normal(size=(n, function.size2_in(i), function.size1_in(i))) for i in range(4)]
+        for i, values in enumerate(given):
+            batch.set(i, values)
+        results = batch()
+        for k in range(n):
+            for found, one in zip(results, function(*[values[k].T for values in given]), strict=True):
+                np.testing.assert_allclose(found[k], one.full().ravel(order="F"), rtol=1e-14, atol=1e-14)

@@ -1,0 +1,81 @@
+"""Quaternions against rotation matrices, Rodrigues' formula and the matrices G of the source."""
+
+import numpy as np
+import pytest
+
+from sfetcas import quaternion as quat
+
+RNG = np.random.default_rng(1)
+PHI = RNG.normal(size=(20, 3))
+Q = quat.from_rotation_vector(PHI)
+P = quat.from_rotation_vector(RNG.normal(size=(20, 3)))
+V = RNG.normal(size=(20, 3))
+ROUNDING = 1e-14  # some ten operations on numbers of order one
+
+
+def rodrigues(phi):
+    angle = np.linalg.norm(phi)
+    k = phi / angle
+    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def test_rotation_vector_is_rodrigues_formula():
+    expected = np.array([rodrigues(phi) for phi in PHI])
+    np.testing.assert_allclose(quat.matrix(Q), expected, atol=ROUNDING)
+    np.testing.assert_allclose(quat.rotate(Q, V), np.einsum("nij,nj->ni", expected, V), atol=ROUNDING)
+
+
+def test_product_turns_by_the_second_factor_first():
+    both = np.einsum("nij,njk->nik", quat.matrix(Q), quat.matrix(P))
+    np.testing.assert_allclose(quat.matrix(quat.multiply(Q, P)), both, atol=ROUNDING)
+
+
+def test_units_multiply_as_hamilton_says():
+    one, i, j, k = np.eye(4)
+    for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
+        np.testing.assert_array_equal(quat.multiply(a, b), c)
+        np.testing.assert_array_equal(quat.multiply(b, a), -c)
+        np.testing.assert_array_equal(quat.multiply(a, a), -one)
+
+
+def test_conjugate_is_the_inverse():
+    np.testing.assert_allclose(quat.multiply(Q, quat.conjugate(Q)), np.tile([1.0, 0, 0, 0], (20, 1)), atol=ROUNDING)
+
+
+def test_turned_is_homogeneous_of_degree_two():
+    scaled = quat.turned(list(3.0 * Q.T), list(V.T))
+    np.testing.assert_allclose(np.array(scaled).T, 9.0 * quat.rotate(Q, V), atol=1e-13)
+
+
+def test_tangent_of_the_source():
+    l0, l1, l2, l3 = Q.T
+    b1 = np.stack([l0**2 + l1**2 - l2**2 - l3**2, 2 * (l1 * l2 + l0 * l3), 2 * (l1 * l3 - l0 * l2)], axis=-1)
+    np.testing.assert_allclose(quat.rotate(Q, [1.0, 0, 0]), b1, atol=ROUNDING)
+
+
+def test_body_and_fixed_spin_of_the_source():
+    """conj(q) q' and q' conj(q) are the matrices G and G1 of the source times q'."""
+    rate = RNG.normal(size=(20, 4))
+    l0, l1, l2, l3 = Q.T
+    body = np.array([[-l1, l0, l3, -l2], [-l2, -l3, l0, l1], [-l3, l2, -l1, l0]])
+    fixed = np.array([[-l1, l0, -l3, l2], [-l2, l3, l0, -l1], [-l3, -l2, l1, l0]])
+    for g, spin in ((body, quat.multiply(quat.conjugate(Q), rate)), (fixed, quat.multiply(rate, quat.conjugate(Q)))):
+        np.testing.assert_allclose(spin[:, 1:], np.einsum("ijn,nj->ni", g, rate), atol=ROUNDING)
+
+
+def test_small_and_large_rotation_vectors():
+    np.testing.assert_array_equal(quat.from_rotation_vector([0.0, 0.0, 0.0]), [1, 0, 0, 0])
+    tiny = quat.from_rotation_vector([1e-9, -2e-9, 3e-9])
+    np.testing.assert_allclose(tiny[1:], [0.5e-9, -1e-9, 1.5e-9], rtol=1e-15)
+    # More than half a turn keeps its sign: a continuous field stays continuous.
+    np.testing.assert_allclose(quat.from_rotation_vector([0, 0, 2 * np.pi]), [-1, 0, 0, 0], atol=ROUNDING)
+    field = quat.from_rotation_vector(np.linspace(0, 20, 400)[:, None] * np.array([0.6, 0.0, 0.8]))
+    assert np.linalg.norm(np.diff(field, axis=0), axis=1).max() < 0.5 * 20 / 399 * 1.001
+
+
+@pytest.mark.parametrize("angle", [-6.0, -3.0, -0.1, 0.0, 2.0, 3.2, 6.2])
+def test_angle_about_reads_the_angle_back(angle):
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    q = quat.from_rotation_vector(angle * axis)
+    assert quat.angle_about(q, axis) == pytest.approx(angle, abs=1e-14)
