@@ -300,10 +300,10 @@ class _Run:
             if found is not None:
                 return found
         zero = pilot.equations.start(model.loading(0.0, 0.0))
-        if np.any(model.loading(factor).shift) and not self.scene.histories:
-            point = pilot.equations.at(zero, model.loading(0.0, 0.0))
-            if redundant_rows(pilot.equations, point):
-                return self._grown_from_bent(pilot, factor)
+        if redundant_rows(pilot.equations, pilot.equations.at(zero, model.loading(0.0, 0.0))):
+            # Straight members without slack: no way leads from here but the one that motions make.
+            moved = np.any(model.loading(factor).shift) and not self.scene.histories
+            return self._grown_from_bent(pilot, factor) if moved else None
         if self.scene.histories and factor != 0.0:
             # With histories the way leads through the factors, after the loads of factor 0 have grown.
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero)
