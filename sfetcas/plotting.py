@@ -969,7 +969,7 @@ class _Sheet:
         """Ticks some way apart; their labels, and that of the axis, at a fixed distance of the axis on the sheet."""
         line = self.axes.transData.transform(np.stack(axis.line.get_data(), axis=1))
         length, point = np.abs(line[1] - line[0]), self._point()
-        width = 6.5 * max((len(label.get_text()) for label in self._tick_labels(axis)), default=1)
+        width = 6.5 * max([4, *(len(label.get_text()) for label in self._tick_labels(axis))])
         # Labels along the axis are apart when they are either beside or above each other.
         bins = min(6, max(1, int((length / (point * np.array([width + 10.0, 20.0]))).max())))
         axis.set_major_locator(MaxNLocator(nbins=bins, steps=[1, 2, 2.5, 5, 10], min_n_ticks=min(2, bins)))
@@ -978,7 +978,7 @@ class _Sheet:
         tick = 5.0 + float(across @ [0.48 * width, 5.0])
         per_pad = _norm(off) / (point * (axis.labelpad + 21.0))
         axis.set_tick_params(pad=tick / per_pad - 8.0)
-        axis.labelpad = (2.0 * tick + float(across @ [14.0, 7.0])) / per_pad - 21.0
+        axis.labelpad = (2.0 * tick + float(across @ [24.0, 8.0])) / per_pad - 21.0
 
     # -- marks ------------------------------------------------------------------------------------
 
@@ -1072,13 +1072,15 @@ class _Sheet:
         return [_box_of(text) for text in texts]
 
     def _hide_colliding(self) -> None:
-        """Hide tick labels in space over or close to those of another axis, sooner on an axis that has many."""
+        """Hide tick labels in space over others or close to those of another axis, sooner on an axis that has many."""
         shown: list[_Box] = []
         for labels in sorted(map(self._tick_labels, self._axes_in_space()), key=len):
-            boxes = [_box_of(label, 2.0 * self._point()) for label in labels]
-            for label, box in zip(labels, boxes, strict=True):
-                label.set_visible(not any(box.meets(other) for other in shown))
-            shown += boxes
+            own: list[_Box] = []
+            for label in labels:
+                box, tight = _box_of(label, 2.0 * self._point()), _box_of(label, -1.0 * self._point())
+                label.set_visible(not any(box.meets(other) for other in shown) and not any(map(tight.meets, own)))
+                own += [tight] if label.get_visible() else []
+            shown += own
 
     def _placed(self, taken: Sequence[_Box]) -> list[tuple[_Label, _Box]]:
         """The labels in turn where they hide least; of many alike only the first."""
