@@ -110,8 +110,10 @@ def _drawing(path: Path | None) -> Callable[[Solution, Path], None] | None:
     if path is None:
         return None
     # Matplotlib costs more than most solves: only a picture pays for it.
-    from .plotting import save_picture
+    from .plotting import ENDINGS, save_picture
 
+    if path.suffix.lower() not in ENDINGS:
+        raise SceneError(f"{path}: found the ending {path.suffix!r} of a picture, accepted: {', '.join(ENDINGS)}")
     return save_picture
 
 

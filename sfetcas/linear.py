@@ -5,12 +5,14 @@ Small systems go to LAPACK, larger ones to the solvers that come with CasADi; th
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from .arrays import Array
+from .kernels import Batch
 
 __all__ = ["SparseSolver"]
 
@@ -36,10 +38,11 @@ class SparseSolver:
         self._places = row * n + column if n <= DENSE else None
         if self._places is None:
             self._sparsity = ca.Sparsity(n, n, _pointers(n, column), row.tolist())
-            self._solver = ca.Linsol("newton", plugin, self._sparsity)
-            # A MUMPS that is never used prints when it is destroyed: its first memory is used once, on a matrix
-            # that is easy; solutions take a second one.
+            self._plugin = plugin
             if plugin == "mumps":
+                self._solver = ca.Linsol("newton", plugin, self._sparsity)
+                # A MUMPS that is never used prints when it is destroyed: its first memory is used once, on a
+                # matrix that is easy; solutions take a second one.
                 self._solver.nfact(ca.DM(self._sparsity, (row == column).astype(float)))
 
     def factor(self, entries: Array) -> None:
@@ -49,7 +52,7 @@ class SparseSolver:
             self._matrix[self._places] = entries
             self._matrix = self._matrix.reshape(self.n, self.n)
         else:
-            self._matrix = ca.DM(self._sparsity, entries)
+            self._matrix = ca.DM(self._sparsity, entries) if self._plugin == "mumps" else entries
 
     def solve(self, b: Array) -> Array:
         """Solution for the matrix given last; b of shape (n,) or (n, k).
@@ -62,10 +65,21 @@ class SparseSolver:
         if self._places is not None:
             return np.asarray(np.linalg.solve(self._matrix, b))
         try:
-            x = self._solver.solve(self._matrix, ca.DM(b))
+            if self._plugin == "mumps":
+                return np.asarray(self._solver.solve(self._matrix, ca.DM(b)).full()).reshape(b.shape)
+            batch = self._batch(1 if b.ndim == 1 else b.shape[1])
+            batch.set(0, self._matrix)
+            batch.set(1, b.T)
+            return np.array(batch()[0].reshape(b.T.shape).T)
         except RuntimeError:
             raise np.linalg.LinAlgError("singular matrix") from None
-        return np.asarray(x.full()).reshape(b.shape)
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019 - lives as long as the solver
+    def _batch(self, columns: int) -> Batch:
+        """The solution as a function, which takes and gives arrays without copies."""
+        entries, b = ca.MX.sym("entries", self._sparsity.nnz()), ca.MX.sym("b", self.n, columns)
+        x = ca.densify(ca.solve(ca.MX(self._sparsity, entries), b, self._plugin))
+        return Batch(ca.Function("solve", [entries, b], [x]), 1)
 
 
 def _pointers(n: int, column: Array) -> list[int]:
