@@ -96,8 +96,8 @@ def test_modules_import_only_from_their_left(name):
 @each
 def test_mechanics_and_solvers_know_no_more_than_they_need(name):
     own, other = imported(TREES[name])
-    if name in ("nlp", "interpolation", "quaternion", "linear"):
-        assert own <= {"errors", "arrays"}, "mathematics knows no mechanics"
+    if name in ("nlp", "interpolation", "quaternion", "kernels", "linear"):
+        assert own <= {"errors", "arrays", "kernels"}, "mathematics knows no mechanics"
     if name in ("sections", "shapes", "structure", "loads", "supports", "dimension", "scene", "records", "scenefile"):
         assert "casadi" not in other, "descriptions need no solver"
     assert ("matplotlib" in other) == (name == "plotting")
