@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from .equations import State
 from .errors import SolveError
 from .loading import Loading
@@ -62,12 +64,16 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
 
     With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.
     """
+    # In space a whole turn of a held node looks like none: no step may turn one by more than a radian.
+    turn = float(np.linalg.norm(way(1.0).turn - way(0.0).turn, axis=1).max(initial=0.0))
+    longest = 1.0 / max(turn, 1.0) if prepared.model.space else 1.0
     done, step = 0.0, 0.5
     left: list[float] = []
     now = prepared.correct(state, way(0.0))
     for _ in range(MOST):
         if done >= 1.0:
             return Followed(now.state, True, tuple(left))
+        step = min(step, longest)
         trial = min(1.0, done + step)
         there = prepared.correct(
             now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries

@@ -56,9 +56,9 @@ class Point:
         Potential energy (zero for the undeformed, unloaded scene) and its elastic part.
     residual : ndarray (unknowns + rows,)
         Out-of-balance moments and forces, then closing gaps.
-    scale : float
-        Largest moment or force that the residual adds up, and no less than a hundredth of the stiffness: what
-        rounding is judged by.
+    scale : ndarray (unknowns + rows,)
+        What rounding of each residual is judged by: the moments and forces added up at the node, no less than a
+        hundredth of its stiffness; 1 for gaps.
     entries : ndarray
         Entries of the Newton matrix, in the order of :attr:`Equations.row` and :attr:`Equations.column`.
     """
@@ -66,7 +66,7 @@ class Point:
     potential: float
     strain: float
     residual: Array
-    scale: float
+    scale: Array
     entries: Array
 
 
@@ -90,8 +90,9 @@ class Equations:
         if len(model.rotations.hinges):
             self._hinge = Batch(hinge(), len(model.rotations.hinges))
             self._hinge.set(1, model.rotations.hinge_axes)
-        # Moment below which rounding of the rotations shows: 1e-14 of it is what a unit quaternion leaves.
-        self._noise = 0.01 * _largest(self.elastic_entries())
+        # A hundredth of the stiffness against turning a node: 1e-14 of it is what rounding of rotations leaves.
+        self._noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
+        self._noise[self.unknowns :] = 1.0
 
     # -- numbering ------------------------------------------------------------------------------
 
@@ -233,17 +234,22 @@ class Equations:
         potential -= float((loading.pull * model.beams.tangent).sum())
         potential -= float(loading.force.ravel() @ nodal)
         residual = np.bincount(self._used_numbers, weights=moments.ravel()[self._used], minlength=self.total)
-        # Held nodes count: their moments are what a structure of one element carries.
-        scale = max(_largest(moments), _largest(pull) * self._longest, _largest(loading.couple), self._noise)
+        # What a node adds up: moments of its elements, and within them the forces times the length they act on.
+        carried = (np.abs(pull).sum(axis=2) * model.beams.weight).sum(axis=1)
+        sums = np.abs(moments) + np.repeat(carried, len(model.element.nodes) * model.element.turns).reshape(
+            moments.shape
+        )
+        scale = np.bincount(self._used_numbers, weights=sums.ravel()[self._used], minlength=self.total) + self._noise
         if not model.space:
             potential -= float(loading.couple @ state.q[:, 0])
             couple = loading.couple[self._free]
             residual[: self.turning_unknowns] -= couple
+            scale[: self.turning_unknowns] += np.abs(couple)
         lam, force = state.lam[: len(positions.rows)], loading.force.ravel()
         if self.displacement_unknowns:
             displacement = slice(self.turning_unknowns, self.unknowns)
             residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
-            scale = max(scale, _largest(lam), _largest(force))
+            scale[displacement] = np.abs(positions.W.T) @ np.abs(lam) + np.abs(positions.Y.T) @ np.abs(force) + 1e-12
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
         parts = [stiffness.ravel(), *self._closing_parts(spin), self._w_entries, self._w_entries]
@@ -363,10 +369,6 @@ class Equations:
 
 FEW_ROWS = 12
 """Up to this many closings csparse is faster than MUMPS, beyond it can be ten times slower (measured)."""
-
-
-def _largest(a: Array) -> float:
-    return float(np.abs(a).max(initial=0.0))
 
 
 def _positive_part(matrices: Array) -> Array:

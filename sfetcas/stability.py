@@ -5,8 +5,8 @@ diagonal weight, the eigenvalues of ``H x = mu M x`` on the null space of ``A`` 
 minimum, one below zero is a way out.  They are counted through Sylvester's law of inertia: the negative
 eigenvalues of ``H - sigma M`` less those of the Schur complement ``A (H - sigma M)^-1 A^T``.
 
-The weight of a rotation is its length times the smallest stiffness of its member over the square of the
-member's length, so that the eigenvalues are pure numbers whatever the units and however unlike the members are.
+The weight of a rotation is its length times the smallest stiffness of all members over the square of its
+member's length: the eigenvalues are pure numbers, of the size of one for what the softest member does.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["Stability", "StabilityTest"]
 NEUTRAL = 1e-7
 """Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
 
-ROUNDING = 1e-12
+ROUNDING = 2e-15
 """The same, relative to the largest entry of the weighted matrix."""
 
 DENSE = 120
@@ -70,18 +70,13 @@ class StabilityTest:
     def weight(self) -> Array:
         """The weight M of the module's docstring, (turning unknowns,)."""
         model = self.equations.model
-        x = np.linspace(0.0, 1.0, 5)
-        stiffness = np.zeros(len(model.rotations.kind))
+        x, softest = np.linspace(0.0, 1.0, 5), np.inf
         for name, member in model.scene.members.items():
             line = model.scene.center_lines[name]
             values = model.scene.sections[member.section].stiffness(x)
             values = values if model.space else values[:, [1 if line.bending_axis == 2 else 2]]
-            relative = np.nanmin(values) / (model.scales.moment * model.scales.length)
-            turns = np.unique(model.rotations.turns[model.elements_of(name)])
-            stiffness[turns] = np.maximum(stiffness[turns], relative / (line.length / model.scales.length) ** 2)
-        number, weight = self.equations.number, np.zeros(self._n)
-        weight[number[number >= 0]] = np.broadcast_to(stiffness[:, None], number.shape)[number >= 0]
-        return weight * self.equations.mass
+            softest = min(softest, float(np.nanmin(values)) / line.length**2)
+        return self.equations.mass * softest / model.scales.moment * model.scales.length
 
     def _rows(self, point: Point) -> Array:
         """The closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
