@@ -10,7 +10,7 @@ from .arrays import Array
 from .equations import Equations, Point, State
 from .loading import Loading
 
-__all__ = ["TURN", "Corrected", "correct", "descend", "redundant_rows", "relative_residual"]
+__all__ = ["TURN", "Corrected", "correct", "descend", "loose_rows", "redundant_rows", "relative_residual"]
 
 PROXIMAL = 1e-10
 """Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
@@ -170,17 +170,22 @@ def descend(
     return state
 
 
-def redundant_rows(equations: Equations, point: Point) -> list[int]:
-    """Rows that depend on others to first order at this state; empty where the multipliers are unique."""
+def loose_rows(equations: Equations, point: Point) -> Array:
+    """Combinations of rows that vanish to first order at this state: orthonormal columns, (rows, n)."""
     n = equations.unknowns
     if not equations.rows:
-        return []
+        return np.zeros((0, 0))
     chosen = (equations.row >= n) & (equations.column < n)
     rows = np.zeros((equations.rows, n))
     rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
     squares, left = np.linalg.eigh(rows @ rows.T)
-    loose = left[:, squares < SLACK**2 * squares[-1]]
-    return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist()
+    return np.asarray(left[:, squares < SLACK**2 * squares[-1]])
+
+
+def redundant_rows(equations: Equations, point: Point) -> list[int]:
+    """Rows that depend on others to first order at this state; empty where the multipliers are unique."""
+    loose = loose_rows(equations, point)
+    return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist() if loose.size else []
 
 
 SLACK = 1e-6

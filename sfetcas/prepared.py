@@ -21,7 +21,7 @@ from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem
 from .stability import Stability, StabilityTest
 
-__all__ = ["Prepared"]
+__all__ = ["SOLVED", "Prepared"]
 
 SOLVED = 1e-9
 """Relative residual after the last Newton steps that is taken for an equilibrium; usual are 1e-13 to 1e-16."""

@@ -25,8 +25,8 @@ from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import assemble
-from .newton import Corrected, redundant_rows
-from .prepared import Prepared
+from .newton import Corrected, loose_rows, redundant_rows, relative_residual
+from .prepared import SOLVED, Prepared
 from .scene import Scene
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
@@ -407,7 +407,7 @@ class _Run:
 
     def _answer(self, found: _Found, factor: float, error: float) -> Equilibrium:
         prepared = found.prepared
-        found = replace(found, notes=(*found.notes, *_redundancy(prepared, found.corrected)))
+        found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
         if stability.negative > 0 and self.leave:
@@ -438,22 +438,31 @@ class _Run:
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
 
-def _redundancy(prepared: Prepared, corrected: Corrected) -> tuple[str, ...]:
-    """A note where closings are redundant, so that reactions are not unique.
+def _with_unique_reactions(found: _Found, loading: Loading) -> _Found:
+    """The same, with the smallest multipliers and a note where closings are redundant.
 
     Raises
     ------
     SolveError
         Members stretched between held points: no finite reaction holds an inextensible member straight.
     """
-    rows = redundant_rows(prepared.equations, corrected.point)
+    equations, corrected = found.prepared.equations, found.corrected
+    rows = redundant_rows(equations, corrected.point)
     if not rows:
-        return ()
-    names = ", ".join(prepared.equations.row_names[row] for row in rows)
-    if np.abs(corrected.state.lam).max() > BEYOND * max(1.0, prepared.load_size(corrected)):
+        return found
+    names = ", ".join(equations.row_names[row] for row in rows)
+    loose = loose_rows(equations, corrected.point)
+    lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
+    state = replace(corrected.state, lam=lam)
+    point = equations.at(state, loading)
+    residual = relative_residual(equations, point)
+    if residual <= SOLVED:
+        corrected = replace(corrected, state=state, point=point, residual=residual)
+    elif np.abs(corrected.state.lam).max() > BEYOND * max(1.0, found.prepared.load_size(corrected)):
         detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
         raise SolveError(Status.INFEASIBLE, detail, corrected.state)
-    return (f"reactions are not unique, the smallest are given; redundant: {names}",)
+    note = f"reactions are not unique, the smallest are given; redundant: {names}"
+    return replace(found, corrected=corrected, notes=(*found.notes, note))
 
 
 BEYOND = 1e4
