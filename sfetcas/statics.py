@@ -206,6 +206,8 @@ class _Run:
         self.leave = scene.analysis.unstable == "leave"
         self.started = any(node.start is not None for node in scene.nodes.values())
         self._choose_meshes()
+        # Where the mesh is the library's own, its default accuracy is a promise as well.
+        self.asked = self.asked or not self.fixed
 
     # -- meshes ---------------------------------------------------------------------------------
 
