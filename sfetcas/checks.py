@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .errors import SceneError
-from .records import nearest
+from .records import nearest, say
 from .scene import Expect, Scene
 from .solution import Equilibrium, Solution
 
@@ -49,7 +49,13 @@ def check(scene: Scene, solution: Solution) -> list[Check]:
             value = look_up(_step(solution, expect), expect.quantity, expect.at)
         except SceneError as error:
             raise error.within("expect", str(i), "quantity") from None
-        checks.append(_compared(expect, value))
+        try:
+            checks.append(_compared(expect, value))
+        except SceneError as error:
+            raise error.within("expect", str(i), "value") from None
+        except (TypeError, ValueError):
+            message = f"found {say(expect.value)}, accepted: numbers as in the answer, {say(value)}"
+            raise SceneError(message, ("expect", str(i), "value")) from None
     return checks
 
 
@@ -103,7 +109,7 @@ def _entry(table: dict[str, Any], key: str) -> Any:
 def _compared(expect: Expect, value: Any) -> Check:
     reference = expect.value
     if isinstance(reference, (bool, str)) or (isinstance(reference, int) and expect.tolerance is None):
-        same = value == reference
+        same = np.array_equal(value, reference)
         return Check(expect, value, 0.0 if same else np.inf, bool(same))
     wanted, found = np.atleast_1d(np.asarray(reference, dtype=float)), np.atleast_1d(np.asarray(value, dtype=float))
     if np.ndim(reference) == 0 and found.size == 3:

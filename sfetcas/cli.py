@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .checks import Check, check
 from .elements import ELEMENTS
 from .errors import SceneError, SolveError, Status
@@ -39,6 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except SolveError as error:
         print(f"sfetcas: no solution: {error}", file=sys.stderr)
+        return NO_SOLUTION
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+        print(f"sfetcas: no solution: the numbers of this scene leave what can be computed ({error})", file=sys.stderr)
         return NO_SOLUTION
     except KeyboardInterrupt:
         print("sfetcas: interrupted; nothing was written", file=sys.stderr)
@@ -94,6 +99,8 @@ def _run(options: argparse.Namespace) -> int:
     for path in (options.json, options.plot):
         if path is not None:
             _check_writable(path)
+            if path.exists() and path.samefile(options.file):
+                raise SceneError(f"{path}: is the scene itself, accepted: another file")
     drawing = _drawing(options.plot)
     solution = solve(scene, settings)
     if options.json is not None:
@@ -119,22 +126,31 @@ def _drawing(path: Path | None) -> Callable[[Solution, Path], None] | None:
 
 def _check_writable(path: Path) -> None:
     folder = path.parent
-    if path.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise SceneError(f"{path}: cannot be written; accepted: a file in a folder that exists and can be written")
+    if (
+        (path.exists() and not path.is_file())
+        or path.is_symlink()
+        or not folder.is_dir()
+        or not os.access(folder, os.W_OK)
+    ):
+        raise SceneError(
+            f"{path}: cannot be written; accepted: a plain file in a folder that exists and can be written"
+        )
 
 
 def _write(path: Path, writer: Callable[[Path], Any]) -> None:
     """Write beside the final name first, so that nothing half-written is ever seen."""
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-    os.close(handle)
+    name = ""
     try:
+        handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
+        os.close(handle)
         writer(Path(name))
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
     except (OSError, ValueError) as error:
         raise SceneError(f"{path}: could not be written: {error}") from None
     finally:
-        Path(name).unlink(missing_ok=True)
+        if name:
+            Path(name).unlink(missing_ok=True)
 
 
 def _umask() -> int:

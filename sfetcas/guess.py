@@ -99,7 +99,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[
         state = _carried(equations, loading)
     targets = _wished(equations)
     if equations.rows and targets is None and redundant_rows(equations, equations.at(state, loading)):
-        state = _bent(equations, state, loading)
+        state = _bent(equations, state, loading, weight)
     if targets is not None:
         state = _placed(equations, state, loading, weight, targets)
     state, gap = restore(equations, state, loading, weight)
@@ -201,15 +201,33 @@ def _carried(equations: Equations, loading: Loading) -> State:
     return equations.holding(replace(equations.start(loading), q=q), loading)
 
 
-def _bent(equations: Equations, state: State, loading: Loading) -> State:
-    """Straight members bent by a slight bow about their weak axis, to the side that the loads prefer."""
-    up, down = (replace(state, q=_bow(equations, state, sign)) for sign in (1.0, -1.0))
-    difference = equations.at(up, loading).potential - equations.at(down, loading).potential
-    return down if difference > 1e-12 else up
+def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -> State:
+    """Straight members bent by a slight bow, each or as chains, to the side that takes least energy."""
+    sides = []
+    for vectors in (_bow(equations), _tent(equations)):
+        for sign in (1.0, -1.0):
+            bent = replace(state, q=_turned_by(equations, state, sign * vectors))
+            closed, gap = restore(equations, bent, loading, weight)
+            sides.append((round(gap, 6), equations.at(closed, loading).potential, bent))
+    least = min(side[:2] for side in sides)
+    margin = 1e-9 * max(1.0, abs(least[1]))
+    # Symmetric sides differ by rounding only: then the first, so that answers repeat.
+    return next(bent for gap, energy, bent in sides if gap == least[0] and energy <= least[1] + margin)
 
 
-def _bow(equations: Equations, state: State, sign: float) -> Array:
-    """Rotations of a state with a slight bow of the straight members."""
+def _tent(equations: Equations) -> Array:
+    """Rotations that raise the middle of chains between held nodes: one way going out, the other coming back."""
+    model, bow = equations.model, _bow(equations)
+    far, vectors = _distances(model), np.zeros((len(equations.model.rotations.kind), 3))
+    for name in model.members:
+        chain = model.chain(name)
+        direction = np.abs(bow[chain]).max(axis=0) * np.sign(bow[chain][1])
+        vectors[chain] = np.sign(np.gradient(far[chain], model.along(name)))[:, None] * direction
+    return vectors
+
+
+def _bow(equations: Equations) -> Array:
+    """Rotation vectors of a slight bow of each straight member about its weak axis."""
     model = equations.model
     vectors = np.zeros((len(model.rotations.kind), 3))
     for name, member in model.scene.members.items():
@@ -222,4 +240,4 @@ def _bow(equations: Equations, state: State, sign: float) -> Array:
         axis = np.array([0.0, 0.0, 1.0]) if not model.space else (-frame[:, 1] if weak_2 else frame[:, 2])
         inner = model.chain(name)[1:-1]
         vectors[inner] = BOW * np.sin(2.0 * np.pi * model.along(name)[1:-1])[:, None] * axis
-    return _turned_by(equations, state, sign * vectors)
+    return vectors

@@ -179,7 +179,9 @@ def loose_rows(equations: Equations, point: Point) -> Array:
     rows = np.zeros((equations.rows, n))
     rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
     squares, left = np.linalg.eigh(rows @ rows.T)
-    return np.asarray(left[:, squares < SLACK**2 * squares[-1]])
+    # A row that no rotation changes is loose too, also where it is the only one.
+    usual = float((equations.model.beams.weight**2).sum())
+    return np.asarray(left[:, squares < SLACK**2 * max(squares[-1], usual)])
 
 
 def redundant_rows(equations: Equations, point: Point) -> list[int]:

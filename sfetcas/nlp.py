@@ -141,6 +141,9 @@ class Solver:
                 lam_g0=np.zeros(nlp.g.numel()) if lam is None else lam,
             )
             stats = function.stats()
+            if stats.get("return_status") == "NonIpopt_Exception_Thrown":
+                # The one exception that reaches IPOPT from outside is Ctrl-C.
+                raise KeyboardInterrupt
             return NLPResult(
                 status=_status(stats),
                 x=solution["x"].full().ravel(),
