@@ -35,7 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code is returned."""
     options = _parser().parse_args(arguments)
     try:
-        return int(options.command(options))
+        with np.errstate(over="raise"):
+            return int(options.command(options))
     except SceneError as error:
         print(f"sfetcas: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -126,15 +127,10 @@ def _drawing(path: Path | None) -> Callable[[Solution, Path], None] | None:
 
 def _check_writable(path: Path) -> None:
     folder = path.parent
-    if (
-        (path.exists() and not path.is_file())
-        or path.is_symlink()
-        or not folder.is_dir()
-        or not os.access(folder, os.W_OK)
-    ):
-        raise SceneError(
-            f"{path}: cannot be written; accepted: a plain file in a folder that exists and can be written"
-        )
+    plain = not path.is_symlink() and (path.is_file() or not path.exists())
+    if not plain or not folder.is_dir() or not os.access(folder, os.W_OK):
+        accepted = "a plain file in a folder that exists and can be written"
+        raise SceneError(f"{path}: cannot be written; accepted: {accepted}")
 
 
 def _write(path: Path, writer: Callable[[Path], Any]) -> None:

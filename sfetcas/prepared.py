@@ -101,8 +101,10 @@ class Prepared:
         polished = self.correct(found, loading)
         if not polished.converged and polished.residual > SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
-            detail = f"IPOPT: {result.message}, {result.iterations} iterations; Newton's method left a residual of"
-            raise SolveError(status, f"{detail} {polished.residual:.1e}", found)
+            detail = f"IPOPT: {result.message}, {result.iterations} iterations"
+            if status is Status.FAILED:
+                detail += f"; Newton's method left a residual of {polished.residual:.1e}"
+            raise SolveError(status, detail, found)
         return polished, result.iterations
 
     def leave(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:

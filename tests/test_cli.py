@@ -214,3 +214,27 @@ def test_importing_costs_no_matplotlib():
     code = "import sys, sfetcas, sfetcas.cli; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_outputs_replace_plain_files_only(scene, tmp_path, capsys):
+    path = scene()
+    before = path.read_text()
+    link = tmp_path / "link.json"
+    link.symlink_to(tmp_path / "target.json")
+    for out in (path, link):
+        assert main(["run", str(path), "--json", str(out)]) == 2
+    assert capsys.readouterr().err.count("accepted") == 2
+    assert path.read_text() == before
+    assert link.is_symlink()
+
+
+@pytest.mark.parametrize("value", ['["x", 1]', "[[0, 0], 1]", "[1, 2, 3, 4]"])
+def test_an_expectation_of_the_wrong_shape_is_exit_2(scene, capsys, value):
+    text = EXPECT.format(tolerance="1e-4").replace("[0.9435, 0.3017]", value)
+    assert main(["check", str(scene(more=text))]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_numbers_that_overflow_are_no_solution(scene, capsys):
+    assert main(["run", str(scene(("value = [0, 1]", "value = [0, 1e160]")))]) == 3
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1

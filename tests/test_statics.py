@@ -375,3 +375,53 @@ def test_checks_compare_with_the_answer():
     scene = made(table)
     with pytest.raises(sfetcas.SceneError, match="did you mean 'elastic'"):
         sfetcas.check(scene, solve(scene))
+
+
+def _strip(nodes, members, **rest):
+    section = sfetcas.CrossSection(EI3=1.0)
+    beams = {name: sfetcas.Member(nodes=pair, section="strip") for name, pair in members.items()}
+    return sfetcas.Scene(sections={"strip": section}, nodes=nodes, members=beams, **rest)
+
+
+def test_slider_across_a_straight_member_is_refused():
+    nodes = {
+        "a": sfetcas.Node(position=[0, 0], support="clamped"),
+        "b": sfetcas.Node(position=[1, 0], support="slider", direction=[0, 1]),
+    }
+    force = sfetcas.Load(type="force", node="b", value=[0, -1])
+    with pytest.raises(SolveError, match="fully stretched"):
+        solve(_strip(nodes, {"beam": ["a", "b"]}, loads={"f": force}))
+
+
+@pytest.mark.parametrize("force", [1.0, -1.0, 5.0])
+def test_a_chain_pushed_together_buckles_to_the_side_of_its_load(force):
+    nodes = {
+        "a": sfetcas.Node(position=[0, 0], support="hinge"),
+        "c": sfetcas.Node(position=[1, 0]),
+        "b": sfetcas.Node(position=[2, 0], support="hinge"),
+    }
+    load = sfetcas.Load(type="force", node="c", value=[0, force])
+    push = sfetcas.Motion(node="b", displacement=[-0.4, 0])
+    scene = _strip(nodes, {"first": ["a", "c"], "second": ["c", "b"]}, loads={"f": load}, motions={"m": push})
+    step = solve(scene).last
+    assert step.certificate.stable is True
+    # Half a metre of deflection at 20 % of shortening: anything near the axis or below it is the other side.
+    assert np.sign(force) * step.position("c")[1] > 0.4
+
+
+def test_a_stiff_tip_turns_with_the_soft_root_it_stands_on():
+    nodes = {
+        "a": sfetcas.Node(position=[0, 0], support="clamped"),
+        "b": sfetcas.Node(position=[1, 0]),
+        "c": sfetcas.Node(position=[2, 0]),
+    }
+    load = sfetcas.Load(type="force", node="c", value=[0, -1])
+    scene = _strip(nodes, {"root": ["a", "b"], "tip": ["b", "c"]}, loads={"f": load})
+    angles = []
+    for stiffness in (1e6, 1e10):
+        stiff = {**scene.members, "tip": sfetcas.Member(nodes=["b", "c"], section="stiff")}
+        sections = {**scene.sections, "stiff": sfetcas.CrossSection(EI3=stiffness)}
+        angles.append(solve(scene.replace(members=stiff, sections=sections), accuracy=1e-8).last.angle("b"))
+    # The tip bends by about F L^2 / (2 EI) = 5e-7 rad in the softer case.
+    assert angles[0] == pytest.approx(angles[1], abs=1e-6)
+    assert angles[0] < -0.5
