@@ -250,13 +250,25 @@ class _Run:
         steps: list[Equilibrium] = []
         last: tuple[float, _Found] | None = None
         for factor in self.scene.analysis.steps:
-            found = self._on_pilot(pilot, factor, last)
-            last = (factor, found)
+            found = self._found(pilot, factor, last)
+            last = (factor, found) if found.prepared is pilot else None
             steps.append(self._refined(found, factor))
         self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
         reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
         status = Status.SOLVED if reached or not self.asked else Status.SHORT
         return Solution(self.scene, status, tuple(steps), self.seconds)
+
+    def _found(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found:
+        """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
+        try:
+            return self._on_pilot(pilot, factor, last)
+        except SolveError as error:
+            if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed:
+                raise
+            try:
+                return self._on_pilot(self._prepared(pilot.model.mesh.refined().refined()), factor, None)
+            except SolveError:
+                raise error from None
 
     def _on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found:
         loading = pilot.model.loading(factor)
@@ -368,7 +380,9 @@ class _Run:
     def _refined(self, pilot: _Found, factor: float) -> Equilibrium:
         if self.fixed == set(self.scene.members):
             return self._on_target(pilot, factor)
-        now = pilot if self.pilot_mesh is self.target else self._onto(self.target, pilot, factor)
+        mesh = pilot.prepared.model.mesh
+        there = mesh is self.target or (mesh is not self.pilot_mesh and mesh.order == self.target.order)
+        now = pilot if there else self._onto(self.target, pilot, factor)
         smooth = np.sqrt(self.accuracy)
         loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
