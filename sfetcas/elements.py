@@ -102,11 +102,6 @@ class Element:
         """Integrals from 0 to each integration point of what is given at them, shape (p + 1, p + 1)."""
         return interpolation.integration(self.points, self.points)
 
-    @functools.cached_property
-    def to_nodes(self) -> Array:
-        """Integrals from 0 to each node of what is given at the integration points, shape (p + 1, p + 1)."""
-        return interpolation.integration(self.points, self.nodes)
-
     def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         n = self.order + 1
         return (

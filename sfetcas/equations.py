@@ -82,7 +82,6 @@ class Equations:
         self._kernel = Batch(chosen(element.turning, calls, kernels), n)
         self._kernel.set(1, model.beams.stiffness)
         self._kernel.set(2, model.beams.tangent)
-        self._longest = float(model.beams.weight.sum(axis=1).max())
         self._first = np.array([model.beams.first[name] for name in model.members])
         self._rest = np.add.reduceat(model.beams.tangent.sum(axis=1), self._first, axis=0)
         self._z = positions.Z.reshape(len(positions.rows), len(model.members), element.axes)

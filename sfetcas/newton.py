@@ -10,7 +10,16 @@ from .arrays import Array
 from .equations import Equations, Point, State
 from .loading import Loading
 
-__all__ = ["TURN", "Corrected", "correct", "descend", "loose_rows", "redundant_rows", "relative_residual"]
+__all__ = [
+    "TURN",
+    "Corrected",
+    "correct",
+    "descend",
+    "loose_rows",
+    "redundant_rows",
+    "relative_residual",
+    "rows_in",
+]
 
 PROXIMAL = 1e-10
 """Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
@@ -186,7 +195,11 @@ def loose_rows(equations: Equations, point: Point) -> Array:
 
 def redundant_rows(equations: Equations, point: Point) -> list[int]:
     """Rows that depend on others to first order at this state; empty where the multipliers are unique."""
-    loose = loose_rows(equations, point)
+    return rows_in(loose_rows(equations, point))
+
+
+def rows_in(loose: Array) -> list[int]:
+    """The rows that take part in combinations, columns of :func:`loose_rows`."""
     return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist() if loose.size else []
 
 

@@ -25,7 +25,7 @@ from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import assemble
-from .newton import Corrected, loose_rows, redundant_rows, relative_residual
+from .newton import Corrected, loose_rows, redundant_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
 from .solution import Equilibrium, Solution, equilibrium
@@ -463,11 +463,10 @@ def _with_unique_reactions(found: _Found, loading: Loading) -> _Found:
         Members stretched between held points: no finite reaction holds an inextensible member straight.
     """
     equations, corrected = found.prepared.equations, found.corrected
-    rows = redundant_rows(equations, corrected.point)
-    if not rows:
-        return found
-    names = ", ".join(equations.row_names[row] for row in rows)
     loose = loose_rows(equations, corrected.point)
+    if not loose.size:
+        return found
+    names = ", ".join(equations.row_names[row] for row in rows_in(loose))
     lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
     state = replace(corrected.state, lam=lam)
     point = equations.at(state, loading)
