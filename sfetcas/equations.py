@@ -11,6 +11,7 @@ constraints; polish, certificate and continuation stand on it.
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,10 +20,11 @@ from . import interpolation, quaternion
 from .arrays import Array, Index
 from .joints import hinge
 from .kernels import Batch, Kernels, chosen
-from .linear import SparseSolver
+from .linear import SparseMap, SparseSolver
 from .loading import Loading
 from .model import Model
 from .rotations import Turn
+from .segments import Segment
 
 __all__ = ["Equations", "Point", "State"]
 
@@ -82,9 +84,8 @@ class Equations:
         self._kernel = Batch(chosen(element.turning, calls, kernels), n)
         self._kernel.set(1, model.beams.stiffness)
         self._kernel.set(2, model.beams.tangent)
-        self._first = np.array([model.beams.first[name] for name in model.members])
+        self._owner, self._first = model.segments.owner, model.segments.first
         self._rest = np.add.reduceat(model.beams.tangent.sum(axis=1), self._first, axis=0)
-        self._z = positions.Z.reshape(len(positions.rows), len(model.members), element.axes)
         self._pattern()
         if len(model.rotations.hinges):
             self._hinge = Batch(hinge(), len(model.rotations.hinges))
@@ -150,22 +151,19 @@ class Equations:
         add(np.broadcast_to(local[:, None, :], shape), np.broadcast_to(local[:, :, None], shape))
         first_row = self.unknowns
         self._touch: list[tuple[slice, Array]] = []
-        for m, name in enumerate(model.members):
-            touched = np.flatnonzero(np.abs(self._z[:, m]).sum(axis=1))
+        for part, touched, z in _touched(model.positions.Z, model.segments.parts, model.element.axes):
             if len(touched):
-                elements = model.elements_of(name)
-                self._touch.append((elements, self._z[touched, m]))
-                cells = local[elements]
+                self._touch.append((part.elements, z))
+                cells = local[part.elements]
                 size = (len(cells), len(touched), cells.shape[1])
                 r = np.broadcast_to((first_row + touched)[None, :, None], size)
                 c = np.broadcast_to(cells[:, None, :], size)
                 r = np.where(c < 0, -1, r)
                 add(r, c)
                 add(c, r)
-        r, c = np.nonzero(model.positions.W)
-        add(first_row + r, self.turning_unknowns + c)
-        add(self.turning_unknowns + c, first_row + r)
-        self._w_entries = model.positions.W[r, c]
+        w = model.positions.W
+        add(first_row + w.row, self.turning_unknowns + w.column)
+        add(self.turning_unknowns + w.column, first_row + w.row)
         if len(model.rotations.hinges):
             cells = self.number[model.rotations.hinges].reshape(len(model.rotations.hinges), -1)
             size = (len(cells), 6, 6)
@@ -202,14 +200,14 @@ class Equations:
         q = np.where((self.model.rotations.kind == Turn.HELD)[:, None], self.model.held(loading), state.q)
         return replace(state, q=q)
 
-    def member_pulls(self, lam: Array, loading: Loading) -> Array:
-        """Minus the constant part of the internal force of each member, (members, axes)."""
+    def segment_pulls(self, lam: Array, loading: Loading) -> Array:
+        """Minus the constant part of the internal force of each segment, (segments, axes)."""
         positions = self.model.positions
         force = positions.Z.T @ lam[: len(positions.rows)] - positions.E.T @ loading.force.ravel()
         return np.asarray(force.reshape(self._rest.shape))
 
     def displacements(self, state: State, loading: Loading, reach: Array) -> tuple[Array, Array]:
-        """Displacements of the nodes (nodes * axes,) and closing gaps, from the reaches of the elements."""
+        """Displacements of the places (places * axes,) and closing gaps, from the reaches of the elements."""
         positions = self.model.positions
         delta = (np.add.reduceat(reach, self._first, axis=0) - self._rest).ravel()
         nodal = positions.E @ delta + positions.Y @ state.y + positions.B @ loading.shift
@@ -219,7 +217,7 @@ class Equations:
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
         """The equations at a state; with ``convex`` the element matrices made positive."""
         model, positions = self.model, self.model.positions
-        constant = self.member_pulls(state.lam, loading)[model.beams.owner]
+        constant = self.segment_pulls(state.lam, loading)[self._owner]
         self._kernel.set(0, state.q[model.rotations.turns])
         pull = loading.pull + constant[:, None, :]
         self._kernel.set(3, pull)
@@ -248,10 +246,11 @@ class Equations:
         if self.displacement_unknowns:
             displacement = slice(self.turning_unknowns, self.unknowns)
             residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
-            scale[displacement] = np.abs(positions.W.T) @ np.abs(lam) + np.abs(positions.Y.T) @ np.abs(force) + 1e-12
+            sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
+            scale[displacement] = sums + 1e-12
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
-        parts = [stiffness.ravel(), *self._closing_parts(spin), self._w_entries, self._w_entries]
+        parts = [stiffness.ravel(), *self._closing_parts(spin), positions.W.value, positions.W.value]
         if len(model.rotations.hinges):
             parts += self._hinge_parts(state, residual)
         values = np.concatenate([*parts, self._zeros])[self._valid]
@@ -262,7 +261,7 @@ class Equations:
         """Moment (3,) about the fixed axes that the surroundings exert on the first end of each member."""
         model = self.model
         self._kernel.set(0, state.q[model.rotations.turns])
-        constant = self.member_pulls(state.lam, loading)[model.beams.owner]
+        constant = self.segment_pulls(state.lam, loading)[self._owner]
         self._kernel.set(3, loading.pull + constant[:, None, :])
         moments = self._kernel()[2]
         turns = model.element.turns
@@ -278,12 +277,12 @@ class Equations:
         self._kernel.set(3, loading.pull)
         _, _, moments, stiffness, reach, spin = self._kernel()
         spin = self._local_parts(moments, stiffness, spin)[2]
-        maps = positions.E[chosen].reshape(len(chosen), len(model.members), -1)[:, model.beams.owner]
+        maps = positions.E.rows(chosen).full().reshape(len(chosen), len(self._first), -1)[:, self._owner]
         values = np.einsum("rea,eca->rec", maps, spin).reshape(len(chosen), -1)
         jacobian = np.zeros((len(chosen), self.unknowns))
         used = self._local.ravel() >= 0
         np.add.at(jacobian.T, self._local.ravel()[used], values.T[used])
-        jacobian[:, self.turning_unknowns :] = positions.Y[chosen]
+        jacobian[:, self.turning_unknowns :] = positions.Y.rows(chosen).full()
         return self.displacements(state, loading, reach)[0][chosen], jacobian
 
     def elastic_entries(self) -> Array:
@@ -376,6 +375,19 @@ def _positive_part(matrices: Array) -> Array:
     if (values >= 0.0).all():
         return matrices
     return np.asarray(np.einsum("nij,nj,nkj->nik", vectors, np.abs(values), vectors))
+
+
+def _touched(z: SparseMap, parts: Sequence[Segment], axes: int) -> Iterator[tuple[Segment, Index, Array]]:
+    """Of each segment the closing rows that it takes part in and their entries, (rows, axes)."""
+    owner = z.column // axes
+    order = np.argsort(owner, kind="stable")
+    bounds = np.searchsorted(owner[order], np.arange(len(parts) + 1))
+    for part, begin, end in zip(parts, bounds, bounds[1:], strict=False):
+        here = order[begin:end]
+        touched, row = np.unique(z.row[here], return_inverse=True)
+        values = np.zeros((len(touched), axes))
+        values[row, z.column[here] % axes] = z.value[here]
+        yield part, touched, values
 
 
 def _basis(axis: Array) -> Array:

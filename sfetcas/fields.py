@@ -31,8 +31,8 @@ class Fields:
         self.turned = _turned_tangents(equations, state)
         reach = self.turned.sum(axis=1)
         nodal, _ = equations.displacements(state, loading, reach)
-        self._nodal = nodal.reshape(len(model.nodes), -1)
-        self._pull = loading.pull + equations.member_pulls(state.lam, loading)[model.beams.owner][:, None, :]
+        self._nodal = nodal.reshape(len(model.segments.places), -1)
+        self._pull = loading.pull + equations.segment_pulls(state.lam, loading)[model.segments.owner][:, None, :]
         self._start_moments = equations.end_moments(state, loading)
 
     # -- nodes ----------------------------------------------------------------------------------
@@ -66,13 +66,8 @@ class Fields:
         return force * model.scales.force, moment * model.scales.moment
 
     def _outer_force(self, node: str) -> Array:
-        """Load on the node itself; the resultants of loads along members were put to their first nodes."""
-        model = self.model
-        force = self._loading.force[model.nodes.index(node)].copy()
-        for name, member in model.scene.members.items():
-            if member.nodes[0] == node:
-                force -= self._spread_after(name)[0] + self._points_after(name)[0]
-        return force
+        """Load on the node itself, not that of the members which begin there."""
+        return self._loading.own[self.model.segments.place(node)]
 
     # -- members --------------------------------------------------------------------------------
 
@@ -97,8 +92,7 @@ class Fields:
         start, moments = self._element_starts(member)
         line = model.scene.center_lines[member]
         position = line.positions(x) + _three(start[e] + here) * model.scales.length
-        beyond = self._spread_after(member)[e] - np.einsum("nk,nka->na", to_x, spread[e])
-        force = _three(beyond + self._points_after(member)[e + 1] - self._constant(member))
+        force = _three(self._start_forces(member)[e] - np.einsum("nk,nka->na", to_x, spread[e]))
         # m' = -r' x n; the pull at the points is minus the force there.
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
@@ -125,23 +119,13 @@ class Fields:
             rotation = quaternion.from_rotation_vector(vectors)
         return quaternion.matrix(quaternion.multiply(rotation, line.quaternions(x)))
 
-    def _constant(self, member: str) -> Array:
-        number = self.model.members.index(member)
-        return self._equations.member_pulls(self._state.lam, self._loading)[number]
-
-    def _spread_after(self, member: str) -> Array:
-        """Distributed load from the start of each element on, then zero, (elements + 1, axes)."""
-        total = self._loading.spread[self.model.elements_of(member)].sum(axis=1)
-        return np.concatenate([np.cumsum(total[::-1], axis=0)[::-1], np.zeros((1, total.shape[1]))])
-
-    def _points_after(self, member: str) -> Array:
-        """Point loads beyond each cut of a member; entry e + 1 holds on element e, (elements + 1, axes)."""
-        model, element = self.model, self.model.element
-        part = model.elements_of(member)
-        spread, after = self._loading.spread[part], self._spread_after(member)
-        inside = np.einsum("jk,eja->eka", element.to_points, spread) / element.weights[:, None]
-        on_element = -(self._loading.pull[part] + inside)[:, 0] - after[1:]
-        return np.concatenate([on_element[:1], on_element])
+    def _start_forces(self, member: str) -> Array:
+        """Internal force at the start of each element of a member, (elements, axes)."""
+        part, element = self.model.elements_of(member), self.model.element
+        spread = self._loading.spread[part]
+        # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
+        beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
+        return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)
 
     @functools.cache  # noqa: B019 - lives as long as the fields
     def _element_starts(self, member: str) -> tuple[Array, Array]:
@@ -149,7 +133,7 @@ class Fields:
         model = self.model
         part = model.elements_of(member)
         turned = self.turned[part]
-        first = self._nodal[model.nodes.index(model.scene.members[member].nodes[0])]
+        first = self._nodal[model.segments.place(model.segments.ends[member, 0])]
         steps = (turned - model.beams.tangent[part]).sum(axis=1)
         starts = first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
         gains = _cross(turned, self._pull[part]).sum(axis=1)

@@ -14,10 +14,64 @@ import numpy as np
 from .arrays import Array
 from .kernels import Batch
 
-__all__ = ["SparseSolver"]
+__all__ = ["SparseMap", "SparseSolver"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
+
+
+class SparseMap:
+    """A constant matrix by its entries that are not zero; products with vectors by ``@``.
+
+    Attributes
+    ----------
+    row, column, value : ndarray
+        The entries, each place once, sorted by rows.
+    shape : (int, int)
+    """
+
+    def __init__(self, row: Array, column: Array, value: Array, shape: tuple[int, int]) -> None:
+        self.shape = shape
+        places, inverse = np.unique(np.asarray(row, dtype=np.int64) * shape[1] + column, return_inverse=True)
+        summed = np.bincount(inverse.ravel(), weights=value, minlength=len(places))
+        keep = summed != 0.0
+        self.row, self.column = (part.astype(np.intp) for part in np.divmod(places[keep], max(shape[1], 1)))
+        self.value = summed[keep]
+        # Small matrices are faster in full.
+        self._full = self.full() if shape[0] * shape[1] <= FULL else None
+
+    @functools.cached_property
+    def T(self) -> SparseMap:
+        """The transpose."""
+        return SparseMap(self.column, self.row, self.value, (self.shape[1], self.shape[0]))
+
+    @functools.cached_property
+    def absolute(self) -> SparseMap:
+        """The matrix of the absolute values."""
+        return SparseMap(self.row, self.column, np.abs(self.value), self.shape)
+
+    def __matmul__(self, vector: Array) -> Array:
+        if self._full is not None:
+            return np.asarray(self._full @ vector)
+        return np.bincount(self.row, weights=self.value * vector[self.column], minlength=self.shape[0])
+
+    def full(self) -> Array:
+        """The matrix with its zeros."""
+        matrix = np.zeros(self.shape)
+        matrix[self.row, self.column] = self.value
+        return matrix
+
+    def rows(self, chosen: Array) -> SparseMap:
+        """The chosen rows, in their order."""
+        chosen = np.asarray(chosen, dtype=np.intp)
+        begin, end = np.searchsorted(self.row, chosen), np.searchsorted(self.row, chosen, side="right")
+        taken = np.concatenate([np.zeros(0, np.intp), *(np.arange(a, b) for a, b in zip(begin, end, strict=True))])
+        new = np.repeat(np.arange(len(chosen)), end - begin)
+        return SparseMap(new, self.column[taken], self.value[taken], (len(chosen), self.shape[1]))
+
+
+FULL = 20_000
+"""Up to this many places the product with the full matrix is faster (measured)."""
 
 
 class SparseSolver:

@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array, Index
+from .arrays import Array
 from .elements import Element
 from .errors import SceneError
 from .mesh import Mesh
 from .rotations import Rotations
 from .scene import Load, Motion, Scene
 from .sections import evaluate
+from .segments import Segments
 
 __all__ = ["Beams", "Loading", "Scales", "unit_loadings"]
 
@@ -48,8 +49,6 @@ class Beams:
         Tangent of the unloaded centre line times weight times length.
     weight : ndarray (elements, points)
         Weight times length.
-    owner : ndarray (elements,)
-        Number of the member that an element belongs to.
     first : dict
         Number of the first element of a member.
     """
@@ -57,7 +56,6 @@ class Beams:
     stiffness: Array
     tangent: Array
     weight: Array
-    owner: Index
     first: dict[str, int]
 
 
@@ -67,21 +65,24 @@ class Loading:
 
     Attributes
     ----------
-    force : ndarray (nodes, axes)
-        Dead forces on macro-nodes, the resultants of the loads along members put to their first nodes.
+    force : ndarray (places, axes)
+        Dead forces on places, and the resultants of the loads along segments, put to their first places.
+    own : ndarray (places, axes)
+        The share of ``force`` that acts on the places themselves.
     couple : ndarray (rotations,)
         Moments about z on rotations; plane only.
     pull : ndarray (elements, points, axes)
         Minus the internal force at the integration points that the loads along the member cause.
     spread : ndarray (elements, points, axes)
         Distributed force times weight times length; what ``pull`` was made of, for section forces.
-    shift : ndarray (nodes * axes,)
-        Prescribed displacements, zero for nodes that are free.
+    shift : ndarray (places * axes,)
+        Prescribed displacements, zero for places that are free.
     turn : ndarray (rotations, 3)
         Prescribed rotation vectors of held rotations.
     """
 
     force: Array
+    own: Array
     couple: Array
     pull: Array
     spread: Array
@@ -94,7 +95,7 @@ class Loading:
 
     def unloaded(self) -> Loading:
         """The motions alone."""
-        zero = {name: np.zeros_like(getattr(self, name)) for name in ("force", "couple", "pull", "spread")}
+        zero = {name: np.zeros_like(getattr(self, name)) for name in ("force", "own", "couple", "pull", "spread")}
         return replace(self, **zero)
 
     def plus(self, other: Loading) -> Loading:
@@ -102,7 +103,7 @@ class Loading:
         return Loading(*(getattr(self, name) + getattr(other, name) for name in PARTS))
 
 
-PARTS = ("force", "couple", "pull", "spread", "shift", "turn")
+PARTS = ("force", "own", "couple", "pull", "spread", "shift", "turn")
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,19 +114,21 @@ class _Writer:
     mesh: Mesh
     element: Element
     scales: Scales
+    segments: Segments
     rotations: Rotations
     beams: Beams
 
     def empty(self) -> Loading:
         """No load and no motion."""
-        nodes, turns = len(self.scene.nodes), len(self.rotations.kind)
+        places, turns = len(self.segments.places), len(self.rotations.kind)
         along = (*self.beams.weight.shape, self.element.axes)
         return Loading(
-            force=np.zeros((nodes, self.element.axes)),
+            force=np.zeros((places, self.element.axes)),
+            own=np.zeros((places, self.element.axes)),
             couple=np.zeros(turns),
             pull=np.zeros(along),
             spread=np.zeros(along),
-            shift=np.zeros(nodes * self.element.axes),
+            shift=np.zeros(places * self.element.axes),
             turn=np.zeros((turns, 3)),
         )
 
@@ -145,9 +148,15 @@ class _Writer:
     def vector(self, vector: Any) -> Array:
         return np.asarray(vector, dtype=float)[: self.element.axes]
 
-    def start_of(self, member: str) -> int:
-        """Number of the first node of a member."""
-        return list(self.scene.nodes).index(self.scene.members[member].nodes[0])
+    def segments_of(self, member: str) -> list[tuple[int, slice]]:
+        """Number of the first place and elements of each segment of a member."""
+        parts = (part for part in self.segments.parts if part.member == member)
+        return [(self.segments.place(part.start), part.elements) for part in parts]
+
+    def push(self, group: Loading, place: int, force: Array) -> None:
+        """Add a force on a place itself, N."""
+        group.force[place] += force / self.scales.force
+        group.own[place] += force / self.scales.force
 
     # -- loads ----------------------------------------------------------------------------------
 
@@ -155,8 +164,7 @@ class _Writer:
         if load.type == "moment":
             self._add_moment(group, name, load)
         elif load.node is not None:
-            number = list(self.scene.nodes).index(load.node)
-            group.force[number] += self.vector(load.vector) / self.scales.force
+            self.push(group, self.segments.place(load.node), self.vector(load.vector))
         elif load.type == "force":
             self._add_point_force(group, load)
         else:
@@ -179,9 +187,13 @@ class _Writer:
     def _add_point_force(self, group: Loading, load: Load) -> None:
         member = str(load.member)
         value = self.vector(load.vector) / self.scales.force
-        start = self.beams.first[member]
-        group.pull[start : start + self.cut(load)] -= value
-        group.force[self.start_of(member)] += value
+        cut = self.beams.first[member] + self.cut(load)
+        for place, part in self.segments_of(member):
+            if part.start <= cut < part.stop:
+                group.pull[part.start : cut] -= value
+                group.force[place] += value
+                return
+        self.push(group, self.segments.place(self.segments.ends[member, 1]), self.vector(load.vector))
 
     def add_weight(self, group: Loading, member: str) -> None:
         x = self.places(member)
@@ -197,16 +209,18 @@ class _Writer:
         part = self.elements_of(member)
         forces = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
         on_element = forces.sum(axis=1)
-        beyond = np.cumsum(on_element[::-1], axis=0)[::-1] - on_element
         inside = np.einsum("jk,eja->eka", self.element.to_points, forces) / self.element.weights[:, None]
         group.spread[part] += forces
-        group.pull[part] -= beyond[:, None, :] + inside
-        group.force[self.start_of(member)] += on_element.sum(axis=0)
+        for place, segment in self.segments_of(member):
+            here = slice(segment.start - part.start, segment.stop - part.start)
+            beyond = np.cumsum(on_element[here][::-1], axis=0)[::-1] - on_element[here]
+            group.pull[segment] -= beyond[:, None, :] + inside[here]
+            group.force[place] += on_element[here].sum(axis=0)
 
     # -- motions --------------------------------------------------------------------------------
 
     def add_motion(self, group: Loading, motion: Motion) -> None:
-        number, axes = list(self.scene.nodes).index(motion.node), self.element.axes
+        number, axes = self.segments.place(motion.node), self.element.axes
         if motion.displacement is not None:
             shift = self.vector(motion.displacement) / self.scales.length
             group.shift[number * axes : (number + 1) * axes] += shift
@@ -224,7 +238,13 @@ class _Writer:
 
 
 def unit_loadings(
-    scene: Scene, mesh: Mesh, element: Element, scales: Scales, rotations: Rotations, beams: Beams
+    scene: Scene,
+    mesh: Mesh,
+    element: Element,
+    scales: Scales,
+    segments: Segments,
+    rotations: Rotations,
+    beams: Beams,
 ) -> dict[str | None, Loading]:
     """Loadings of factor 1, by the history that multiplies them; None is the load factor itself.
 
@@ -233,7 +253,7 @@ def unit_loadings(
     SceneError
         A moment on a node that nothing turns with.
     """
-    writer = _Writer(scene, mesh, element, scales, rotations, beams)
+    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams)
     groups: dict[str | None, Loading] = {None: writer.empty()}
     for name, load in scene.loads.items():
         writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)

@@ -22,6 +22,7 @@ from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
 from .rotations import Rotations, Turn, number_rotations
 from .scene import Scene
+from .segments import Segments, cut_members
 
 __all__ = ["Block", "Model", "assemble"]
 
@@ -45,6 +46,8 @@ class Model:
         What it was made of.
     beams : Beams
         Stiffness, tangents and weights of the elements.
+    segments : Segments
+        Members cut between places.
     rotations : Rotations
         Numbers and freedoms of the rotations.
     positions : Positions
@@ -59,6 +62,7 @@ class Model:
     scales: Scales
     assembly: str
     beams: Beams
+    segments: Segments
     rotations: Rotations
     positions: Positions
     groups: Mapping[str | None, Loading]
@@ -71,7 +75,7 @@ class Model:
     @property
     def unknowns(self) -> int:
         """Unknowns of the minimisation: components of rotations, displacements kept; without multipliers."""
-        return int(self.widths.sum()) + self.positions.Y.shape[1]
+        return int(self.widths.sum()) + len(self.positions.unknowns)
 
     @property
     def dimension(self) -> str:
@@ -96,12 +100,12 @@ class Model:
 
     @functools.cached_property
     def members(self) -> tuple[str, ...]:
-        """Names of the members, in the order of ``beams.owner``."""
-        return tuple(self.scene.members)
+        """Names of the members that are made of elements, in the order of these."""
+        return tuple(self.beams.first)
 
     @functools.cached_property
     def nodes(self) -> tuple[str, ...]:
-        """Names of the nodes, in the order of the displacements."""
+        """Names of the nodes: the first places, in the order of the displacements."""
         return tuple(self.scene.nodes)
 
     def elements_of(self, member: str) -> slice:
@@ -163,10 +167,11 @@ def assemble(
     """
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
     scales, rotations = _scales(scene), number_rotations(scene, mesh, element)
-    beams = _beams(scene, mesh, element, scales)
-    both = {name: place_nodes(scene, element.axes, name == "closing") for name in ("closing", "nodal")}
+    beams, segments = _beams(scene, mesh, element, scales), cut_members(scene, mesh)
+    both = {name: place_nodes(scene, segments, element.axes, name == "closing") for name in ("closing", "nodal")}
     if assembly == "auto":
-        assembly = "closing" if entries(both["closing"], mesh) <= entries(both["nodal"], mesh) else "nodal"
+        closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
+        assembly = "closing" if closing <= nodal else "nodal"
     return Model(
         scene=scene,
         mesh=mesh,
@@ -174,9 +179,10 @@ def assemble(
         scales=scales,
         assembly=assembly,
         beams=beams,
+        segments=segments,
         rotations=rotations,
         positions=both[assembly],
-        groups=unit_loadings(scene, mesh, element, scales, rotations, beams),
+        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams),
     )
 
 
@@ -189,9 +195,8 @@ def _scales(scene: Scene) -> Scales:
 
 def _beams(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
     stiffness, tangent, weight = [], [], []
-    owner: list[Index] = []
     first: dict[str, int] = {}
-    for number, (name, member) in enumerate(scene.members.items()):
+    for name, member in scene.members.items():
         cuts, line = mesh.cuts[name], scene.center_lines[name]
         x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.points
         length = line.length / scales.length * np.diff(cuts)
@@ -203,11 +208,8 @@ def _beams(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
         stiffness.append(_in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
         tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
         weight.append(w)
-        first[name] = sum(len(part) for part in owner)
-        owner.append(np.full(len(w), number))
-    return Beams(
-        np.concatenate(stiffness), np.concatenate(tangent), np.concatenate(weight), np.concatenate(owner), first
-    )
+        first[name] = sum(len(part) for part in weight[:-1])
+    return Beams(np.concatenate(stiffness), np.concatenate(tangent), np.concatenate(weight), first)
 
 
 def _in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:

@@ -1,25 +1,29 @@
-"""Displacements of nodes and closing equations as linear maps of what the members reach.
+"""Displacements of places and closing equations as linear maps of what the segments of members reach.
 
-Two assemblies.  *closing*: the displacement of a node is the sum of the reaches of the members on a path from
+Two assemblies.  *closing*: the displacement of a place is the sum of the reaches of the segments on a way from
 the ground, and what is left are closing equations, one for each loop and each further held direction.  *nodal*:
-displacements of free nodes are unknowns and each member has its closing equation.  Both are the same linear
-maps with other entries: with ``Delta`` the reaches of the members less those of the undeformed scene, ``y`` the
+displacements of free places are unknowns and each segment has its closing equation.  Both are the same linear
+maps with other entries: with ``Delta`` the reaches of the segments less those of the undeformed scene, ``y`` the
 displacements kept as unknowns and ``b`` the prescribed ones,
 
     u = E Delta + Y y + B b,      0 = Z Delta + W y + B_Z b.
+
+A place that is *kept* has its displacement among ``y``, component by component, in either assembly.
 
 Source: Barraco and Munteanu, Part 1, section 1 (the two ways of assembling).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Index
+from .linear import SparseMap
 from .mesh import Mesh
 from .scene import Scene
+from .segments import Segments
 from .supports import drives
 
 __all__ = ["Positions", "entries", "normals", "place_nodes"]
@@ -31,22 +35,25 @@ class Positions:
 
     Attributes
     ----------
-    E, Y, B : ndarray (nodes * axes, members * axes | unknowns | nodes * axes)
-        Displacements of the nodes.
-    Z, W, BZ : ndarray (rows, members * axes | unknowns | nodes * axes)
+    E, Y, B : SparseMap (places * axes, segments * axes | unknowns | places * axes)
+        Displacements of the places.
+    Z, W, BZ : SparseMap (rows, segments * axes | unknowns | places * axes)
         Closing equations.
     rows, unknowns : tuple of str
         Names.
+    kept : ndarray (places, axes)
+        Unknown that a component of a kept place is, -1 where it is prescribed or the place is not kept.
     """
 
-    E: Array
-    Y: Array
-    B: Array
-    Z: Array
-    W: Array
-    BZ: Array
+    E: SparseMap
+    Y: SparseMap
+    B: SparseMap
+    Z: SparseMap
+    W: SparseMap
+    BZ: SparseMap
     rows: tuple[str, ...]
     unknowns: tuple[str, ...]
+    kept: Index
 
 
 def normals(direction: Array, axes: int) -> Array:
@@ -63,122 +70,158 @@ def _slides(scene: Scene, name: str) -> bool:
     return node.support == "slider" and not any(drives(node, displacement) for displacement in moved)
 
 
+Source = tuple[str, int]
+"""What a displacement depends on: the reach (E), unknowns (Y) or prescribed displacement (B) of a number."""
+
+
 @dataclass
 class _Place:
-    """The displacement of a node as a linear expression in reaches, unknowns and prescribed displacements."""
+    """A displacement as a sum of matrices times sources: (axes, axes), or (axes, 1) for a single unknown."""
 
-    E: Array
-    Y: Array
-    B: Array
+    terms: dict[Source, Array] = field(default_factory=dict)
 
-    def combined(self, other: _Place, matrix: Array, sign: float = 1.0) -> _Place:
-        return _Place(
-            self.E + sign * matrix @ other.E, self.Y + sign * matrix @ other.Y, self.B + sign * matrix @ other.B
-        )
+    def plus(self, other: _Place, sign: float = 1.0) -> _Place:
+        terms = dict(self.terms)
+        for source, matrix in other.terms.items():
+            terms[source] = terms[source] + sign * matrix if source in terms else sign * matrix
+        return _Place({source: matrix for source, matrix in terms.items() if matrix.any()})
+
+    def times(self, matrix: Array) -> _Place:
+        return _Place({source: matrix @ term for source, term in self.terms.items()})
 
 
-def place_nodes(scene: Scene, axes: int, closing: bool) -> Positions:
-    """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly."""
-    nodes, members = list(scene.nodes), list(scene.members)
-    free = [n for n in nodes if scene.nodes[n].support == "free"]
-    sliding = [n for n in nodes if _slides(scene, n)]
-    labels: list[str] = []
-    eye = np.eye(axes)
-    size_e, size_b = len(members) * axes, len(nodes) * axes
-    size_y = len(free) * axes + len(sliding)
+class _Placing:
+    """The places while they are found one after the other."""
 
-    def guide(name: str) -> Array:
-        d = np.asarray(scene.nodes[name].direction)[:axes]
+    def __init__(self, scene: Scene, segments: Segments, axes: int, closing: bool) -> None:
+        self.scene, self.segments, self.axes = scene, segments, axes
+        self.eye = np.eye(axes)
+        self.labels: list[str] = []
+        self.rows: list[tuple[str, _Place]] = []
+        self.places: dict[str, _Place] = {}
+        self.kept = np.full((len(segments.places), axes), -1, dtype=np.intp)
+        self.number = {name: i for i, name in enumerate(segments.places)}
+        self.free = {n for n in segments.places if n not in scene.nodes or scene.nodes[n].support == "free"}
+        self.sliding = {n for n in scene.nodes if _slides(scene, n)}
+        self._touching: dict[str, list[int]] = {n: [] for n in segments.places}
+        for i, part in enumerate(segments.parts):
+            self._touching[part.start].append(i)
+            self._touching[part.end].append(i)
+        self._used: set[int] = set()
+        self._find(closing)
+
+    def _find(self, closing: bool) -> None:
+        loose = [n for n in self.segments.places if n in self.free or n in self.sliding]
+        for name in self.segments.places:
+            if name not in self.free and name not in self.sliding:
+                self.places[name] = self._prescribed(name)
+        for name in loose:
+            if name in self.segments.kept:
+                self._keep(name)
+            elif not closing:
+                self.places[name] = self._unknown(name)
+        self._spread(list(self.places))
+        for root in (*(n for n in loose if n in self.sliding), *(n for n in loose if n in self.free)):
+            if root not in self.places:
+                self.places[root] = self._unknown(root)
+                self._spread([root])
+        for i, part in enumerate(self.segments.parts):
+            if i not in self._used:
+                gap = self.places[part.start].plus(self._reach(i)).plus(self.places[part.end], -1.0)
+                self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye)
+
+    def _guide(self, name: str) -> Array:
+        d = np.asarray(self.scene.nodes[name].direction)[: self.axes]
         return np.asarray(d / np.linalg.norm(d))
 
-    def blank() -> _Place:
-        return _Place(np.zeros((axes, size_e)), np.zeros((axes, size_y)), np.zeros((axes, size_b)))
+    def _prescribed(self, name: str) -> _Place:
+        return _Place({("B", self.number[name]): self.eye})
 
-    def prescribed(name: str) -> _Place:
-        place = blank()
-        number = nodes.index(name)
-        place.B[:, number * axes : (number + 1) * axes] = eye
-        return place
+    def _reach(self, number: int) -> _Place:
+        return _Place({("E", number): self.eye})
 
-    def unknown(name: str) -> _Place:
-        place = prescribed(name) if name in sliding else blank()
-        width = 1 if name in sliding else axes
-        place.Y[:, len(labels) : len(labels) + width] = guide(name)[:, None] if name in sliding else eye
-        labels.extend([f"travel of {name}"] if name in sliding else [f"{name}.{c}" for c in "xyz"[:axes]])
-        return place
+    def _unknown(self, name: str) -> _Place:
+        """A free place, or a slider by its travel."""
+        first = len(self.labels)
+        if name in self.sliding:
+            self.labels.append(f"travel of {name}")
+            return self._prescribed(name).plus(_Place({("Y", first): self._guide(name)[:, None]}))
+        self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
+        return _Place({("Y", first): self.eye})
 
-    def reach(name: str) -> _Place:
-        place = blank()
-        number = members.index(name)
-        place.E[:, number * axes : (number + 1) * axes] = eye
-        return place
+    def _keep(self, name: str) -> None:
+        """A place by its components; on a guide with the equations that keep it there."""
+        first = len(self.labels)
+        self.kept[self.number[name]] = first + np.arange(self.axes)
+        self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
+        self.places[name] = _Place({("Y", first): self.eye})
+        if name in self.sliding:
+            self._across(name, self.places[name])
 
-    places = {n: prescribed(n) for n in nodes if n not in free and n not in sliding}
-    rows: list[tuple[str, _Place]] = []
-    used: set[str] = set()
-    if not closing:
-        places |= {n: unknown(n) for n in (*free, *sliding)}
-    touching: dict[str, list[str]] = {n: [] for n in nodes}
-    for m in members:
-        for n in scene.members[m].nodes:
-            touching[n].append(m)
+    def _across(self, name: str, found: _Place) -> _Place:
+        """Rows that keep a place on its guide; its displacement along it."""
+        gap = found.plus(self._prescribed(name), -1.0)
+        across = normals(self._guide(name), self.axes)
+        self._close(gap, [f"{name} across its guide"] * len(across), across)
+        along = self._guide(name)[:, None] @ self._guide(name)[None, :]
+        return self._prescribed(name).plus(gap.times(along))
 
-    def spread(front: list[str]) -> None:
-        """Place nodes member by member, breadth first, so that paths are short."""
-        while front:
-            here = front.pop(0)
-            for m in touching[here]:
-                a, b = scene.members[m].nodes
-                there = b if here == a else a
-                if m in used or there in places:
+    def _close(self, gap: _Place, names: list[str], directions: Array) -> None:
+        for name, direction in zip(names, directions, strict=True):
+            self.rows.append((name, gap.times(direction[None, :])))
+
+    def _spread(self, front: list[str]) -> None:
+        """Find places segment by segment, breadth first, so that ways are short."""
+        for here in front:
+            for i in self._touching[here]:
+                part = self.segments.parts[i]
+                there = part.end if here == part.start else part.start
+                if i in self._used or there in self.places:
                     continue
-                used.add(m)
-                found = places[here].combined(reach(m), eye, 1.0 if here == a else -1.0)
-                if there in sliding:
-                    across = normals(guide(there), axes)
-                    gap = found.combined(prescribed(there), eye, -1.0)
-                    rows.extend((f"{there} across its guide", _projected(gap, n[None, :])) for n in across)
-                    along = guide(there)[:, None] @ guide(there)[None, :]
-                    found = prescribed(there).combined(gap, along)
-                places[there] = found
+                self._used.add(i)
+                found = self.places[here].plus(self._reach(i), 1.0 if here == part.start else -1.0)
+                self.places[there] = self._across(there, found) if there in self.sliding else found
                 front.append(there)
 
-    spread(list(places))
-    while len(places) < len(nodes):
-        root = next(n for n in (*sliding, *free) if n not in places)
-        places[root] = unknown(root)
-        spread([root])
-    for m in members:
-        if m not in used:
-            a, b = scene.members[m].nodes
-            gap = places[a].combined(reach(m), eye).combined(places[b], eye, -1.0)
-            rows.extend((f"closing of {m}, {'xyz'[i]}", _projected(gap, eye[i : i + 1])) for i in range(axes))
-    count = len(labels)
+    def matrix(self, parts: list[_Place], height: int, kind: str, columns: int) -> SparseMap:
+        """The terms of one kind of all parts below each other, each of some height."""
+        row, column, value = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
+        for i, part in enumerate(parts):
+            for (source, number), matrix in part.terms.items():
+                if source == kind:
+                    first = number if kind == "Y" else number * self.axes
+                    r, c = np.nonzero(matrix)
+                    row.append(i * height + r)
+                    column.append(first + c)
+                    value.append(matrix[r, c])
+        shape = (len(parts) * height, columns)
+        return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
 
-    def stacked(parts: list[_Place], name: str, width: int) -> Array:
-        return np.vstack([np.zeros((0, width)), *[getattr(part, name)[:, :width] for part in parts]])
 
-    in_order = [places[n] for n in nodes]
-    closings = [place for _, place in rows]
+def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool) -> Positions:
+    """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly."""
+    placing = _Placing(scene, segments, axes, closing)
+    sizes = {"E": len(segments.parts) * axes, "Y": len(placing.labels), "B": len(segments.places) * axes}
+    in_order = [placing.places[n] for n in segments.places]
+    closings = [place for _, place in placing.rows]
+    up = {kind: placing.matrix(in_order, axes, kind, size) for kind, size in sizes.items()}
+    low = {kind: placing.matrix(closings, 1, kind, size) for kind, size in sizes.items()}
     return Positions(
-        E=stacked(in_order, "E", size_e),
-        Y=stacked(in_order, "Y", count),
-        B=stacked(in_order, "B", size_b),
-        Z=stacked(closings, "E", size_e),
-        W=stacked(closings, "Y", count),
-        BZ=stacked(closings, "B", size_b),
-        rows=tuple(label for label, _ in rows),
-        unknowns=tuple(labels),
+        E=up["E"],
+        Y=up["Y"],
+        B=up["B"],
+        Z=low["E"],
+        W=low["Y"],
+        BZ=low["B"],
+        rows=tuple(label for label, _ in placing.rows),
+        unknowns=tuple(placing.labels),
+        kept=placing.kept,
     )
 
 
-def _projected(place: _Place, matrix: Array) -> _Place:
-    return _Place(matrix @ place.E, matrix @ place.Y, matrix @ place.B)
-
-
-def entries(positions: Positions, mesh: Mesh) -> float:
+def entries(positions: Positions, segments: Segments, mesh: Mesh) -> float:
     """Entries of the closing rows and unknowns: what the stationarity equations grow by."""
-    counts = np.array([len(cuts) - 1 for cuts in mesh.cuts.values()])
-    width = positions.Z.shape[1] // len(counts)
-    touched = np.abs(positions.Z).reshape(len(positions.rows), len(counts), width).sum(axis=2) > 0.0
-    return float((touched @ (counts * mesh.order)).sum() + 4 * positions.Y.shape[1])
+    counts = np.array([part.elements.stop - part.elements.start for part in segments.parts])
+    axes = positions.Z.shape[1] // max(len(counts), 1)
+    touched = np.unique(positions.Z.row * len(counts) + positions.Z.column // max(axes, 1))
+    return float(counts[touched % len(counts)].sum() * mesh.order + 4 * positions.Y.shape[1]) if len(counts) else 0.0

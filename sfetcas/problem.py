@@ -20,6 +20,7 @@ from .arrays import Array
 from .equations import State
 from .joints import hinge_rows
 from .kernels import Kernels, chosen
+from .linear import SparseMap
 from .loading import Loading
 from .model import Model
 from .nlp import NLP
@@ -38,6 +39,10 @@ def _matrix(rows: Array, columns: Array, values: Array, shape: tuple[int, int]) 
     summed = np.bincount(inverse, weights=values, minlength=len(place))
     pointers = np.searchsorted(place // shape[0], np.arange(shape[1] + 1)).tolist()
     return ca.DM(ca.Sparsity(shape[0], shape[1], pointers, (place % shape[0]).tolist()), summed)
+
+
+def _dm(matrix: SparseMap) -> ca.DM:
+    return _matrix(matrix.row, matrix.column, matrix.value, matrix.shape)
 
 
 @dataclass(frozen=True)
@@ -174,17 +179,24 @@ class EquilibriumProblem:
     @functools.cached_property
     def _to_rows(self) -> ca.DM:
         """Takes the reaches of the elements to the closing rows."""
-        model, axes = self.model, self.model.element.axes
-        z = model.positions.Z.reshape(len(model.positions.rows), len(model.members), axes)[:, model.beams.owner]
-        row, element, axis = np.nonzero(z)
-        return _matrix(row, element * axes + axis, z[row, element, axis], (z.shape[0], z.shape[1] * axes))
+        return self._by_elements(self.model.positions.Z)
+
+    def _by_elements(self, z: SparseMap) -> ca.DM:
+        """A map of the reaches of segments as one of the reaches of their elements."""
+        axes, parts = self.model.element.axes, self.model.segments.parts
+        start = np.array([part.elements.start for part in parts])[z.column // axes]
+        count = np.array([part.elements.stop for part in parts])[z.column // axes] - start
+        element = np.concatenate([np.zeros(0, np.intp), *(a + np.arange(n) for a, n in zip(start, count, strict=True))])
+        column = element * axes + np.repeat(z.column % axes, count)
+        shape = (z.shape[0], len(self.model.segments.owner) * axes)
+        return _matrix(np.repeat(z.row, count), column, np.repeat(z.value, count), shape)
 
     def _closings(self) -> ca.MX:
         if not self.model.positions.rows:
             return ca.MX(0, 1)
         reach = self._map("reach")(self._q_elements, self._tangent)
         turning = self._reduction.unknowns
-        kept = ca.mtimes(ca.DM(self.model.positions.W), self.x[turning:])
+        kept = ca.mtimes(_dm(self.model.positions.W), self.x[turning:])
         return ca.mtimes(self._to_rows, ca.vec(reach)) + kept + self._offset
 
     def _norms(self) -> ca.MX:
@@ -260,21 +272,23 @@ class EquilibriumProblem:
         n, width = model.rotations.turns.shape[0], model.rotations.turns.shape[1] * model.element.components
         cells = self._cells.reshape(n, width)
         index, weight = self._reduction.index[cells], self._reduction.weight[cells]
-        z = positions.Z.reshape(len(positions.rows), len(model.members), axes)
-        most = max(1, int((z != 0.0).sum(axis=0).max()))
         # Each reach component goes to at most `most` rows: padded lists of rows and weights.
-        order = np.argsort(z == 0.0, axis=0, kind="stable")[:most]
-        value = np.take_along_axis(z, order, axis=0)
-        rows, values = order.transpose(1, 2, 0)[model.beams.owner], value.transpose(1, 2, 0)[model.beams.owner]
+        by_column = positions.Z.T
+        counts = np.bincount(by_column.row, minlength=by_column.shape[0])
+        most = max(1, int(counts.max(initial=0)))
+        rank = np.arange(len(by_column.row)) - np.repeat(np.cumsum(counts) - counts, counts)
+        order, value = (np.zeros((by_column.shape[0], most), kind) for kind in (np.intp, float))
+        order[by_column.row, rank], value[by_column.row, rank] = by_column.column, by_column.value
+        owner = model.segments.owner
+        rows, values = order.reshape(-1, axes, most)[owner], value.reshape(-1, axes, most)[owner]
         shape = (n, width, axes, most, 2)
         r = np.broadcast_to(rows[:, None, :, :, None], shape)
         c = np.broadcast_to(index[:, :, None, None, :], shape)
         w = values[:, None, :, :, None] * weight[:, :, None, None, :]
         parts = [(r, c, w, jacobian)]
-        kept_row, kept = np.nonzero(positions.W)
-        if len(kept_row):
-            values_w = positions.W[kept_row, kept]
-            parts.append((kept_row, turning + kept, values_w, ca.MX.ones(len(kept_row))))
+        w_map = positions.W
+        if len(w_map.row):
+            parts.append((w_map.row, turning + w_map.column, w_map.value, ca.MX.ones(len(w_map.row))))
         return self._scattered(parts, (len(positions.rows), self.x.numel()))
 
     def _hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
@@ -313,16 +327,20 @@ class EquilibriumProblem:
     def displacement(self, node: int) -> ca.MX:
         """Displacement of a node, dimensionless."""
         model, positions, axes = self.model, self.model.positions, self.model.element.axes
-        rows = slice(node * axes, (node + 1) * axes)
-        e = positions.E[rows].reshape(axes, len(model.members), axes)[:, model.beams.owner]
-        row, element, axis = np.nonzero(e)
-        adder = _matrix(row, element * axes + axis, e[row, element, axis], (axes, len(model.beams.owner) * axes))
+        rows = np.arange(node * axes, (node + 1) * axes)
+        e = positions.E.rows(rows)
         reach = self._map("reach")(self._q_elements, self._tangent)
-        rest = np.zeros((len(model.members), axes))
-        np.add.at(rest, model.beams.owner, model.beams.tangent.sum(axis=1))
-        constant = ca.DM(-positions.E[rows] @ rest.ravel()) + ca.mtimes(ca.DM(positions.B[rows]), self._b)
-        kept = ca.mtimes(ca.DM(positions.Y[rows]), self.x[self._reduction.unknowns :])
-        return ca.densify(ca.mtimes(adder, ca.vec(reach)) + kept + constant)
+        constant = ca.DM(-(e @ self._rest)) + ca.mtimes(_dm(positions.B.rows(rows)), self._b)
+        kept = ca.mtimes(_dm(positions.Y.rows(rows)), self.x[self._reduction.unknowns :])
+        return ca.densify(ca.mtimes(self._by_elements(e), ca.vec(reach)) + kept + constant)
+
+    @functools.cached_property
+    def _rest(self) -> Array:
+        """Reaches of the segments in the undeformed scene, (segments * axes,)."""
+        model = self.model
+        rest = np.zeros((len(model.segments.parts), model.element.axes))
+        np.add.at(rest, model.segments.owner, model.beams.tangent.sum(axis=1))
+        return rest.ravel()
 
     def rotation(self, number: int) -> ca.MX:
         """Components of a rotation."""
@@ -354,11 +372,9 @@ class EquilibriumProblem:
         """Values of the parameters for a loading."""
         model, positions = self.model, self.model.positions
         held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
-        rest = np.zeros((len(model.members), model.element.axes))
-        np.add.at(rest, model.beams.owner, model.beams.tangent.sum(axis=1))
-        offset = positions.BZ @ loading.shift - positions.Z @ rest.ravel()
-        constant = -(positions.E.T @ loading.force.ravel()).reshape(rest.shape)
-        pull = loading.pull + constant[model.beams.owner][:, None, :]
+        offset = positions.BZ @ loading.shift - positions.Z @ self._rest
+        constant = -(positions.E.T @ loading.force.ravel()).reshape(-1, model.element.axes)
+        pull = loading.pull + constant[model.segments.owner][:, None, :]
         force = np.zeros(self.x.numel())
         if not model.space:
             free = np.flatnonzero(model.widths)

@@ -206,7 +206,7 @@ RANK = 1e-10
 def _left_null_space(equations: Equations) -> Array:
     """Combinations of the rows in which no displacement appears, (rows, combinations)."""
     w = np.zeros((equations.rows, equations.displacement_unknowns))
-    w[: len(equations.model.positions.rows)] = equations.model.positions.W
+    w[: len(equations.model.positions.rows)] = equations.model.positions.W.full()
     if not w.shape[1]:
         return np.eye(equations.rows)
     left, sizes, _ = np.linalg.svd(w)

@@ -34,6 +34,7 @@ ORDER = [
     "elements",
     "joints",
     "mesh",
+    "segments",
     "positions",
     "rotations",
     "loading",
