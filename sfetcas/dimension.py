@@ -8,6 +8,7 @@ import numpy as np
 
 from .loads import Load, Motion
 from .shapes import CenterLine
+from .springs import Spring
 from .structure import Node
 
 __all__ = ["out_of_plane"]
@@ -23,6 +24,7 @@ def out_of_plane(
     lines: Mapping[str, CenterLine],
     loads: Mapping[str, Load],
     motions: Mapping[str, Motion],
+    springs: Mapping[str, Spring],
     gravity: Triple | None,
 ) -> Finding | None:
     """The place of the first thing out of x-y with what it does there; None where all lies in it."""
@@ -33,6 +35,7 @@ def out_of_plane(
         _members(lines),
         _loads(loads),
         _motions(motions),
+        _springs(springs),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -44,6 +47,8 @@ def _nodes(nodes: Mapping[str, Node]) -> Iterator[Finding]:
             point = getattr(node, key)
             if point is not None and abs(point[2]) > _ROUNDING * size:
                 yield ("nodes", name, key), "has a z component"
+        if node.axis2 is not None:
+            yield ("nodes", name, "axis2"), "makes a joint that turns about two axes"
         if node.direction is not None and _leaves(node.direction):
             yield ("nodes", name, "direction"), "has a z component"
         if _turns_out(node.axis):
@@ -77,6 +82,16 @@ def _motions(motions: Mapping[str, Motion]) -> Iterator[Finding]:
             yield ("motions", name, "displacement"), "has a z component"
         if isinstance(motion.rotation, tuple) and _turns_out(motion.rotation):
             yield ("motions", name, "rotation"), "is not about z"
+
+
+def _springs(springs: Mapping[str, Spring]) -> Iterator[Finding]:
+    for name, spring in springs.items():
+        if spring.type == "rotational" and _turns_out(spring.axis):
+            yield ("springs", name, "axis"), "is not along z"
+        for key in ("anchor", "direction"):
+            vector = getattr(spring, key)
+            if vector is not None and _leaves(vector):
+                yield ("springs", name, key), "has a z component"
 
 
 def _leaves(vector: Triple) -> bool:

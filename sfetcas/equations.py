@@ -18,13 +18,15 @@ import numpy as np
 
 from . import interpolation, quaternion
 from .arrays import Array, Index
-from .joints import hinge
+from .connections import Group
+from .joints import by_turning
 from .kernels import Batch, Kernels, chosen
 from .linear import SparseMap, SparseSolver
 from .loading import Loading
 from .model import Model
 from .rotations import Turn
 from .segments import Segment
+from .work import Work
 
 __all__ = ["Equations", "Point", "State"]
 
@@ -77,7 +79,7 @@ class Equations:
 
     def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
         self.model = model
-        element, positions = model.element, model.positions
+        element = model.element
         self._number_unknowns()
         n = len(model.rotations.turns)
         calls = 12.0 * n
@@ -86,10 +88,8 @@ class Equations:
         self._kernel.set(2, model.beams.tangent)
         self._owner, self._first = model.segments.owner, model.segments.first
         self._rest = np.add.reduceat(model.beams.tangent.sum(axis=1), self._first, axis=0)
+        self._linked = [_Linked(self, group) for group in model.connections]
         self._pattern()
-        if len(model.rotations.hinges):
-            self._hinge = Batch(hinge(), len(model.rotations.hinges))
-            self._hinge.set(1, model.rotations.hinge_axes)
         # A hundredth of the stiffness against turning a node: 1e-14 of it is what rounding of rotations leaves.
         self._noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
         self._noise[self.unknowns :] = 1.0
@@ -105,13 +105,22 @@ class Equations:
             here = count > i
             self.number[here, i] = (ends - count)[here] + i
         self.turning_unknowns = int(ends[-1]) if len(ends) else 0
-        self.displacement_unknowns = model.positions.Y.shape[1]
-        self.rows = len(model.positions.rows) + 2 * len(model.rotations.hinges)
+        self.displacement_unknowns = len(model.positions.unknowns)
+        kept = model.positions.kept
+        self.place_number = np.where(kept < 0, -1, self.turning_unknowns + kept)
+        self._kept = self.place_number[(kept >= 0).all(axis=1)]
+        self.rows = len(model.positions.rows) + sum(len(group.rows) for group in model.connections)
         self.unknowns = self.turning_unknowns + self.displacement_unknowns
         about = np.flatnonzero(model.rotations.kind == Turn.AXIS) if model.space else np.array([], dtype=np.intp)
         self._basis = {int(i): _basis(model.rotations.axis[i]) for i in about}
         self._on_axes = np.argwhere(np.isin(model.rotations.turns, about)).tolist()
         self._free = np.flatnonzero(self.number[:, 0] >= 0)
+
+    @functools.cached_property
+    def elastic_displacements(self) -> Index:
+        """Numbers of the displacement unknowns that springs, bodies and joints act upon."""
+        touched = [link.cells[link.cells >= self.turning_unknowns] for link in self._linked]
+        return np.unique(np.concatenate([np.zeros(0, np.intp), *touched]))
 
     @functools.cached_property
     def mass(self) -> Array:
@@ -122,6 +131,12 @@ class Equations:
         if model.element.gauss:
             w = w.sum(axis=1, keepdims=True) * interpolation.lobatto(model.element.order + 1)[1]
         np.add.at(lump, model.rotations.turns.ravel(), w.ravel())
+        for name, member in model.scene.members.items():
+            if member.type == "small":
+                share = model.scene.center_lines[name].length / model.scales.length / len(member.nodes)
+                np.add.at(lump, list(model.rotations.ends[name]), share)
+        # What turns with nothing that has a length.
+        lump = np.maximum(lump, 1e-6)
         mass = np.zeros(self.turning_unknowns)
         used = self.number >= 0
         mass[self.number[used]] = np.broadcast_to(lump[:, None], self.number.shape)[used]
@@ -130,16 +145,15 @@ class Equations:
     @property
     def row_names(self) -> tuple[str, ...]:
         """Names of the closing and hinge rows."""
-        count = len(self.model.rotations.hinges)
-        hinges = (f"hinge {i}, {side} direction" for i in range(count) for side in ("first", "second"))
-        return (*self.model.positions.rows, *hinges)
+        return self.model.row_names
 
     # -- pattern of the Newton matrix -----------------------------------------------------------
 
     def _pattern(self) -> None:
         """Row and column of every contribution, and where it goes among the entries of the matrix."""
         model = self.model
-        local = self.number[model.rotations.turns].reshape(len(model.rotations.turns), -1)
+        width = model.rotations.turns.shape[1] * model.element.turns
+        local = self.number[model.rotations.turns].reshape(-1, width)
         self._local = local
         rows, columns = [], []
 
@@ -164,16 +178,19 @@ class Equations:
         w = model.positions.W
         add(first_row + w.row, self.turning_unknowns + w.column)
         add(self.turning_unknowns + w.column, first_row + w.row)
-        if len(model.rotations.hinges):
-            cells = self.number[model.rotations.hinges].reshape(len(model.rotations.hinges), -1)
-            size = (len(cells), 6, 6)
+        for link in self._linked:
+            cells, width = link.cells, link.cells.shape[1]
+            size = (len(cells), width, width)
             add(np.broadcast_to(cells[:, None, :], size), np.broadcast_to(cells[:, :, None], size))
-            labels = first_row + len(model.positions.rows) + np.arange(2 * len(cells)).reshape(-1, 2)
-            size = (len(cells), 6, 2)
+            labels = first_row + link.first_row + np.arange(len(cells) * link.rows).reshape(len(cells), -1)
+            size = (len(cells), width, link.rows)
             r, c = np.broadcast_to(labels[:, None, :], size), np.broadcast_to(cells[:, :, None], size)
             r = np.where(c < 0, -1, r)
             add(r, c)
             add(c, r)
+        if not model.has_potential:
+            self._work = Work(model, self.number, self.place_number, self._basis)
+            add(self._work.row, self._work.column)
         # The diagonal is always there: regularisation and shifts are put on it.
         total = self.unknowns + self.rows
         add(np.arange(total), np.arange(total))
@@ -217,6 +234,7 @@ class Equations:
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
         """The equations at a state; with ``convex`` the element matrices made positive."""
         model, positions = self.model, self.model.positions
+        applied, loading = loading, self.effective(state, loading)
         constant = self.segment_pulls(state.lam, loading)[self._owner]
         self._kernel.set(0, state.q[model.rotations.turns])
         pull = loading.pull + constant[:, None, :]
@@ -230,16 +248,16 @@ class Equations:
         potential = float(strain.sum() + work.sum() - (constant * reach).sum())
         potential -= float((loading.pull * model.beams.tangent).sum())
         potential -= float(loading.force.ravel() @ nodal)
-        residual = np.bincount(self._used_numbers, weights=moments.ravel()[self._used], minlength=self.total)
+        residual = self._gathered(moments)
         # What a node adds up: moments of its elements, and within them the forces times the length they act on.
         carried = (np.abs(pull).sum(axis=2) * model.beams.weight).sum(axis=1)
         sums = np.abs(moments) + np.repeat(carried, len(model.element.nodes) * model.element.turns).reshape(
             moments.shape
         )
-        scale = np.bincount(self._used_numbers, weights=sums.ravel()[self._used], minlength=self.total) + self._noise
-        if not model.space:
-            potential -= float(loading.couple @ state.q[:, 0])
-            couple = loading.couple[self._free]
+        scale = self._gathered(sums) + self._noise
+        if loading.moment.any():
+            potential -= self._work_of_moments(state, loading)
+            couple = self._on_unknowns(loading.moment)
             residual[: self.turning_unknowns] -= couple
             scale[: self.turning_unknowns] += np.abs(couple)
         lam, force = state.lam[: len(positions.rows)], loading.force.ravel()
@@ -247,19 +265,31 @@ class Equations:
             displacement = slice(self.turning_unknowns, self.unknowns)
             residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
             sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
-            scale[displacement] = sums + 1e-12
+            scale[displacement] += sums + 1e-12
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
         parts = [stiffness.ravel(), *self._closing_parts(spin), positions.W.value, positions.W.value]
-        if len(model.rotations.hinges):
-            parts += self._hinge_parts(state, residual)
+        stored = float(strain.sum())
+        for link, load in zip(self._linked, loading.loads, strict=True):
+            energy, kept, link_parts = link.at(self, state, nodal, load, residual, scale, convex=convex)
+            potential, stored, parts = potential + energy, stored + kept, parts + link_parts
+        # A component along which nothing acts is judged by what acts across it.
+        scale[self._kept] = scale[self._kept].max(axis=1, keepdims=True)
+        if not model.has_potential:
+            parts.append(self._work.entries(state.q, applied, convex=convex))
         values = np.concatenate([*parts, self._zeros])[self._valid]
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
-        return Point(potential, float(strain.sum()), residual, scale, entries)
+        return Point(potential, stored, residual, scale, entries)
+
+    def _gathered(self, parts: Array) -> Array:
+        """Moments on the nodes of the elements added up on the unknowns."""
+        values = np.bincount(self._used_numbers, weights=parts.ravel()[self._used], minlength=self.total)
+        # Without any element the sum is of whole numbers.
+        return values.astype(float, copy=False)
 
     def end_moments(self, state: State, loading: Loading) -> dict[str, Array]:
-        """Moment (3,) about the fixed axes that the surroundings exert on the first end of each member."""
-        model = self.model
+        """Moment (3,) about the fixed axes that the surroundings exert on the first end of each flexible member."""
+        model, loading = self.model, self.effective(state, loading)
         self._kernel.set(0, state.q[model.rotations.turns])
         constant = self.segment_pulls(state.lam, loading)[self._owner]
         self._kernel.set(3, loading.pull + constant[:, None, :])
@@ -296,7 +326,53 @@ class Equations:
         stiffness = self._local_parts(moments, stiffness, spin)[1].ravel()
         values = np.zeros(self._size)
         values[: len(stiffness)] = stiffness
+        self._add_links(values)
         return np.bincount(self._to_entry, weights=values[self._valid], minlength=len(self.row))
+
+    def _add_links(self, values: Array) -> None:
+        """Put the stiffness of springs and small members at the undeformed state to the contributions."""
+        rest = self.start(self.model.loading(0.0, 0.0))
+        rest = replace(rest, q=self._at_rest(len(rest.q)))
+        nothing = np.zeros(self.total)
+        where = self._size - self.total - (self._work.row.size if not self.model.has_potential else 0)
+        for link in reversed(self._linked):
+            places = np.zeros(len(self.model.segments.places) * self.model.element.axes)
+            load = np.zeros((len(link.cells), link.group.kind.sizes[4]))
+            _, _, (stiffness, spin, _) = link.at(self, rest, places, load, nothing.copy(), nothing.copy())
+            where -= 2 * spin.size
+            values[where - stiffness.size : where] = stiffness
+            where -= stiffness.size
+
+    def _at_rest(self, count: int) -> Array:
+        rest = np.zeros((count, self.model.element.components))
+        rest[:, 0] = 1.0 if self.model.space else 0.0
+        return rest
+
+    def effective(self, state: State, loading: Loading) -> Loading:
+        """The loading with what follows the state as it is there."""
+        return loading if self.model.has_potential else self._work.effective(state.q, loading)
+
+    def _on_unknowns(self, moments: Array) -> Array:
+        """Moments about the fixed axes (rotations, 3) on the turning unknowns."""
+        if not self.model.space:
+            return np.asarray(moments[self._free, 2])
+        moments = moments.copy()
+        for i, basis in self._basis.items():
+            moments[i] = moments[i] @ basis
+        values = np.zeros(self.turning_unknowns)
+        used = self.number >= 0
+        values[self.number[used]] = moments[used]
+        return values
+
+    def _work_of_moments(self, state: State, loading: Loading) -> float:
+        """Work of the moments that have a potential: about z in the plane, about the axis of a held hinge."""
+        if not self.model.space:
+            return float(loading.moment[:, 2] @ state.q[:, 0])
+        axes = {i: self.model.rotations.axis[i] for i in self._basis}
+        return sum(
+            float(loading.moment[i] @ axis) * float(quaternion.angle_about(state.q[i], axis))
+            for i, axis in axes.items()
+        )
 
     def _local_parts(self, moments: Array, stiffness: Array, spin: Array) -> tuple[Array, Array, Array]:
         """The kernel's results in the bases of the unknowns; read before the kernel is called again."""
@@ -305,26 +381,6 @@ class Equations:
         spin = spin.reshape(n, width, self.model.element.axes)
         self._turn_bases(moments, stiffness, spin)
         return moments, stiffness, spin
-
-    def _hinge_parts(self, state: State, residual: Array) -> list[Array]:
-        model = self.model
-        first = len(model.positions.rows)
-        self._hinge.set(0, state.q[model.rotations.hinges])
-        self._hinge.set(2, state.lam[first:])
-        rows, spin, stiffness = self._hinge()
-        n = len(rows)
-        stiffness, spin = stiffness.reshape(n, 6, 6).copy(), spin.reshape(n, 6, 2).copy()
-        moments = np.einsum("ncr,nr->nc", spin, state.lam[first:].reshape(n, 2))
-        for h, side in np.argwhere(np.isin(model.rotations.hinges, list(self._basis))):
-            basis, part = self._basis[int(model.rotations.hinges[h, side])], slice(3 * side, 3 * side + 3)
-            moments[h, part] = moments[h, part] @ basis
-            stiffness[h, part] = basis.T @ stiffness[h, part]
-            stiffness[h, :, part] = stiffness[h, :, part] @ basis
-            spin[h, part] = basis.T @ spin[h, part]
-        cells = self.number[model.rotations.hinges].reshape(n, -1)
-        np.add.at(residual, cells[cells >= 0], moments[cells >= 0])
-        residual[self.unknowns + first :] = rows.ravel()
-        return [stiffness.ravel(), spin.ravel(), spin.ravel()]
 
     def _turn_bases(self, moments: Array, stiffness: Array, spin: Array) -> None:
         """Turn the components of rotations about a held axis, in place, so that the first is about it."""
@@ -363,6 +419,70 @@ class Equations:
             q = state.q + turn
         y = state.y + step[self.turning_unknowns : self.unknowns]
         return State(q, y, state.lam + step[self.unknowns :])
+
+
+class _Linked:
+    """The connections of one group in the unknowns of the equations."""
+
+    def __init__(self, equations: Equations, group: Group) -> None:
+        model = equations.model
+        self.rows = group.kind.sizes[2]
+        n, width = len(group.names), model.element.turns
+        self.group = group
+        before = model.connections[: next(i for i, g in enumerate(model.connections) if g is group)]
+        self.first_row = len(model.positions.rows) + sum(len(g.rows) for g in before)
+        # The ground is the last side: it has no unknowns.
+        numbers = np.vstack([equations.number, np.full((1, width), -1)])
+        moves = np.vstack([equations.place_number, np.full((1, model.element.axes), -1)])
+        turning, moving = numbers[group.turns].reshape(n, -1), moves[group.places].reshape(n, -1)
+        self.cells = np.concatenate([turning, moving], axis=1)
+        self._width = width
+        self._batch = Batch(by_turning(group.kind), n)
+        self._batch.set(2, group.data)
+        self._about = np.argwhere(np.isin(group.turns, list(equations._basis))).tolist()
+
+    def at(
+        self,
+        equations: Equations,
+        state: State,
+        places: Array,
+        load: Array,
+        residual: Array,
+        scale: Array,
+        *,
+        convex: bool = False,
+    ) -> tuple[float, float, list[Array]]:
+        """Energy, its share without loads, and entries; what is out of balance is added to the residual."""
+        group, n = self.group, len(self.cells)
+        q = np.vstack([state.q, equations._at_rest(1)])
+        u = np.vstack([places.reshape(-1, equations.model.element.axes), np.zeros((1, equations.model.element.axes))])
+        rows = slice(self.first_row, self.first_row + n * self.rows)
+        for i, values in enumerate((q[group.turns], u[group.places])):
+            if values.size:
+                self._batch.set(i, values)
+        if load.size:
+            self._batch.set(3, load)
+        if self.rows:
+            self._batch.set(4, state.lam[rows])
+        energy, stored, gaps, gradient, stiffness, spin = self._batch()
+        width = self.cells.shape[1]
+        gradient = gradient.copy()
+        stiffness, spin = stiffness.reshape(n, width, width).copy(), spin.reshape(n, width, self.rows).copy()
+        for h, side in self._about:
+            basis = equations._basis[int(group.turns[h, side])]
+            part = slice(self._width * side, self._width * (side + 1))
+            gradient[h, part] = gradient[h, part] @ basis
+            stiffness[h, part] = basis.T @ stiffness[h, part]
+            stiffness[h, :, part] = stiffness[h, :, part] @ basis
+            spin[h, part] = basis.T @ spin[h, part]
+        if convex and not self.rows:
+            stiffness = _positive_part(stiffness)
+        used = self.cells >= 0
+        np.add.at(residual, self.cells[used], gradient[used])
+        np.add.at(scale, self.cells[used], np.abs(gradient)[used])
+        residual[equations.unknowns + rows.start : equations.unknowns + rows.stop] = gaps.ravel()
+        parts = [stiffness.ravel(), spin.ravel(), spin.ravel()]
+        return float(energy.sum()), float(stored.sum()), parts
 
 
 FEW_ROWS = 12

@@ -24,7 +24,8 @@ class Fields:
     """Fields of one state of a model.  All results are in SI units and fixed axes, with three components."""
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
-        self.model, self._state, self._loading = equations.model, state, loading
+        self.model, self._state, self._applied = equations.model, state, loading
+        self._loading = loading = equations.effective(state, loading)
         self._equations = equations
         self.q = state.q
         model = self.model
@@ -54,7 +55,7 @@ class Fields:
         moment = np.zeros(3)
         number = model.rotations.node_turn[node]
         if number is not None:
-            moment[2] -= self._loading.couple[number]
+            moment -= self._loading.moment[number]
         for name, member in model.scene.members.items():
             ends = self.along(name, np.array([0.0, 1.0]), dimensionless=True)
             if member.nodes[0] == node:
@@ -103,8 +104,11 @@ class Fields:
             return result
         result["force"] = force * model.scales.force
         result["moment"] = moment * model.scales.moment
-        stiffness = model.scene.sections[model.scene.members[member].section].stiffness(x)
         strain = np.einsum("nij,ni->nj", frames, result["moment"])
+        record = model.scene.members[member]
+        if record.type == "rigid":
+            return {**result, "curvature": line.curvatures(x)}
+        stiffness = model.scene.sections[str(record.section)].stiffness(x)
         with np.errstate(invalid="ignore"):
             strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
@@ -139,7 +143,7 @@ class Fields:
         gains = _cross(turned, self._pull[part]).sum(axis=1)
         chain = model.rotations.turns[part]
         # A couple at a cut is a jump of the moment.
-        gains[:-1, 2] -= self._loading.couple[chain[1:, 0]]
+        gains[:-1] -= self._loading.moment[chain[1:, 0]]
         moment = -self._start_moments[member]
         moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
         return starts, moments
@@ -190,11 +194,34 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
 
 
 def transferred(source: Any, state: State, target: Any) -> State:
-    """A state of one mesh on another mesh of the same scene."""
+    """A state of one mesh on another mesh of the same scene.
+
+    Displacements and multipliers go by their names; those that the other mesh does not have are left zero.
+    """
     q = np.zeros((len(target.rotations.kind), target.element.components))
+    for name, ends in target.rotations.ends.items():
+        q[list(ends)] = state.q[list(source.rotations.ends[name])]
     for name in target.members:
         q[target.chain(name)] = rotations_along(source, state.q, name, target.along(name))
     for name, number in target.rotations.node_turn.items():
         if number is not None and source.rotations.node_turn[name] is not None:
             q[number] = state.q[source.rotations.node_turn[name]]
-    return State(q, state.y.copy(), state.lam.copy())
+    y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
+    lam = _by_name(source.row_names, state.lam, target.row_names)
+    return State(q, y, lam)
+
+
+def _by_name(names: tuple[str, ...], values: Array, wanted: tuple[str, ...]) -> Array:
+    """Values by their names; names that repeat go in their order."""
+    if names == wanted:
+        return values.copy()
+    known: dict[tuple[str, int], float] = {}
+    count: dict[str, int] = {}
+    for name, value in zip(names, values, strict=True):
+        count[name] = count.get(name, 0) + 1
+        known[name, count[name]] = float(value)
+    count, found = {}, []
+    for name in wanted:
+        count[name] = count.get(name, 0) + 1
+        found.append(known.get((name, count[name]), 0.0))
+    return np.array(found)

@@ -138,17 +138,17 @@ def _curls(equations: Equations, turns: tuple[float, ...]) -> list[Array]:
 
 def _distances(model: Model) -> Array:
     """Shortest length along members from the ground to each rotation."""
-    lengths = {name: model.scene.center_lines[name].length for name in model.members}
+    lengths = {name: line.length for name, line in model.scene.center_lines.items()}
     to_node = {name: 0.0 if node.support != "free" else np.inf for name, node in model.scene.nodes.items()}
     for _ in model.nodes:
         for name, member in model.scene.members.items():
-            start, end = member.nodes
+            start, end = member.nodes[0], member.nodes[-1]
             to_node[start] = min(to_node[start], to_node[end] + lengths[name])
             to_node[end] = min(to_node[end], to_node[start] + lengths[name])
     distances = np.full(len(model.rotations.kind), np.inf)
-    for name, member in model.scene.members.items():
+    for name in model.members:
         part = model.along(name) * lengths[name]
-        a, b = (to_node[node] for node in member.nodes)
+        a, b = (to_node[node] for node in model.scene.members[name].nodes)
         chain = model.chain(name)
         distances[chain] = np.minimum(distances[chain], np.minimum(a + part, b + lengths[name] - part))
     return np.where(np.isfinite(distances), distances, 0.0)
@@ -166,9 +166,9 @@ def _wished(equations: Equations) -> Array | None:
     """Displacements to the ``start`` places, dimensionless, nan where none is given."""
     model = equations.model
     axes = model.element.axes
-    targets = np.full((len(model.nodes), axes), np.nan)
+    targets = np.full((len(model.segments.places), axes), np.nan)
     for i, node in enumerate(model.scene.nodes.values()):
-        if node.start is not None and node.support in ("free", "slider"):
+        if node.start is not None and (node.support == "free" or node.slides):
             targets[i] = (np.asarray(node.start) - np.asarray(node.position))[:axes] / model.scales.length
     return targets.ravel() if np.isfinite(targets).any() else None
 
@@ -177,7 +177,8 @@ def _carried(equations: Equations, loading: Loading) -> State:
     """Prescribed rotation vectors spread over the scene like heat, members being rods."""
     model = equations.model
     count = len(model.rotations.kind)
-    ends = np.array([model.rotations.ends[name] for name in model.members])
+    names = tuple(name for name, ends in model.rotations.ends.items() if len(ends) == 2)
+    ends = np.array([model.rotations.ends[name] for name in names])
     used, index = np.unique(ends, return_inverse=True)
     index = index.reshape(ends.shape)
     laplacian = np.zeros((len(used), len(used)))
@@ -190,11 +191,13 @@ def _carried(equations: Equations, loading: Loading) -> State:
         matrix = laplacian[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
         vectors[free] = np.linalg.solve(matrix, -laplacian[np.ix_(free, held)] @ vectors[held])
     field = np.zeros((count, 3))
-    for (a, b), (i, j), name in zip(ends, index, model.members, strict=True):
+    for (a, b), (i, j), name in zip(ends, index, names, strict=True):
+        field[a], field[b] = vectors[i], vectors[j]
+        if name not in model.members:
+            continue
         chain = model.chain(name)
         part = model.along(name)[:, None]
         field[chain] = (1.0 - part) * vectors[i] + part * vectors[j]
-        field[a], field[b] = vectors[i], vectors[j]
     about = model.rotations.kind == Turn.AXIS
     field[about] = (field[about] * model.rotations.axis[about]).sum(axis=1, keepdims=True) * model.rotations.axis[about]
     q = quaternion.from_rotation_vector(field) if model.space else field[:, 2:3]
@@ -230,11 +233,11 @@ def _bow(equations: Equations) -> Array:
     """Rotation vectors of a slight bow of each straight member about its weak axis."""
     model = equations.model
     vectors = np.zeros((len(model.rotations.kind), 3))
-    for name, member in model.scene.members.items():
-        line = model.scene.center_lines[name]
-        if line.turning > 0.05:
+    for name in model.members:
+        member, line = model.scene.members[name], model.scene.center_lines[name]
+        if line.turning > 0.05 or member.type == "rigid":
             continue
-        stiffness = model.scene.sections[member.section].stiffness(np.array([0.5]))[0]
+        stiffness = model.scene.sections[str(member.section)].stiffness(np.array([0.5]))[0]
         weak_2 = model.space and stiffness[1] < stiffness[2] * (1.0 - 1e-9)
         frame = quaternion.matrix(line.quaternions(np.array([0.0])))[0]
         axis = np.array([0.0, 0.0, 1.0]) if not model.space else (-frame[:, 1] if weak_2 else frame[:, 2])

@@ -124,12 +124,15 @@ class Batch:
     """
 
     def __init__(self, function: ca.Function, n: int) -> None:
+        self._n = n
         self._function = function.map(n) if n > 1 else function
         buffer: Any
         buffer, self._call = self._function.buffer()
         self._buffer = buffer
         self._arguments: list[Array] = [np.zeros((n, function.nnz_in(i))) for i in range(function.n_in())]
         self.results: list[Array] = [np.zeros((n, function.nnz_out(i))) for i in range(function.n_out())]
+        if n == 0:
+            return
         for i, array in enumerate(self._arguments):
             self._buffer.set_arg(i, array.data)
         for i, array in enumerate(self.results):
@@ -141,5 +144,6 @@ class Batch:
 
     def __call__(self) -> list[Array]:
         """Evaluate; the arrays returned are overwritten by the next call."""
-        self._call()
+        if self._n:
+            self._call()
         return self.results

@@ -10,24 +10,13 @@ from pydantic import model_validator
 from .errors import SceneError
 from .records import Record
 
-__all__ = ["SPACE_MOMENT", "Staged", "refusal"]
-
-SPACE_MOMENT = "Load.type = moment in space"
+__all__ = ["Staged", "refusal"]
 
 _LATER = {
-    "Scene.springs": "springs",
     "Scene.contacts": "contacts",
     "Scene.rotating": "rotating axes",
-    "Node.mass": "lumped masses",
-    "Node.inertia": "lumped inertias",
     "Node.velocity": "velocities",
-    "Member.type = rigid": "rigid members",
-    "Member.type = small": "members of small deformation",
-    "Member.stiffness": "stiffness matrices of members",
-    "Member.mass": "mass matrices of members",
     "Member.spin": "angular velocities of members",
-    "Load.frame = follower": "follower loads",
-    SPACE_MOMENT: "moments in a space scene",
     "Analysis.type = path": "paths",
     "Analysis.type = modes": "modes",
     "Analysis.type = dynamic": "dynamics",

@@ -41,7 +41,7 @@ class SparseMap:
         self._full = self.full() if shape[0] * shape[1] <= FULL else None
 
     @functools.cached_property
-    def T(self) -> SparseMap:
+    def T(self) -> SparseMap:  # noqa: N802 - the name of NumPy
         """The transpose."""
         return SparseMap(self.column, self.row, self.value, (self.shape[1], self.shape[0]))
 

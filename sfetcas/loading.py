@@ -12,51 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Index
+from .beams import Beams, Scales
+from .bodies import Lever, body_of, lever_along, quadrature
+from .connections import Group, freedoms
 from .elements import Element
 from .errors import SceneError
+from .interpolation import lobatto
+from .joints import Body, DrivenSlide, DrivenTurn
 from .mesh import Mesh
 from .rotations import Rotations
 from .scene import Load, Motion, Scene
 from .sections import evaluate
 from .segments import Segments
 
-__all__ = ["Beams", "Loading", "Scales", "unit_loadings"]
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Units of a model: length (m), force (N) and moment or energy (N m)."""
-
-    length: float
-    moment: float
-
-    @property
-    def force(self) -> float:
-        """Unit of force, N."""
-        return self.moment / self.length
-
-
-@dataclass(frozen=True, eq=False)
-class Beams:
-    """What the elements of all members are made of, dimensionless.
-
-    Attributes
-    ----------
-    stiffness : ndarray (elements, points, stiffnesses)
-        Stiffness times weight over length, fixed axes of the undeformed scene.
-    tangent : ndarray (elements, points, axes)
-        Tangent of the unloaded centre line times weight times length.
-    weight : ndarray (elements, points)
-        Weight times length.
-    first : dict
-        Number of the first element of a member.
-    """
-
-    stiffness: Array
-    tangent: Array
-    weight: Array
-    first: dict[str, int]
+__all__ = ["Followers", "Loading", "carried", "find_followers", "unit_loadings"]
 
 
 @dataclass(frozen=True)
@@ -69,8 +39,14 @@ class Loading:
         Dead forces on places, and the resultants of the loads along segments, put to their first places.
     own : ndarray (places, axes)
         The share of ``force`` that acts on the places themselves.
-    couple : ndarray (rotations,)
-        Moments about z on rotations; plane only.
+    moment : ndarray (rotations, 3)
+        Moments on rotations, about the fixed axes.
+    twist : ndarray (rotations, 3)
+        Moments on rotations that turn with them.
+    following : ndarray (n, axes)
+        Forces that turn with a rotation, on the pairs of :attr:`Followers`.
+    tangential : ndarray (elements, points, axes)
+        Distributed force times weight times length that turns with the section.
     pull : ndarray (elements, points, axes)
         Minus the internal force at the integration points that the loads along the member cause.
     spread : ndarray (elements, points, axes)
@@ -79,31 +55,131 @@ class Loading:
         Prescribed displacements, zero for places that are free.
     turn : ndarray (rotations, 3)
         Prescribed rotation vectors of held rotations.
+    loads : tuple of ndarray (n, loads)
+        What grows with the load factor in each group of connections.
     """
 
     force: Array
     own: Array
-    couple: Array
+    moment: Array
+    twist: Array
+    following: Array
+    tangential: Array
     pull: Array
     spread: Array
     shift: Array
     turn: Array
+    loads: tuple[Array, ...]
 
     def scaled(self, factor: float) -> Loading:
         """All loads and motions times a factor."""
-        return Loading(*(factor * getattr(self, name) for name in PARTS))
+        parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS)}
+        return Loading(**parts, loads=tuple(factor * load for load in self.loads))
 
     def unloaded(self) -> Loading:
-        """The motions alone."""
-        zero = {name: np.zeros_like(getattr(self, name)) for name in ("force", "own", "couple", "pull", "spread")}
-        return replace(self, **zero)
+        """The motions alone; the driven joints among them."""
+        zero: dict[str, Any] = {name: np.zeros_like(getattr(self, name)) for name in LOADS}
+        loads = tuple(load if load.shape[1] == 1 else np.zeros_like(load) for load in self.loads)
+        return replace(self, **zero, loads=loads)
 
     def plus(self, other: Loading) -> Loading:
         """The sum of two loadings."""
-        return Loading(*(getattr(self, name) + getattr(other, name) for name in PARTS))
+        parts = {name: getattr(self, name) + getattr(other, name) for name in (*LOADS, *MOTIONS)}
+        return Loading(**parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
+
+    @property
+    def follows(self) -> bool:
+        """Whether forces or moments turn with what they act on."""
+        return bool(self.following.any() or self.tangential.any() or self.twist.any())
 
 
-PARTS = ("force", "own", "couple", "pull", "spread", "shift", "turn")
+LOADS = ("force", "own", "moment", "twist", "following", "tangential", "pull", "spread")
+MOTIONS = ("shift", "turn")
+
+
+@dataclass(frozen=True)
+class Followers:
+    """Where forces that turn with a rotation act.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the loads.
+    turns, places : ndarray (n,)
+        Numbers of the rotation that each turns with and of the place it acts on.
+    elements : ndarray
+        Elements along which distributed ones act; each is a segment.
+    """
+
+    names: tuple[str, ...]
+    turns: Index
+    places: Index
+    elements: Index
+
+
+def find_followers(scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations) -> Followers:
+    """The followers of a scene.
+
+    Raises
+    ------
+    SceneError
+        Nothing turns with the node that a load shall follow.
+    """
+    names, turns, places, along = [], [], [], []
+    for name, load in scene.loads.items():
+        if not load.follows:
+            continue
+        if load.type == "distributed":
+            along += [part.elements.start for part in segments.parts if part.member == load.member]
+            continue
+        names.append(name)
+        if load.node is not None:
+            turns.append(turning(rotations, name, load.node))
+            places.append(segments.place(load.node))
+            continue
+        member = str(load.member)
+        cut = int(np.argmin(np.abs(mesh.cuts[member] - (load.at or 0.0))))
+        parts = [part for part in segments.parts if part.member == member]
+        chain = rotations.chain(slice(parts[0].elements.start, parts[-1].elements.stop))
+        turns.append(int(chain[cut * element.order]))
+        start = next((part.start for part in parts if part.elements.start == parts[0].elements.start + cut), None)
+        places.append(segments.place(parts[-1].end if start is None else start))
+    index = [np.array(part, dtype=np.intp) for part in (turns, places, sorted(set(along)))]
+    return Followers(tuple(names), *index)
+
+
+def turning(rotations: Rotations, name: str, node: str) -> int:
+    """Rotation of a node that a load acts on.
+
+    Raises
+    ------
+    SceneError
+        There is none.
+    """
+    number = rotations.node_turn[node]
+    if number is None:
+        raise SceneError(f"nothing turns with node {node!r}, so no moment or follower can act on it", ("loads", name))
+    return number
+
+
+def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array, Array]:
+    """Pull (elements, points, axes) and forces on places (places, axes) of forces along the elements.
+
+    The pull at a point is minus the load beyond it up to the end of its segment; within an element "beyond" is
+    the transpose of the matrix that integrates the turned tangents, so that the discrete potential has exactly
+    this gradient.
+    """
+    on_element = forces.sum(axis=1)
+    pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
+    on_places = np.zeros((len(segments.places), element.axes))
+    for part in segments.parts:
+        here = part.elements
+        if not forces[here].any():
+            continue
+        beyond = np.cumsum(on_element[here][::-1], axis=0)[::-1]
+        pull[here] -= (beyond - on_element[here])[:, None, :]
+        on_places[segments.place(part.start)] += beyond[0]
+    return pull, on_places
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +193,8 @@ class _Writer:
     segments: Segments
     rotations: Rotations
     beams: Beams
+    connections: tuple[Group, ...]
+    followers: Followers
 
     def empty(self) -> Loading:
         """No load and no motion."""
@@ -125,11 +203,15 @@ class _Writer:
         return Loading(
             force=np.zeros((places, self.element.axes)),
             own=np.zeros((places, self.element.axes)),
-            couple=np.zeros(turns),
+            moment=np.zeros((turns, 3)),
+            twist=np.zeros((turns, 3)),
+            following=np.zeros((len(self.followers.names), self.element.axes)),
+            tangential=np.zeros(along),
             pull=np.zeros(along),
             spread=np.zeros(along),
             shift=np.zeros(places * self.element.axes),
             turn=np.zeros((turns, 3)),
+            loads=tuple(np.zeros((len(group.names), group.kind.sizes[4])) for group in self.connections),
         )
 
     def elements_of(self, member: str) -> slice:
@@ -163,26 +245,30 @@ class _Writer:
     def add_load(self, group: Loading, name: str, load: Load) -> None:
         if load.type == "moment":
             self._add_moment(group, name, load)
+        elif load.follows and load.type == "force":
+            number = self.followers.names.index(name)
+            group.following[number] += self.vector(load.vector) / self.scales.force
         elif load.node is not None:
             self.push(group, self.segments.place(load.node), self.vector(load.vector))
+        elif self.scene.members[str(load.member)].type == "small":
+            self._add_on_body(group, load)
         elif load.type == "force":
             self._add_point_force(group, load)
         else:
             x = self.places(str(load.member))
             profile = np.ones(x.shape) if load.profile is None else evaluate(load.profile, x.ravel()).reshape(x.shape)
             density = profile[..., None] * self.vector(load.vector)
-            self.spread(group, str(load.member), density)
+            self.spread(group, str(load.member), density, follows=load.follows)
 
     def _add_moment(self, group: Loading, name: str, load: Load) -> None:
         if load.node is not None:
-            number = self.rotations.node_turn[load.node]
-            if number is None:
-                message = f"nothing turns with node {load.node!r}, so no moment can act on it"
-                raise SceneError(message, ("loads", name))
+            number = turning(self.rotations, name, load.node)
         else:
             chain = self.rotations.chain(self.elements_of(str(load.member)))
             number = int(chain[self.cut(load) * self.element.order])
-        group.couple[number] += load.vector[2] / self.scales.moment
+        # In the plane a moment that follows is one that does not.
+        part = group.twist if load.frame == "follower" and self.element.space else group.moment
+        part[number] += np.asarray(load.vector) / self.scales.moment
 
     def _add_point_force(self, group: Loading, load: Load) -> None:
         member = str(load.member)
@@ -196,31 +282,82 @@ class _Writer:
         self.push(group, self.segments.place(self.segments.ends[member, 1]), self.vector(load.vector))
 
     def add_weight(self, group: Loading, member: str) -> None:
+        if self.scene.members[member].type == "small":
+            weight = body_of(self.scene, member).weight
+            assert weight is not None
+            self._add_lever(group, member, weight, np.asarray(self.scene.gravity))
+            return
+        section = self.scene.members[member].section
+        if section is None:
+            return
         x = self.places(member)
-        mass = self.scene.sections[self.scene.members[member].section].mass(x.ravel()).reshape(x.shape)
+        mass = self.scene.sections[section].mass(x.ravel()).reshape(x.shape)
+        line = self.scene.center_lines[member]
+        if self.scene.members[member].type == "rigid" and line.turning > 0.0:
+            self._add_weight_of_chord(group, member)
+            return
         self.spread(group, member, mass[..., None] * self.vector(self.scene.gravity))
 
-    def spread(self, group: Loading, member: str, density: Array) -> None:
-        """Add a force per length (elements, points, axes), N/m: the adjoint of summing up the displacements.
+    def _add_weight_of_chord(self, group: Loading, member: str) -> None:
+        """The mass of a rigid member is spread over the straight line between its nodes, whatever its shape."""
+        x, w = lobatto(9)
+        start, end = (np.asarray(self.scene.nodes[n].position) for n in self.scene.members[member].nodes)
+        share = self.scene.sections[str(self.scene.members[member].section)].mass(x) * w * np.linalg.norm(end - start)
+        weight = self.vector(self.scene.gravity)
+        self.push(group, self.segments.place(self.segments.ends[member, 0]), (share @ (1.0 - x)) * weight)
+        self.push(group, self.segments.place(self.segments.ends[member, 1]), (share @ x) * weight)
 
-        The pull at a point is minus the load beyond it; within an element "beyond" is the transpose of the
-        matrix that integrates the turned tangents, so that the discrete potential has exactly this gradient.
-        """
-        part = self.elements_of(member)
-        forces = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
-        on_element = forces.sum(axis=1)
-        inside = np.einsum("jk,eja->eka", self.element.to_points, forces) / self.element.weights[:, None]
-        group.spread[part] += forces
-        for place, segment in self.segments_of(member):
-            here = slice(segment.start - part.start, segment.stop - part.start)
-            beyond = np.cumsum(on_element[here][::-1], axis=0)[::-1] - on_element[here]
-            group.pull[segment] -= beyond[:, None, :] + inside[here]
-            group.force[place] += on_element[here].sum(axis=0)
+    def add_mass(self, group: Loading, node: str) -> None:
+        """Weight of a lumped mass."""
+        weight = self.scene.nodes[node].mass * self.vector(self.scene.gravity)
+        self.push(group, self.segments.place(node), weight)
+
+    def spread(self, group: Loading, member: str, density: Array, *, follows: bool = False) -> None:
+        """Add a force per length (elements, points, axes), N/m."""
+        part, forces = self.elements_of(member), np.zeros_like(group.spread)
+        forces[part] = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
+        if follows:
+            group.tangential[part] += forces[part]
+            return
+        pull, on_places = carried(forces, self.segments, self.element)
+        group.spread[part] += forces[part]
+        group.pull[part] += pull[part]
+        group.force[:] += on_places
+
+    # -- small members ----------------------------------------------------------------------------
+
+    def _add_on_body(self, group: Loading, load: Load) -> None:
+        member = str(load.member)
+        if load.type == "force":
+            length = self.scene.center_lines[member].length
+            lever = lever_along(self.scene, member, np.ones(1) / length, np.array([load.at or 0.0]), np.ones(1))
+        else:
+            x, w = quadrature()
+            profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+            lever = lever_along(self.scene, member, profile, x, w)
+        self._add_lever(group, member, lever, np.asarray(load.vector))
+
+    def _add_lever(self, group: Loading, member: str, lever: Lever, vector: Array) -> None:
+        """A profile times a vector: force, first moment and consistent forces as the body's kernel takes them."""
+        i = next(i for i, g in enumerate(self.connections) if isinstance(g.kind, Body) and member in g.names)
+        kind, axes = self.connections[i].kind, self.element.axes
+        assert isinstance(kind, Body)
+        value = vector[:axes] / self.scales.force
+        chosen = freedoms(kind.nodes, kind.space)
+        unit = np.tile([self.scales.length] * 3 + [1.0] * 3, kind.nodes)
+        ends = (lever.ends * unit / self.scales.length)[:axes, chosen]
+        first = np.outer(value, lever.first[:axes] / self.scales.length)
+        tensor = np.einsum("a,bj->abj", value, ends)
+        parts = [lever.total * value, first.T.ravel(), tensor.transpose(2, 1, 0).ravel()]
+        group.loads[i][self.connections[i].names.index(member)] += np.concatenate(parts)
 
     # -- motions --------------------------------------------------------------------------------
 
-    def add_motion(self, group: Loading, motion: Motion) -> None:
+    def add_motion(self, group: Loading, name: str, motion: Motion) -> None:
         number, axes = self.segments.place(motion.node), self.element.axes
+        if motion.between is not None:
+            self._add_drive(group, name, motion)
+            return
         if motion.displacement is not None:
             shift = self.vector(motion.displacement) / self.scales.length
             group.shift[number * axes : (number + 1) * axes] += shift
@@ -229,11 +366,23 @@ class _Writer:
             assert turn is not None
             group.turn[turn] += self._rotation_vector(motion)
 
+    def _add_drive(self, group: Loading, name: str, motion: Motion) -> None:
+        """Angle or travel of a driven joint."""
+        for load, connections in zip(group.loads, self.connections, strict=True):
+            if name not in connections.names:
+                continue
+            number = connections.names.index(name)
+            if isinstance(connections.kind, DrivenTurn):
+                load[number] += motion.rotation
+            elif isinstance(connections.kind, DrivenSlide):
+                along = np.asarray(self.scene.nodes[motion.node].direction, dtype=float)
+                load[number] += np.dot(motion.displacement or (), along / np.linalg.norm(along)) / self.scales.length
+
     def _rotation_vector(self, motion: Motion) -> Array:
         if isinstance(motion.rotation, tuple):
             return np.asarray(motion.rotation, dtype=float)
         assert motion.rotation is not None
-        axis = np.asarray(self.scene.nodes[motion.node].axis, dtype=float)
+        axis = np.asarray(self.scene.nodes[motion.node].turn_axis, dtype=float)
         return np.asarray(motion.rotation * axis / np.linalg.norm(axis))
 
 
@@ -245,6 +394,8 @@ def unit_loadings(
     segments: Segments,
     rotations: Rotations,
     beams: Beams,
+    connections: tuple[Group, ...],
+    followers: Followers,
 ) -> dict[str | None, Loading]:
     """Loadings of factor 1, by the history that multiplies them; None is the load factor itself.
 
@@ -253,13 +404,15 @@ def unit_loadings(
     SceneError
         A moment on a node that nothing turns with.
     """
-    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams)
+    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams, connections, followers)
     groups: dict[str | None, Loading] = {None: writer.empty()}
     for name, load in scene.loads.items():
         writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)
     if scene.gravity is not None and np.any(scene.gravity):
         for member in scene.members:
             writer.add_weight(groups[None], member)
-    for motion in scene.motions.values():
-        writer.add_motion(groups.setdefault(motion.history, writer.empty()), motion)
+        for node in scene.nodes:
+            writer.add_mass(groups[None], node)
+    for name, motion in scene.motions.items():
+        writer.add_motion(groups.setdefault(motion.history, writer.empty()), name, motion)
     return groups

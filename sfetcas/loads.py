@@ -79,7 +79,8 @@ class Load(Staged):
     type : force (N), moment (N m) or distributed (N per metre of the undeformed member)
     node : name of the node it acts on; or
     member, at : name of the member, and the fraction of its length; a distributed load acts along all of it
-    value : (3,), fixed axes; a moment about z may be one number
+    value : (3,), fixed axes of the undeformed scene; a moment about z may be one number
+    frame : fixed, or follower: the value turns with the node, or with the section under it
     profile : factor along a distributed load
     history : name of the history that replaces the step's factor
     """
@@ -89,7 +90,7 @@ class Load(Staged):
     member: str | None = None
     at: Fraction | None = None
     value: Turn
-    frame: Literal["fixed"] = "fixed"
+    frame: Literal["fixed", "follower"] = "fixed"
     profile: Varying | None = None
     history: str | None = None
 
@@ -126,6 +127,11 @@ class Load(Staged):
             )
 
     @property
+    def follows(self) -> bool:
+        """Whether it is a force that turns with what it acts on."""
+        return self.frame == "follower" and self.type != "moment"
+
+    @property
     def vector(self) -> tuple[float, float, float]:
         """(3,), N, N m or N/m, fixed axes; one number is a moment about z."""
         return (0.0, 0.0, self.value) if isinstance(self.value, float) else self.value
@@ -140,12 +146,15 @@ class Motion(Record):
     displacement : (3,), m, fixed axes
     rotation : rad, about the axis of a hinge (z where the node is clamped in a plane scene);
         or (3,), rad, fixed axes - rotation vector of a node that cannot turn by itself
+    between : drives a joint instead of a support: two members that end at the node, hinged there (rotation: angle
+        of the second against the first) or the second released as a slider (displacement along the direction)
     history : name of the history that replaces the step's factor
     """
 
     node: str
     displacement: Vector | None = None
     rotation: Turn | None = None
+    between: tuple[str, str] | None = None
     history: str | None = None
 
     @model_validator(mode="after")

@@ -11,7 +11,7 @@ from .arrays import Array
 from .scene import Scene
 from .sections import breaks as kinks
 
-__all__ = ["Mesh", "breaks_of", "first_mesh", "uniform_mesh"]
+__all__ = ["Mesh", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 SAME = 1e-12
 """Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
@@ -29,11 +29,14 @@ class Mesh:
         Fractions of the member's length from 0 to 1, rising, n elements.
     gauss : bool
         Gauss integration instead of integration at the nodes.
+    rigid : frozenset of str
+        Members whose elements are never halved.
     """
 
     order: int
     cuts: Mapping[str, Array]
     gauss: bool = False
+    rigid: frozenset[str] = frozenset()
 
     @property
     def elements(self) -> int:
@@ -45,14 +48,18 @@ class Mesh:
         cuts = {}
         for name, old in self.cuts.items():
             chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
+            chosen = chosen & (name not in self.rigid)
             middles = 0.5 * (old[1:] + old[:-1])
             cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
-        return Mesh(self.order, cuts, self.gauss)
+        return Mesh(self.order, cuts, self.gauss, self.rigid)
 
 
 def breaks_of(scene: Scene, member: str) -> Array:
     """Fractions at which the solution along a member has a kink and an element has to end."""
-    places = [0.0, 1.0, *scene.sections[scene.members[member].section].breaks, *scene.center_lines[member].breaks]
+    section = scene.members[member].section
+    places = [0.0, 1.0, *scene.center_lines[member].breaks]
+    if section is not None and scene.members[member].type == "flexible":
+        places += scene.sections[section].breaks
     for load in scene.loads.values():
         if load.member == member:
             places += [] if load.at is None else [load.at]
@@ -77,7 +84,25 @@ def _divided(breaks: Array, elements: int) -> Array:
 def uniform_mesh(scene: Scene, order: int, elements: int | Mapping[str, int], gauss: bool = False) -> Mesh:
     """Equal elements on each member; one more wherever a load or a kink of the section needs a cut."""
     counts = elements if isinstance(elements, Mapping) else dict.fromkeys(scene.members, elements)
-    return Mesh(order, {name: _divided(breaks_of(scene, name), counts[name]) for name in scene.members}, gauss)
+    cuts = {name: _divided(breaks_of(scene, name), counts.get(name, 1)) for name in cut(scene)}
+    cuts |= {name: rigid_cuts(scene, name) for name in rigid(scene)}
+    return Mesh(order, cuts, gauss, rigid(scene))
+
+
+def cut(scene: Scene) -> list[str]:
+    """Names of the members that are made of elements: all but small ones."""
+    return [name for name, member in scene.members.items() if member.type != "small"]
+
+
+def rigid(scene: Scene) -> frozenset[str]:
+    """Names of the rigid members."""
+    return frozenset(name for name, member in scene.members.items() if member.type == "rigid")
+
+
+def rigid_cuts(scene: Scene, member: str) -> Array:
+    """Elements of a rigid member: they share one rotation, and integrate what acts along its shape."""
+    turning = scene.center_lines[member].turning
+    return _divided(breaks_of(scene, member), max(1, int(np.ceil(4.0 * turning))))
 
 
 def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
@@ -88,17 +113,20 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
     ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
     """
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
-    moments = sum(abs(load.vector[2]) for load in scene.loads.values() if load.type == "moment")
+    moments = sum(float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "moment")
     most = _largest_force(scene)
     cuts = {}
-    for name, member in scene.members.items():
-        line = scene.center_lines[name]
-        softest = float(np.nanmin(scene.sections[member.section].stiffness(np.linspace(0.0, 1.0, 5))))
+    for name in cut(scene):
+        line, section = scene.center_lines[name], scene.sections.get(str(scene.members[name].section))
+        if scene.members[name].type == "rigid" or section is None:
+            cuts[name] = rigid_cuts(scene, name)
+            continue
+        softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
         expected = line.turning + max(rotations, default=0.0) + moments * line.length / softest
         count = int(min(max(2.0, np.ceil(expected / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
         cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
-    return Mesh(order, cuts)
+    return Mesh(order, cuts, rigid=rigid(scene))
 
 
 def _largest_force(scene: Scene) -> float:
@@ -117,7 +145,9 @@ def _largest_force(scene: Scene) -> float:
         masses = [
             float(scene.sections[m.section].mass(x).mean()) * scene.center_lines[n].length
             for n, m in scene.members.items()
+            if m.section is not None
         ]
+        masses += [node.mass for node in scene.nodes.values()]
         total += float(np.linalg.norm(scene.gravity)) * sum(masses) * largest
     return total
 

@@ -16,8 +16,10 @@ import numpy as np
 
 from . import quaternion
 from .arrays import Array, Index
+from .beams import Beams, Scales, beams_of, scales_of
+from .connections import Group, connect
 from .elements import Element, element_by_name
-from .loading import Beams, Loading, Scales, unit_loadings
+from .loading import Followers, Loading, find_followers, unit_loadings
 from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
 from .rotations import Rotations, Turn, number_rotations
@@ -52,6 +54,10 @@ class Model:
         Numbers and freedoms of the rotations.
     positions : Positions
         Displacements of nodes, closing equations.
+    connections : tuple of Group
+        Joints, springs and small members.
+    followers : Followers
+        Where forces act that turn with what they act on.
     groups : mapping
         Loadings of factor 1, by history.
     """
@@ -65,6 +71,8 @@ class Model:
     segments: Segments
     rotations: Rotations
     positions: Positions
+    connections: tuple[Group, ...]
+    followers: Followers
     groups: Mapping[str | None, Loading]
 
     @property
@@ -88,6 +96,11 @@ class Model:
         return self.scene.dimension_reason
 
     @functools.cached_property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the closing rows, then of the rows of joints."""
+        return (*self.positions.rows, *(row for group in self.connections for row in group.rows))
+
+    @functools.cached_property
     def blocks(self) -> tuple[Block, ...]:
         """What the model consists of, and why."""
         return _blocks(self)
@@ -97,6 +110,19 @@ class Model:
         """Unknown numbers of each rotation in the minimisation: 4, 2 or 0 in space; 1 or 0 in the plane."""
         table = np.array([0, 2, 4]) if self.space else np.array([0, 1, 1])
         return table[self.rotations.kind]
+
+    @functools.cached_property
+    def has_potential(self) -> bool:
+        """Whether all loads have a potential: none follows, and in space no moment turns what is free to turn."""
+        free = self.rotations.kind == Turn.FREE
+        turning = self.space and any(group.moment[free].any() for group in self.groups.values())
+        return not turning and not any(group.follows for group in self.groups.values())
+
+    @functools.cached_property
+    def minimisable(self) -> bool:
+        """Whether the energy of the nonlinear program is complete: moments in space are not in it."""
+        turning = self.space and any(group.moment.any() for group in self.groups.values())
+        return self.has_potential and not turning
 
     @functools.cached_property
     def members(self) -> tuple[str, ...]:
@@ -166,12 +192,14 @@ def assemble(
         A moment on a node that nothing turns with.
     """
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
-    scales, rotations = _scales(scene), number_rotations(scene, mesh, element)
-    beams, segments = _beams(scene, mesh, element, scales), cut_members(scene, mesh)
+    scales, rotations = scales_of(scene), number_rotations(scene, mesh, element)
+    beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
     both = {name: place_nodes(scene, segments, element.axes, name == "closing") for name in ("closing", "nodal")}
     if assembly == "auto":
         closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
         assembly = "closing" if closing <= nodal else "nodal"
+    connections = connect(scene, segments, rotations, element, scales)
+    followers = find_followers(scene, mesh, element, segments, rotations)
     return Model(
         scene=scene,
         mesh=mesh,
@@ -182,42 +210,14 @@ def assemble(
         segments=segments,
         rotations=rotations,
         positions=both[assembly],
-        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams),
+        connections=connections,
+        followers=followers,
+        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections, followers),
     )
 
 
-def _scales(scene: Scene) -> Scales:
-    length = max(line.length for line in scene.center_lines.values())
-    x = np.linspace(0.0, 1.0, 5)
-    stiffest = max(float(np.nanmax(scene.sections[m.section].stiffness(x))) for m in scene.members.values())
-    return Scales(length, stiffest / length)
-
-
-def _beams(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
-    stiffness, tangent, weight = [], [], []
-    first: dict[str, int] = {}
-    for name, member in scene.members.items():
-        cuts, line = mesh.cuts[name], scene.center_lines[name]
-        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.points
-        length = line.length / scales.length * np.diff(cuts)
-        w = length[:, None] * element.weights
-        values = scene.sections[member.section].stiffness(x.ravel()) / (scales.moment * scales.length)
-        frames = quaternion.matrix(line.quaternions(x.ravel()))
-        # Integrals over xi of squares of derivatives by xi: weight over length.
-        per_length = (element.weights / length[:, None])[..., None]
-        stiffness.append(_in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
-        tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
-        weight.append(w)
-        first[name] = sum(len(part) for part in weight[:-1])
-    return Beams(np.concatenate(stiffness), np.concatenate(tangent), np.concatenate(weight), first)
-
-
-def _in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:
-    """Stiffness (n, 3) about b1, b2, b3 in the fixed axes: upper triangles (n, 6), or about z (n, 1)."""
-    if not element.space:
-        return values[:, 1:2] if bending_axis == 2 else values[:, 2:3]
-    full = np.einsum("nij,nj,nkj->nik", frames, values, frames)
-    return full[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
 
 
 def _blocks(model: Model) -> tuple[Block, ...]:
@@ -238,8 +238,8 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"
         blocks.append(Block("closings", len(model.positions.rows), f"{why}; the multipliers are forces"))
-    if len(model.rotations.hinges):
-        blocks.append(
-            Block("hinges", 2 * len(model.rotations.hinges), "a hinge between members keeps two directions together")
-        )
+    for group in model.connections:
+        if group.rows:
+            name = type(group.kind).__name__.lower()
+            blocks.append(Block(f"{name} rows", len(group.rows), f"{_listed(group.names)}"))
     return tuple(blocks)

@@ -147,7 +147,7 @@ def descend(
     it up at once.  Stops where steps have become short: the state is meant for IPOPT or Newton's method.
     """
     scale = 1.0
-    most = np.inf if np.any(loading.couple) and most == TURN else most
+    most = np.inf if np.any(loading.moment) and most == TURN else most
     point = equations.at(state, loading, convex=True)
     for _ in range(iterations):
         try:

@@ -67,7 +67,7 @@ def _slides(scene: Scene, name: str) -> bool:
     """A slider whose travel is not prescribed."""
     node = scene.nodes[name]
     moved = [motion.displacement for motion in scene.motions.values() if motion.node == name]
-    return node.support == "slider" and not any(drives(node, displacement) for displacement in moved)
+    return node.slides and not any(drives(node, displacement) for displacement in moved)
 
 
 Source = tuple[str, int]

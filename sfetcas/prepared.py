@@ -75,11 +75,17 @@ class Prepared:
         return correct(self.equations, state, loading, self._test.weight, **limits)
 
     def stability(self, found: Corrected) -> Stability:
-        """The stability test at a state."""
+        """The stability test at a state; without a potential no energy tells stable from unstable."""
+        equations = self.equations
+        if not self.model.has_potential:
+            nothing = np.zeros(equations.turning_unknowns), np.zeros(equations.displacement_unknowns)
+            return Stability("not defined", 0, np.nan, *nothing)
         return self._test.test(found.point)
 
     def negative(self, found: Corrected) -> int:
-        """Number of negative eigenvalues at a state."""
+        """Number of negative eigenvalues at a state; none is counted where there is no potential."""
+        if not self.model.has_potential:
+            return 0
         return self._test.negative(found.point)
 
     def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
@@ -90,6 +96,8 @@ class Prepared:
         SolveError
             No equilibrium: what IPOPT says of it.
         """
+        if not self.model.minimisable:
+            raise SolveError(Status.FAILED, "loads without potential cannot be minimised, only followed", state)
         problem = self._problem
         scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
         result = self._ipopt(scale)(
@@ -137,6 +145,7 @@ class Prepared:
         for sign in (1.0, -1.0):
             step = np.zeros(equations.total)
             step[: equations.turning_unknowns] = sign * amplitude * stability.shape
+            step[equations.turning_unknowns : equations.unknowns] = sign * amplitude * stability.travel
             moved = replace(equations.moved(state, step), lam=state.lam)
             if equations.rows:
                 moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
@@ -148,7 +157,7 @@ class Prepared:
     def load_size(self, found: Corrected) -> float:
         """Largest elastic moment or load in the balance of a state, dimensionless."""
         loading = self.model.loading(1.0)
-        return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.couple))
+        return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.moment))
 
     def distance(self, a: State, b: State) -> float:
         """Largest angle between the rotations of two states, rad."""

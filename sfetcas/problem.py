@@ -1,7 +1,7 @@
 """The equilibrium of a model as a nonlinear program that a user can extend.
 
 Unknowns are the components of the quaternions (angles in the plane) of all rotations that are not held, and the
-displacements kept as unknowns; rows are the norms of the quaternions, the closings and the hinges.  Each element
+displacements kept as unknowns; rows are the norms of the quaternions, the closings and the joints.  Each element
 function is derived once for its type, mapped over the elements and scattered by constant matrices, so the
 effort of building does not grow with the number of elements.
 """
@@ -17,8 +17,9 @@ import numpy as np
 
 from . import interpolation, quaternion
 from .arrays import Array
+from .connections import Group
 from .equations import State
-from .joints import hinge_rows
+from .joints import by_components
 from .kernels import Kernels, chosen
 from .linear import SparseMap
 from .loading import Loading
@@ -73,6 +74,81 @@ def _reduction(model: Model) -> _Reduction:
     return _Reduction(index.reshape(-1, 2), weight.reshape(-1, 2), int(widths.sum()), first)
 
 
+def _pairs(index: Array, weight: Array) -> tuple[Array, Array, Array]:
+    """Rows, columns and weights of dense symmetric blocks over the unknowns behind components (n, width, 2)."""
+    n, width = index.shape[:2]
+    # Rotations about a held axis are the only ones with a second unknown a component.
+    used = 2 if (weight[..., 1] != 0.0).any() else 1
+    index, weight = index[..., :used], weight[..., :used]
+    shape = (n, width, width, used, used)
+    r = np.broadcast_to(index[:, None, :, :, None], shape)
+    c = np.broadcast_to(index[:, :, None, None, :], shape)
+    return r, c, weight[:, None, :, :, None] * weight[:, :, None, None, :]
+
+
+class _Link:
+    """The connections of one group in the unknowns of the program.
+
+    Attributes
+    ----------
+    index, weight : ndarray (n, width, 2)
+        Unknowns behind the components of the rotations, then of the displacements, of each connection.
+    collect : DM
+        Takes derivatives by these components to derivatives by the unknowns.
+    """
+
+    def __init__(self, problem: EquilibriumProblem, number: int, group: Group) -> None:
+        self.group = group
+        model, reduction = problem.model, problem._reduction
+        n, (turns, places, self._rows, _, loads) = len(group.names), group.kind.sizes
+        components, axes = model.element.components, model.element.axes
+        ground = (len(model.rotations.kind), len(model.segments.places))
+        turn, place = (np.where(a < 0, last, a) for a, last in zip((group.turns, group.places), ground, strict=True))
+        turning, moving = _with_ground(problem, reduction)
+        cells = turn[..., None] * components + np.arange(components), place[..., None] * axes + np.arange(axes)
+        flat = [cell.reshape(n, -1) for cell in cells]
+        self.index = np.concatenate([turning[0][flat[0]], moving[0][flat[1]]], axis=1)
+        self.weight = np.concatenate([turning[1][flat[0]], moving[1][flat[1]]], axis=1)
+        self.cells = np.concatenate(flat, axis=1)
+        q = ca.vertcat(problem._q, ca.DM([1.0, 0.0, 0.0, 0.0] if components == 4 else [0.0]))
+        u = ca.vertcat(problem.kept_displacements, ca.DM.zeros(axes))
+        self._arguments = [
+            ca.reshape(q[flat[0].ravel().tolist()], components, turns * n) if turns else ca.MX(components, 0),
+            ca.reshape(u[flat[1].ravel().tolist()], axes, places * n) if places else ca.MX(axes, 0),
+            ca.MX(ca.DM(group.data.T)),
+            ca.reshape(problem._loads[number], loads, n),
+        ]
+        self._function = by_components(group.kind).map(n)
+        energy, rows, gradient, jacobian, _ = self._call(ca.MX.zeros(self._rows, n), ca.MX.ones(1, n))
+        self.energy, self.rows, self.gradient, self.jacobian = ca.sum2(energy), rows, gradient, jacobian
+        columns = np.broadcast_to(np.arange(self.cells.size)[:, None], (self.cells.size, 2))
+        shape = (problem.x.numel(), self.cells.size)
+        self.collect = _matrix(self.index.reshape(-1, 2), columns, self.weight.reshape(-1, 2), shape)
+
+    def _call(self, lam: ca.MX, weight: ca.MX) -> Any:
+        return self._function(*self._arguments, lam, weight)
+
+    def hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
+        """Hessian of the Lagrangian's share by the components."""
+        n = len(self.group.names)
+        hessian: ca.MX = self._call(ca.reshape(lam_g, self._rows, n), ca.repmat(lam_f, 1, n))[4]
+        return hessian
+
+
+def _with_ground(problem: EquilibriumProblem, reduction: _Reduction) -> list[tuple[Array, Array]]:
+    """Index and weight of the components of rotations and of displacements, those of the ground last."""
+    model = problem.model
+    kept = model.positions.kept.ravel()
+    index = np.stack([np.where(kept < 0, 0, reduction.unknowns + kept), np.zeros_like(kept)], axis=1)
+    weight = np.stack([(kept >= 0).astype(float), np.zeros(len(kept))], axis=1)
+    nothing = [np.zeros((size, 2)) for size in (model.element.components, model.element.axes)]
+    pairs = ((reduction.index, reduction.weight), (index, weight))
+    return [
+        (np.vstack([i, none.astype(np.intp)]), np.vstack([w, none]))
+        for (i, w), none in zip(pairs, nothing, strict=True)
+    ]
+
+
 class EquilibriumProblem:
     """The nonlinear program of a model, with the means to write terms by the names of the scene.
 
@@ -93,7 +169,7 @@ class EquilibriumProblem:
             x=self.x,
             p=self.p,
             f=self._objective(),
-            g=ca.vertcat(self._norms(), self._closings(), self._hinges()),
+            g=ca.vertcat(self._norms(), self._closings(), self._linked_rows()),
             lower=np.zeros(len(self.row_names)),
             upper=np.zeros(len(self.row_names)),
             x_lower=np.full(self.x.numel(), -np.inf),
@@ -119,9 +195,10 @@ class EquilibriumProblem:
             len(positions.rows),
             self.x.numel(),
             positions.B.shape[1],
+            *(len(group.names) * group.kind.sizes[4] for group in model.connections),
         )
         self.p = ca.MX.sym("p", sum(sizes))
-        pull, held, offset, force, shift = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
+        pull, held, offset, force, shift, *self._loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
         self._pull = ca.reshape(pull, element.axes, n * points)
         self._offset, self._force, self._b = offset, force, shift
         index, weight = self._reduction.index, self._reduction.weight
@@ -132,11 +209,11 @@ class EquilibriumProblem:
         of_elements = (model.rotations.turns.ravel()[:, None] * components + np.arange(components)).ravel()
         self._cells = of_elements
         self._q_elements = ca.reshape(self._q[of_elements.tolist()], components, n * points)
-        self._stiffness = ca.MX(ca.DM(model.beams.stiffness.reshape(n * points, -1).T))
-        self._tangent = ca.MX(ca.DM(model.beams.tangent.reshape(n * points, -1).T))
+        self._stiffness = ca.MX(ca.DM(model.beams.stiffness.reshape(n * points, element.stiffnesses).T))
+        self._tangent = ca.MX(ca.DM(model.beams.tangent.reshape(n * points, element.axes).T))
         norms = [f"norm of rotation {i}" for i in self._unit]
-        hinges = [f"hinge {i}, {c}" for i in range(len(model.rotations.hinges)) for c in "ab"]
-        self.row_names = (*norms, *positions.rows, *hinges)
+        self.row_names = (*norms, *positions.rows, *(row for group in model.connections for row in group.rows))
+        self._links = [_Link(self, i, group) for i, group in enumerate(model.connections)]
 
     @functools.cached_property
     def _unit(self) -> list[int]:
@@ -162,8 +239,12 @@ class EquilibriumProblem:
     # -- functions and first derivatives ---------------------------------------------------------
 
     def _objective(self) -> ca.MX:
-        energy = self._map("energy")(self._q_elements, *self._data)
-        return ca.sum2(energy) - ca.dot(self._force, self.x)
+        energy = ca.MX(0)
+        if len(self.model.rotations.turns):
+            energy = ca.sum2(self._map("energy")(self._q_elements, *self._data))
+        for link in self._links:
+            energy += link.energy
+        return energy - ca.dot(self._force, self.x)
 
     @functools.cached_property
     def _collect(self) -> ca.DM:
@@ -173,8 +254,13 @@ class EquilibriumProblem:
         return _matrix(index, columns, weight, (self.x.numel(), len(index)))
 
     def _gradient(self) -> ca.MX:
-        gradient = self._map("gradient")(self._q_elements, *self._data)[1]
-        return ca.densify(ca.mtimes(self._collect, ca.vec(gradient)) - self._force)
+        total = -self._force
+        if len(self.model.rotations.turns):
+            gradient = self._map("gradient")(self._q_elements, *self._data)[1]
+            total += ca.mtimes(self._collect, ca.vec(gradient))
+        for link in self._links:
+            total += ca.mtimes(link.collect, ca.vec(link.gradient))
+        return ca.densify(total)
 
     @functools.cached_property
     def _to_rows(self) -> ca.DM:
@@ -194,6 +280,8 @@ class EquilibriumProblem:
     def _closings(self) -> ca.MX:
         if not self.model.positions.rows:
             return ca.MX(0, 1)
+        if not len(self.model.rotations.turns):
+            return ca.mtimes(_dm(self.model.positions.W), self.x[self._reduction.unknowns :]) + self._offset
         reach = self._map("reach")(self._q_elements, self._tangent)
         turning = self._reduction.unknowns
         kept = ca.mtimes(_dm(self.model.positions.W), self.x[turning:])
@@ -204,29 +292,8 @@ class EquilibriumProblem:
         adder = _matrix(rows, columns, np.ones(len(rows)), (len(self._unit), self.x.numel()))
         return ca.mtimes(adder, self.x**2) - 1.0 if self._unit else ca.MX(0, 1)
 
-    @functools.cached_property
-    def _hinge(self) -> ca.Function:
-        q, normals, lam = ca.SX.sym("q", 8), ca.SX.sym("normals", 3, 2), ca.SX.sym("lam", 2)
-        rows = hinge_rows(ca.vertsplit(q[:4]), ca.vertsplit(q[4:]), normals)
-        jacobian, hessian = ca.jacobian(rows, q), ca.hessian(ca.dot(lam, rows), q)[0]
-        outputs = [rows, ca.densify(jacobian), ca.densify(hessian)]
-        return ca.Function("hinge_row", [q, normals, lam], outputs).map(len(self.model.rotations.hinges))
-
-    @functools.cached_property
-    def _hinge_cells(self) -> Array:
-        return np.asarray(
-            (self.model.rotations.hinges[:, :, None] * 4 + np.arange(4)).reshape(len(self.model.rotations.hinges), 8)
-        )
-
-    def _hinge_call(self, lam: ca.MX | None = None) -> Any:
-        n = len(self.model.rotations.hinges)
-        q = ca.reshape(self._q[self._hinge_cells.ravel().tolist()], 8, n)
-        normals = ca.MX(ca.DM(self.model.rotations.hinge_axes.reshape(2 * n, 3).T))
-        result: Any = self._hinge(q, normals, ca.MX.zeros(2, n) if lam is None else ca.reshape(lam, 2, n))
-        return result
-
-    def _hinges(self) -> ca.MX:
-        return ca.vec(self._hinge_call()[0]) if len(self.model.rotations.hinges) else ca.MX(0, 1)
+    def _linked_rows(self) -> ca.MX:
+        return ca.vertcat(ca.MX(0, 1), *(ca.vec(link.rows) for link in self._links if link.group.rows))
 
     def _scattered(self, parts: list[tuple[Array, Array, Array, ca.MX]], shape: tuple[int, int]) -> ca.MX:
         """Sparse matrix from (row, column, weight, values) with several entries (…, k) for each value."""
@@ -246,7 +313,7 @@ class EquilibriumProblem:
         return ca.MX(sparsity, ca.mtimes(adder, ca.vertcat(*[ca.vec(v) for _, _, _, v in parts])))
 
     def _jacobian(self) -> ca.MX:
-        model, positions = self.model, self.model.positions
+
         blocks, width = [], self.x.numel()
         if self._unit:
             rows, columns = self._norm_parts
@@ -254,20 +321,24 @@ class EquilibriumProblem:
             blocks.append(self._scattered(norm, (len(self._unit), width)))
         if positions.rows:
             blocks.append(self._closing_jacobian())
-        if len(model.rotations.hinges):
-            jacobian = self._hinge_call()[1]
-            cells, n = self._hinge_cells, len(model.rotations.hinges)
-            labels = np.arange(2 * n).reshape(n, 1, 2, 1)
-            index, weight = self._reduction.index[cells], self._reduction.weight[cells]
-            shape = (n, 8, 2, 2)
-            r = np.broadcast_to(labels, shape)
-            c, w = (np.broadcast_to(a[:, :, None, :], shape) for a in (index, weight))
-            blocks.append(self._scattered([(r, c, w, jacobian)], (2 * n, width)))
+        for link in self._links:
+            (n, components), count = link.cells.shape, link.group.kind.sizes[2]
+            if count:
+                labels = np.arange(n * count).reshape(n, 1, count, 1)
+                shape = (n, components, count, 2)
+                r = np.broadcast_to(labels, shape)
+                c, w = (np.broadcast_to(a[:, :, None, :], shape) for a in (link.index, link.weight))
+                blocks.append(self._scattered([(r, c, w, link.jacobian)], (n * count, width)))
         return ca.vertcat(*blocks) if blocks else ca.MX(0, width)
 
     def _closing_jacobian(self) -> ca.MX:
         model, positions = self.model, self.model.positions
         axes, turning = model.element.axes, self._reduction.unknowns
+        if not len(model.rotations.turns):
+            w_map = positions.W
+            ones = ca.MX.ones(len(w_map.row))
+            part = (w_map.row, turning + w_map.column, w_map.value, ones)
+            return self._scattered([part], (len(positions.rows), self.x.numel()))
         jacobian = self._map("reach_jacobian")(self._q_elements, self._tangent)[1]
         n, width = model.rotations.turns.shape[0], model.rotations.turns.shape[1] * model.element.components
         cells = self._cells.reshape(n, width)
@@ -300,27 +371,27 @@ class EquilibriumProblem:
             constant = ca.mtimes(self._to_rows.T, lam_g[norms : norms + closings])
             spread = np.repeat(np.arange(n), points)
             pull += ca.reshape(constant, element.axes, n)[:, spread.tolist()]
-        hessian = self._map("hessian")(self._q_elements, lam_f * self._stiffness, self._tangent, pull)
-        parts = [(*self._pairs(self._cells.reshape(n, -1)), hessian)]
+        parts: list[tuple[Array, Array, Array, ca.MX]] = []
+        if n:
+            hessian = self._map("hessian")(self._q_elements, lam_f * self._stiffness, self._tangent, pull)
+            cells = self._cells.reshape(n, -1)
+            parts.append((*_pairs(self._reduction.index[cells], self._reduction.weight[cells]), hessian))
         if norms:
             rows, columns = self._norm_parts
             parts.append((columns, columns, np.full(len(rows), 2.0), lam_g[rows.tolist()]))
-        if len(model.rotations.hinges):
-            own = self._hinge_call(lam_g[norms + closings :])[2]
-            parts.append((*self._pairs(self._hinge_cells), own))
+        first = norms + closings
+        for link in self._links:
+            own = link.hessian(lam_f, lam_g[first : first + len(link.group.rows)])
+            parts.append((*_pairs(link.index, link.weight), own))
+            first += len(link.group.rows)
         return self._scattered(parts, (self.x.numel(), self.x.numel()))
 
-    def _pairs(self, cells: Array) -> tuple[Array, Array, Array]:
-        """Rows, columns and weights of dense symmetric blocks over the unknowns behind their cells."""
-        index, weight = self._reduction.index[cells], self._reduction.weight[cells]
-        n, width = cells.shape
-        # Rotations about a held axis are the only ones with a second unknown a component.
-        used = 2 if (weight[..., 1] != 0.0).any() else 1
-        index, weight = index[..., :used], weight[..., :used]
-        shape = (n, width, width, used, used)
-        r = np.broadcast_to(index[:, None, :, :, None], shape)
-        c = np.broadcast_to(index[:, :, None, None, :], shape)
-        return r, c, weight[:, None, :, :, None] * weight[:, :, None, None, :]
+    @functools.cached_property
+    def kept_displacements(self) -> ca.MX:
+        """Displacements of all places whose components are unknowns or prescribed, (places * axes,); others wrong."""
+        positions, turning = self.model.positions, self._reduction.unknowns
+        prescribed = ca.mtimes(_dm(positions.B), self._b)
+        return ca.mtimes(_dm(positions.Y), self.x[turning:]) + prescribed if positions.unknowns else prescribed
 
     # -- expressions by place ---------------------------------------------------------------------
 
@@ -329,6 +400,8 @@ class EquilibriumProblem:
         model, positions, axes = self.model, self.model.positions, self.model.element.axes
         rows = np.arange(node * axes, (node + 1) * axes)
         e = positions.E.rows(rows)
+        if not len(model.rotations.turns):
+            return ca.densify(self.kept_displacements[rows.tolist()])
         reach = self._map("reach")(self._q_elements, self._tangent)
         constant = ca.DM(-(e @ self._rest)) + ca.mtimes(_dm(positions.B.rows(rows)), self._b)
         kept = ca.mtimes(_dm(positions.Y.rows(rows)), self.x[self._reduction.unknowns :])
@@ -378,9 +451,10 @@ class EquilibriumProblem:
         force = np.zeros(self.x.numel())
         if not model.space:
             free = np.flatnonzero(model.widths)
-            force[self._reduction.first[free]] = loading.couple[free]
+            force[self._reduction.first[free]] = loading.moment[free, 2]
         force[self._reduction.unknowns :] = positions.Y.T @ loading.force.ravel()
-        return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift])
+        loads = [load.ravel() for load in loading.loads]
+        return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift, *loads])
 
     def unknowns(self, state: State) -> Array:
         """The unknowns of the program at a state."""
@@ -404,7 +478,7 @@ class EquilibriumProblem:
 
     @property
     def rows_of_equations(self) -> slice:
-        """The rows that are also rows of the stationarity equations: closings and hinges."""
+        """The rows that are also rows of the stationarity equations: closings and joints."""
         return slice(len(self._unit), len(self.row_names))
 
     def multipliers(self, state: State) -> Array:

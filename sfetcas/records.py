@@ -18,6 +18,7 @@ __all__ = [
     "Direction",
     "Fraction",
     "Named",
+    "NotNegative",
     "Number",
     "Numbers",
     "Positive",
@@ -101,6 +102,12 @@ def _positive(value: float) -> float:
     return value
 
 
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise ValueError(f"found {say(value)}, accepted: zero or a number above zero")
+    return value
+
+
 def _vector(value: Any, accepted: str = "[x, y] or [x, y, z]") -> tuple[float, float, float]:
     entries = tuple(number(entry) for entry in listed(value, accepted))
     if len(entries) not in (2, 3):
@@ -144,6 +151,9 @@ Number = Annotated[float, BeforeValidator(number)]
 
 Positive = Annotated[float, BeforeValidator(number), AfterValidator(_positive)]
 """A finite number above zero."""
+
+NotNegative = Annotated[float, BeforeValidator(number), AfterValidator(_not_negative)]
+"""A number of zero or above."""
 
 Vector = Annotated[tuple[float, float, float], BeforeValidator(_vector)]
 """Two or three finite numbers, kept as three (z = 0 where it is left out)."""

@@ -13,15 +13,18 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_v
 
 from .dimension import out_of_plane
 from .errors import SceneError
-from .later import SPACE_MOMENT, Staged, refusal
+from .later import Staged
 from .loads import History, Load, Motion
+from .matrices import check_rigid_motion
+from .quaternion import matrix
 from .records import Fraction, Named, Number, Numbers, Vector, number, say, unknown
 from .sections import CrossSection
 from .shapes import CenterLine, place
-from .structure import Member, Node, hinged
-from .supports import check_floating, check_motion, check_motions_once
+from .springs import Spring
+from .structure import Member, Node, released, unit
+from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 
-__all__ = ["Analysis", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene"]
+__all__ = ["Analysis", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
 
 
 def _accuracy(value: float) -> float:
@@ -103,7 +106,7 @@ class Scene(Staged):
     title, source : free text
     dimension : plane (x-y), space, or auto: plane where everything lies in x-y
     gravity : (3,), m/s2, fixed axes
-    sections, nodes, members, loads, motions, histories : tables by name, read-only
+    sections, nodes, members, springs, loads, motions, histories : tables by name, read-only
     analysis : what is asked for
     expect : what is known about the answer
 
@@ -132,6 +135,7 @@ class Scene(Staged):
     sections: Named[CrossSection] = Field(default_factory=dict)
     nodes: Named[Node] = Field(default_factory=dict)
     members: Named[Member] = Field(default_factory=dict)
+    springs: Named[Spring] = Field(default_factory=dict)
     loads: Named[Load] = Field(default_factory=dict)
     motions: Named[Motion] = Field(default_factory=dict)
     histories: Named[History] = Field(default_factory=dict)
@@ -149,7 +153,7 @@ class Scene(Staged):
         """The unloaded centre line of each member, by name."""
         lines = {}
         for name, member in self.members.items():
-            start, end = (self.nodes[node].position for node in member.nodes)
+            start, end = (self.nodes[node].position for node in (member.nodes[0], member.nodes[-1]))
             lines[name] = place(member.shape, start, end, member.b2, ("members", name))
         return MappingProxyType(lines)
 
@@ -177,7 +181,7 @@ class Scene(Staged):
 
     @cached_property
     def _out_of_plane(self) -> tuple[tuple[str, ...], str] | None:
-        parts = self.nodes, self.center_lines, self.loads, self.motions, self.gravity
+        parts = self.nodes, self.center_lines, self.loads, self.motions, self.springs, self.gravity
         return out_of_plane(*parts)
 
 
@@ -202,7 +206,8 @@ def _check_driven(scene: Scene) -> None:
     for name, motion in scene.motions.items():
         _known(motion.node, scene.nodes, "nodes", "motions", name, "node")
         _known(motion.history, scene.histories, "histories", "motions", name, "history")
-    if not scene.loads and not scene.motions and scene.gravity is None:
+    pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
+    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
         raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
 
 
@@ -212,11 +217,37 @@ def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> No
 
 
 def _check_axes(scene: Scene) -> None:
-    used = hinged(scene.nodes, scene.members)
+    hinges, slides, universals = (
+        released(scene.nodes, scene.members, ends) for ends in (("hinge",), ("slider", "cylindrical"), ("universal",))
+    )
     for name, node in scene.nodes.items():
-        if node.axis != (0.0, 0.0, 1.0) and name not in used:
+        used = name in hinges or name in universals or node.has_hinge
+        if node.axis != (0.0, 0.0, 1.0) and not used:
             message = "neither the support nor the joint nor a member end released here is a hinge with this axis"
             raise SceneError(message, ("nodes", name, "axis"))
+        if node.direction is not None and not node.slides and name not in slides:
+            message = f"only a slider has a direction, and the support is {node.support!r}"
+            raise SceneError(message, ("nodes", name, "direction"))
+        if node.direction is None and name in slides:
+            message = "the key 'direction' is missing: a member end slides along its node"
+            raise SceneError(message, ("nodes", name))
+        if node.support != "slider" and node.rotation != "fixed":
+            found = f"found {node.rotation!r}, accepted: only for a slider, and the support is {node.support!r}"
+            raise SceneError(found, ("nodes", name, "rotation"))
+        _check_universal(name, node, name in universals)
+
+
+def _check_universal(name: str, node: Node, end: bool) -> None:
+    if not node.is_universal and not end:
+        if node.axis2 is not None:
+            message = "neither the support nor the joint nor a member end released here is a universal joint"
+            raise SceneError(message, ("nodes", name, "axis2"))
+        return
+    if node.axis2 is None:
+        raise SceneError("the key 'axis2' is missing: a universal joint has an axis on either side", ("nodes", name))
+    if abs(np.dot(unit(node.axis), unit(node.axis2))) > 1e-9:
+        message = f"found {say(node.axis2)}, accepted: a direction normal to the key 'axis', {say(node.axis)}"
+        raise SceneError(message, ("nodes", name, "axis2"))
 
 
 def _check_dimension(scene: Scene) -> None:
@@ -227,36 +258,74 @@ def _check_dimension(scene: Scene) -> None:
 
 def _check_sections(scene: Scene) -> None:
     for name, member in scene.members.items():
-        missing = list(scene.sections[member.section].missing(_needed(scene, name)))
+        missing = [] if member.section is None else list(scene.sections[member.section].missing(_needed(scene, name)))
         if missing:
             why = f"members.{name} needs it in {scene.resolved_dimension} ({scene.dimension_reason})"
             if missing[0] == "rhoA":
                 why = "gravity acts on the mass per length"
-            raise SceneError(f"the key {missing[0]!r} is missing: {why}", ("sections", member.section))
+            raise SceneError(f"the key {missing[0]!r} is missing: {why}", ("sections", str(member.section)))
+        if member.stiffness is not None and member.mass is None and scene.gravity is not None:
+            raise SceneError("the key 'mass' is missing: gravity acts on the member", ("members", name))
 
 
 def _needed(scene: Scene, member: str) -> tuple[str, ...]:
     in_plane = ("EI3",) if scene.center_lines[member].bending_axis == 3 else ("EI2",)
     stiffness = in_plane if scene.resolved_dimension == "plane" else ("EI2", "EI3", "GJ")
-    return stiffness if scene.gravity is None else (*stiffness, "rhoA")
+    needed: tuple[str, ...] = () if scene.members[member].type == "rigid" else stiffness
+    return needed if scene.gravity is None else (*needed, "rhoA")
 
 
-def _check_moments(scene: Scene) -> None:
-    for name, load in scene.loads.items():
-        if load.type != "moment":
+def _check_bodies(scene: Scene) -> None:
+    for name, member in scene.members.items():
+        if member.stiffness is None:
             continue
-        if load.node is not None and (joint := scene.nodes[load.node].joint) != "rigid":
+        try:
+            places = np.array([scene.nodes[node].position for node in member.nodes])
+            frame = matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0]
+            check_rigid_motion(member.stiffness, (places - places[0]) @ frame)
+        except SceneError as error:
+            raise error.within("members", name) from None
+
+
+def _check_loads(scene: Scene) -> None:
+    for name, load in scene.loads.items():
+        kind = "flexible" if load.member is None else scene.members[load.member].type
+        condensed = load.member is not None and scene.members[load.member].stiffness is not None
+        if kind == "small" and (condensed or load.type == "moment" or load.frame == "follower"):
+            accepted = "a node there, or a fixed force or distributed load on a small member with a section"
+            raise SceneError(f"found the small member {load.member!r}, accepted: {accepted}", ("loads", name, "member"))
+        joint = "rigid" if load.node is None else scene.nodes[load.node].joint
+        if joint != "rigid" and load.type == "moment":
             message = f"node {load.node!r} has no rotation of its own for a moment, as its joint is a {joint}"
             raise SceneError(message, ("loads", name, "node"))
-        later = refusal(SPACE_MOMENT)
-        if later and scene.resolved_dimension == "space":
-            raise SceneError(f"{later}; the scene is in space as {scene.dimension_reason}", ("loads", name, "type"))
+        if joint != "rigid" and load.frame == "follower":
+            message = f"node {load.node!r} has no rotation of its own to follow, as its joint is a {joint}"
+            raise SceneError(message, ("loads", name, "node"))
+
+
+def _check_springs(scene: Scene) -> None:
+    for name, spring in scene.springs.items():
+        _known(spring.node, scene.nodes, "nodes", "springs", name, "node")
+        _known(spring.to, scene.nodes, "nodes", "springs", name, "to")
+        for party in spring.between or ():
+            ends = [n for n, m in scene.members.items() if spring.node in m.nodes]
+            if party not in ("ground", spring.node, *ends):
+                message = unknown(party, ("ground", spring.node, *ends), "parties")
+                raise SceneError(message, ("springs", name, "between"))
+        own = spring.between is None or spring.node in spring.between
+        if spring.type == "rotational" and own and scene.nodes[spring.node].joint != "rigid":
+            joint = scene.nodes[spring.node].joint
+            message = f"node {spring.node!r} has no rotation of its own, as its joint is a {joint}; name the members"
+            raise SceneError(message, ("springs", name, "between"))
 
 
 def _check_motions(scene: Scene) -> None:
     reason = f"the scene is in space ({scene.dimension_reason})"
     for name, motion in scene.motions.items():
         try:
+            if motion.between is not None:
+                check_driven_joint(motion, scene.nodes[motion.node], scene.members)
+                continue
             check_motion(motion, scene.nodes[motion.node], scene.resolved_dimension, reason)
         except SceneError as error:
             raise error.within("motions", name) from None
@@ -264,11 +333,11 @@ def _check_motions(scene: Scene) -> None:
 
 
 def _check_supports(scene: Scene) -> None:
-    check_floating(scene.nodes, scene.members, scene.motions, scene.resolved_dimension)
+    check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
 
 
 def _check_expect(scene: Scene) -> None:
-    tables = {"nodes": scene.nodes, "reactions": scene.nodes, "members": scene.members}
+    tables = {"nodes": scene.nodes, "reactions": scene.nodes, "members": scene.members, "springs": scene.springs}
     for i, expect in enumerate(scene.expect):
         kind, _, rest = expect.quantity.partition(".")
         if kind in tables:
@@ -284,7 +353,9 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_axes,
     _check_dimension,
     _check_sections,
-    _check_moments,
+    _check_bodies,
+    _check_loads,
+    _check_springs,
     _check_motions,
     _check_supports,
     _check_expect,

@@ -7,13 +7,15 @@ member between two places; most members are one segment.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Index
+from .arrays import Array, Index
 from .mesh import Mesh
+from .rotations import end_joints
 from .scene import Scene
 
 __all__ = ["Segment", "Segments", "cut_members"]
@@ -62,9 +64,32 @@ class Segments:
         """Number of a place."""
         return self._number[name]
 
-    @property
+    @functools.cached_property
     def _number(self) -> dict[str, int]:
         return {name: i for i, name in enumerate(self.places)}
+
+
+def _kept_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
+    """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
+    inner = range(1, len(cuts) - 1)
+    following = [load for load in scene.loads.values() if load.member == member and load.follows]
+    if any(load.type == "distributed" for load in following):
+        return list(inner)
+    wanted = {int(np.argmin(np.abs(cuts - (load.at or 0.0)))) for load in following}
+    return [cut for cut in inner if cut in wanted]
+
+
+def _sprung(scene: Scene) -> Iterator[str]:
+    """Nodes whose displacement springs and small members act upon, and first nodes of what follows its section."""
+    for spring in scene.springs.values():
+        if spring.type == "translational":
+            yield from (node for node in (spring.node, spring.to) if node is not None)
+    for member in scene.members.values():
+        if member.type == "small":
+            yield from member.nodes
+    for load in scene.loads.values():
+        if load.follows and load.member is not None:
+            yield from scene.members[load.member].nodes
 
 
 def cut_members(scene: Scene, mesh: Mesh) -> Segments:
@@ -74,13 +99,26 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     parts: list[Segment] = []
     begin = 0
     for name, member in scene.members.items():
-        for i, (node, release) in enumerate(zip(member.nodes, member.release, strict=True)):
+        for i, (node, joint) in enumerate(end_joints(scene, member)):
             ends[name, i] = node
+            if joint in ("slider", "cylindrical"):
+                ends[name, i] = f"{node} at {name}"
+                places.append(ends[name, i])
+                kept |= {node, ends[name, i]}
         if name not in mesh.cuts:
             continue
-        count = len(mesh.cuts[name]) - 1
-        parts.append(Segment(name, slice(begin, begin + count), ends[name, 0], ends[name, 1]))
-        begin += count
+        cuts = mesh.cuts[name]
+        stops = [0, *_kept_cuts(scene, name, cuts), len(cuts) - 1]
+        here = ends[name, 0]
+        for a, b in zip(stops, stops[1:], strict=False):
+            there = ends[name, 1] if b == len(cuts) - 1 else f"{name} at {cuts[b]:.12g}"
+            if b < len(cuts) - 1:
+                places.append(there)
+                kept.add(there)
+            parts.append(Segment(name, slice(begin + a, begin + b), here, there))
+            here = there
+        begin += len(cuts) - 1
+    kept |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
     return Segments(tuple(places), frozenset(kept), tuple(parts), owner, ends)

@@ -33,7 +33,7 @@ class Certificate:
     ----------
     residual : float
         Largest out-of-balance force or moment over the largest that was added up, or gap over the length scale.
-    stable : bool or "neutral"
+    stable : bool, "neutral", or "not defined" for loads without potential
         Inertia of the energy on the closings.
     negative : int
         Its negative eigenvalues.
@@ -55,7 +55,8 @@ class Certificate:
     def to_dict(self) -> dict[str, Any]:
         """As in the JSON answer."""
         smallest = self.smallest if np.isfinite(self.smallest) else None
-        answer = {"residual": self.residual, "stable": self.stable, "negative": self.negative, "smallest": smallest}
+        negative = None if self.stable == "not defined" else self.negative
+        answer = {"residual": self.residual, "stable": self.stable, "negative": negative, "smallest": smallest}
         return {**answer, "error_estimate": self.error_estimate}
 
 

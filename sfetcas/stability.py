@@ -38,19 +38,22 @@ class Stability:
 
     Attributes
     ----------
-    stable : bool or "neutral"
+    stable : bool, "neutral", or "not defined" for loads without potential
     negative : int
         Eigenvalues below zero: independent ways out.
     smallest : float
         Rayleigh quotient of the escape shape by the integral of its square, dimensionless.
     shape : ndarray
         Escape shape: the turning unknowns of the smallest eigenvalue, largest entry 1.
+    travel : ndarray
+        The displacements kept as unknowns in it.
     """
 
     stable: bool | str
     negative: int
     smallest: float
     shape: Array
+    travel: Array
 
 
 class StabilityTest:
@@ -58,65 +61,99 @@ class StabilityTest:
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
-        n = equations.turning_unknowns
-        self._n = n
-        self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
-        self._h_row, self._h_column = equations.row[self._in_h], equations.column[self._in_h]
-        self._in_a = np.flatnonzero((equations.row >= equations.unknowns) & (equations.column < n))
-        self._combine = _left_null_space(equations)
+        # Displacements that springs and bodies act upon count as rotations do; all others follow from the closings.
+        self._chosen = np.concatenate([np.arange(equations.turning_unknowns), equations.elastic_displacements])
+        self._n = n = len(self._chosen)
+        place = np.full(equations.total, -1, dtype=np.intp)
+        place[self._chosen] = np.arange(n)
+        row, column = place[equations.row], place[equations.column]
+        self._in_h = np.flatnonzero((row >= 0) & (column >= 0))
+        self._h_row, self._h_column = row[self._in_h], column[self._in_h]
+        self._in_a = np.flatnonzero((equations.row >= equations.unknowns) & (column >= 0))
+        self._a_column = column[self._in_a]
         self._diagonal = np.flatnonzero(self._h_row == self._h_column)
+
+    @functools.cached_property
+    def _combine(self) -> Array:
+        return _left_null_space(self.equations)
 
     @functools.cached_property
     def weight(self) -> Array:
         """The weight M of the module's docstring, (turning unknowns,)."""
+        return self.equations.mass * self._softest
+
+    @functools.cached_property
+    def _weights(self) -> Array:
+        """The weight of all that counts: displacements have next to none."""
+        count = len(self.equations.elastic_displacements)
+        return np.concatenate([self.weight, np.full(count, LIGHT * self._softest)])
+
+    @functools.cached_property
+    def _masses(self) -> Array:
+        return np.concatenate([self.equations.mass, np.full(len(self.equations.elastic_displacements), LIGHT)])
+
+    @functools.cached_property
+    def _softest(self) -> float:
         model = self.equations.model
         x, softest = np.linspace(0.0, 1.0, 5), np.inf
         for name, member in model.scene.members.items():
             line = model.scene.center_lines[name]
-            values = model.scene.sections[member.section].stiffness(x)
+            if member.section is None or member.type == "rigid":
+                continue
+            values = model.scene.sections[str(member.section)].stiffness(x)
             values = values if model.space else values[:, [1 if line.bending_axis == 2 else 2]]
             softest = min(softest, float(np.nanmin(values)) / line.length**2)
-        return self.equations.mass * softest / model.scales.moment * model.scales.length
+        softest = softest if np.isfinite(softest) else model.scales.moment / model.scales.length
+        return softest / model.scales.moment * model.scales.length
 
     def _rows(self, point: Point) -> Array:
         """The closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
         equations = self.equations
         rows = np.zeros((equations.rows, self._n))
-        places = equations.row[self._in_a] - equations.unknowns, equations.column[self._in_a]
-        rows[places] = point.entries[self._in_a]
-        return (self._combine.T @ rows) / np.sqrt(self.weight)
+        rows[equations.row[self._in_a] - equations.unknowns, self._a_column] = point.entries[self._in_a]
+        return (self._combine.T @ rows) / np.sqrt(self._weights)
 
     def _weighted(self, point: Point) -> Array:
-        root = np.sqrt(self.weight)
+        root = np.sqrt(self._weights)
         return np.asarray(point.entries[self._in_h] / (root[self._h_row] * root[self._h_column]))
 
     def test(self, point: Point) -> Stability:
         """Inertia, smallest eigenvalue and escape shape at an equilibrium."""
+        equations = self.equations
+        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
         if self._n == 0:
-            return Stability(True, 0, np.inf, np.zeros(0))
-        entries, rows = self._weighted(point), self._rows(point)
+            return Stability(True, 0, np.inf, np.zeros(0), nothing)
+        entries = self._weighted(point)
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
-        find = self._dense if self._n <= DENSE else self._sparse
-        values, vector, negative = find(point, entries, rows, limit)
+        find = self._dense if self._is_dense else self._sparse
+        values, vector, negative = find(point, entries, limit)
         if not len(values):
-            return Stability(True, 0, np.inf, np.zeros(self._n))
+            return Stability(True, 0, np.inf, np.zeros(turning), nothing)
         stable: bool | str = bool(values[0] > limit)
         if negative == 0 and not stable:
             stable = "neutral"
-        shape = vector / np.sqrt(self.weight)
-        quotient = float(values[0]) * float(vector @ vector) / float(shape @ (self.equations.mass * shape))
-        peak = shape[np.argmax(np.abs(shape))]
-        return Stability(stable, negative, quotient, shape / peak)
+        shape = vector / np.sqrt(self._weights)
+        quotient = float(values[0]) * float(vector @ vector) / float(shape @ (self._masses * shape))
+        turned = shape[:turning] if np.abs(shape[:turning]).max(initial=0.0) > 0.0 else shape
+        shape = shape / turned[np.argmax(np.abs(turned))]
+        travel = nothing.copy()
+        travel[equations.elastic_displacements - turning] = shape[turning:]
+        return Stability(stable, negative, quotient, shape[:turning], travel)
 
     def negative(self, point: Point) -> int:
         """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
         if self._n == 0:
             return 0
-        entries, rows = self._weighted(point), self._rows(point)
+        entries = self._weighted(point)
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
-        if self._n > DENSE:
-            return self._below(entries, rows, -limit)
-        return int((np.linalg.eigvalsh(self._projected(entries, rows)[0]) < -limit).sum())
+        if not self._is_dense:
+            return self._below(point, entries, -limit)
+        return int((np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]) < -limit).sum())
+
+    @property
+    def _is_dense(self) -> bool:
+        # Displacements without stiffness of their own make the sparse factorisation without pivots break down.
+        return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.elastic_displacements) else DENSE)
 
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
         """The full matrix on the null space of the rows, and a basis of that."""
@@ -128,25 +165,28 @@ class StabilityTest:
         basis = right[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
         return basis.T @ h @ basis, basis
 
-    def _dense(self, point: Point, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
-        projected, basis = self._projected(entries, rows)
+    def _dense(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
+        projected, basis = self._projected(entries, self._rows(point))
         values, vectors = np.linalg.eigh(projected)
         if not len(values):
             return values, np.zeros(self._n), 0
         return values, basis @ vectors[:, 0], int((values < -limit).sum())
 
-    def _sparse(self, point: Point, entries: Array, rows: Array, limit: float) -> tuple[Array, Array, int]:
-        negative = self._below(entries, rows, -limit)
+    def _sparse(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
+        negative = self._below(point, entries, -limit)
         shift = -limit
-        while negative and self._below(entries, rows, shift) > 0:
+        while negative and self._below(point, entries, shift) > 0:
             shift *= 8.0 if shift < -0.1 else 1000.0
         values, vector = self._subspace(point, entries, shift)
         if negative == 0 and values[0] < -limit:
             values[0] = -limit
         return values, vector, negative
 
-    def _below(self, entries: Array, rows: Array, shift: float) -> int:
+    def _below(self, point: Point, entries: Array, shift: float) -> int:
         """Number of eigenvalues on the null space of the rows below the shift."""
+        if self.equations.rows > MANY_ROWS or len(self.equations.elastic_displacements):
+            return self._below_bordered(point, shift)
+        rows = self._rows(point)
         shifted = entries.copy()
         shifted[self._diagonal] -= shift
         matrix = ca.DM(self._pattern, shifted)
@@ -156,6 +196,35 @@ class StabilityTest:
         schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
         values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
         return int(self._ldl.neig(matrix)) - int((values < -RANK * np.abs(values).max()).sum())
+
+    def _below_bordered(self, point: Point, shift: float) -> int:
+        """The same from the whole Newton matrix, with closings and displacements very slightly soft.
+
+        Each row of the closings adds a negative eigenvalue.  The softness moves an eigenvalue by its share of the
+        stiffness; rounding by its inverse: both stay below a millionth.
+        """
+        equations = self.equations
+        entries, diagonal = point.entries.copy(), equations.diagonal
+        entries[diagonal[self._chosen]] -= shift * self._weights
+        size = float(np.abs(entries[diagonal[: equations.turning_unknowns]]).max(initial=1.0))
+        rest = np.setdiff1d(np.arange(equations.unknowns), self._chosen)
+        entries[diagonal[rest]] += SOFT * self._softest
+        entries[diagonal[equations.unknowns :]] -= SOFT / size
+        matrix = ca.DM(self._bordered_pattern, entries)
+        self._bordered.nfact(matrix)
+        return int(self._bordered.neig(matrix)) - equations.rows
+
+    @functools.cached_property
+    def _bordered_pattern(self) -> ca.Sparsity:
+        equations = self.equations
+        pointers = np.searchsorted(equations.column, np.arange(equations.total + 1)).tolist()
+        return ca.Sparsity(equations.total, equations.total, pointers, equations.row.tolist())
+
+    @functools.cached_property
+    def _bordered(self) -> ca.Linsol:
+        solver = ca.Linsol("bordered_inertia", "ldl", self._bordered_pattern)
+        solver.sfact(ca.DM(self._bordered_pattern, 1.0))
+        return solver
 
     @functools.cached_property
     def _pattern(self) -> ca.Sparsity:
@@ -174,17 +243,18 @@ class StabilityTest:
         The Newton matrix, shifted, keeps the vectors on the closings; it is as sparse as that of a solve.
         """
         equations, n = self.equations, self._n
-        root = np.sqrt(self.weight)[:, None]
+        root = np.sqrt(self._weights)[:, None]
         block = np.random.default_rng(0).standard_normal((n, min(4, n)))
-        padding = np.zeros((equations.total - n, block.shape[1]))
+        loads = np.zeros((equations.total, block.shape[1]))
         smallest, starts = np.array([np.inf]), np.searchsorted(self._h_column, np.arange(n))
         for count in range(60):
             shifted = point.entries.copy()
-            shifted[equations.diagonal[:n]] -= shift * self.weight
+            shifted[equations.diagonal[self._chosen]] -= shift * self._weights
             # A tiny negative diagonal keeps redundant rows from making the matrix singular.
             shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
             equations.solver.factor(shifted)
-            block = root * equations.solver.solve(np.vstack([root * block, padding]))[:n]
+            loads[self._chosen] = root * block
+            block = root * equations.solver.solve(loads)[self._chosen]
             block = np.linalg.qr(block)[0]
             # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
             product = np.add.reduceat(entries[:, None] * block[self._h_row], starts, axis=0)
@@ -199,6 +269,18 @@ class StabilityTest:
         return smallest, block[:, 0]
 
 
+DENSE_WITH_TRAVEL = 500
+"""The same where displacements take part."""
+
+MANY_ROWS = 150
+"""From this many closings on their dense complement costs more than the bordered matrix (measured)."""
+
+LIGHT = 1e-3
+"""Weight of a displacement over the length scale beside that of a rotation along the length."""
+
+SOFT = 1e-9
+"""Softness of closings in the bordered matrix, and stiffness of displacements, beside the rest."""
+
 RANK = 1e-10
 """Singular values below this, relative to the largest, are zero."""
 
@@ -207,6 +289,7 @@ def _left_null_space(equations: Equations) -> Array:
     """Combinations of the rows in which no displacement appears, (rows, combinations)."""
     w = np.zeros((equations.rows, equations.displacement_unknowns))
     w[: len(equations.model.positions.rows)] = equations.model.positions.W.full()
+    w = np.delete(w, equations.elastic_displacements - equations.turning_unknowns, axis=1)
     if not w.shape[1]:
         return np.eye(equations.rows)
     left, sizes, _ = np.linalg.svd(w)

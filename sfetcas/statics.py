@@ -222,11 +222,12 @@ class _Run:
         order = ELEMENTS.index(name) + 1
         # A coarser turning an element for low orders: they need more elements to be near at all.
         mesh = first_mesh(scene, order, turning=min(2.0, 0.5 * order))
-        counts = {n: settings.elements or m.elements for n, m in scene.members.items()}
+        flexible = {n: m for n, m in scene.members.items() if m.type == "flexible"}
+        counts = {n: settings.elements or m.elements for n, m in flexible.items()}
         self.fixed = {n for n, count in counts.items() if count is not None}
         equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
-        cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in scene.members}
-        self.target = Mesh(order, cuts, settings.gauss)
+        cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
+        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid)
         if order >= PILOT_ORDER and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
             self.pilot_mesh = self.target
         else:
@@ -272,6 +273,8 @@ class _Run:
 
     def _on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found:
         loading = pilot.model.loading(factor)
+        if not pilot.model.minimisable:
+            return self._only_grown(pilot, factor, last)
         alone, failure = self._direct(pilot, loading)
         if self.started or not self.settings.branch:
             return self._accepted(pilot, alone, failure, loading)
@@ -286,6 +289,16 @@ class _Run:
                     "the loads growing from zero lead here, not to the minimum nearest to the start guess",
                 )
         return reached
+
+    def _only_grown(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found:
+        """Loads that cannot be minimised: the state that they lead to from zero, stable or not."""
+        found = self._grown(pilot, factor, last)
+        if found is None:
+            detail = "the loads could not be followed from zero, and without a potential there is no other way"
+            raise SolveError(Status.FAILED, detail)
+        if not pilot.model.has_potential:
+            found.notes += (NO_POTENTIAL,)
+        return found
 
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[_Found | None, SolveError | None]:
         """IPOPT from the start guess."""
@@ -355,7 +368,7 @@ class _Run:
         return self._followed(pilot, lambda t: pilot.model.loading(begin + t * (factor - begin)), state)
 
     def _followed(self, pilot: Prepared, way: Any, state: State) -> _Found | None:
-        result = follow(pilot, way, state, leave=self.leave)
+        result = follow(pilot, way, state, leave=self.leave and pilot.model.minimisable)
         if not result.reached:
             return None
         corrected = pilot.correct(result.state, way(1.0))
@@ -378,7 +391,7 @@ class _Run:
         return replace(source, prepared=prepared, corrected=corrected)
 
     def _refined(self, pilot: _Found, factor: float) -> Equilibrium:
-        if self.fixed == set(self.scene.members):
+        if self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh
         there = mesh is self.target or (mesh is not self.pilot_mesh and mesh.order == self.target.order)
@@ -411,7 +424,7 @@ class _Run:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.target
         if mesh.elements > HUGE:
-            half = Mesh(mesh.order, {n: every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss)
+            half = Mesh(mesh.order, {n: every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss, mesh.rigid)
             coarse = self._onto(half, pilot, factor)
             now = self._onto(mesh, coarse, factor)
             # The error falls by 4^p a halving; twice that share for not being there yet.
@@ -426,7 +439,7 @@ class _Run:
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
-        if stability.negative > 0 and self.leave:
+        if stability.negative > 0 and self.leave and prepared.model.minimisable:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             found = replace(found, corrected=corrected, notes=(*found.notes, note))
@@ -479,6 +492,11 @@ def _with_unique_reactions(found: _Found, loading: Loading) -> _Found:
     note = f"reactions are not unique, the smallest are given; redundant: {names}"
     return replace(found, corrected=corrected, notes=(*found.notes, note))
 
+
+NO_POTENTIAL = (
+    "loads without potential: no energy tells whether this is stable; the static tangent is regular all the way "
+    "from zero load, and flutter would only show in dynamics"
+)
 
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from .errors import SceneError
 from .loads import Motion
 from .records import say
+from .springs import Spring
 from .structure import Member, Node, unit
 
-__all__ = ["check_floating", "check_motion", "check_motions_once", "drives"]
+__all__ = ["check_driven_joint", "check_floating", "check_motion", "check_motions_once", "drives"]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -20,7 +21,7 @@ Triple = tuple[float, float, float]
 
 def drives(node: Node, displacement: Triple | None) -> bool:
     """Whether a displacement drives a slider along its guide: it has a component along it."""
-    if node.direction is None or displacement is None or not any(displacement):
+    if not node.slides or node.direction is None or displacement is None or not any(displacement):
         return False
     return bool(abs(np.dot(unit(displacement), unit(node.direction))) > 1e-12)
 
@@ -29,16 +30,18 @@ def held_directions(node: Node, displacement: Triple | None = None) -> Floats:
     """(k, 3): directions in which the ground holds the node, a slider that is driven in all of them."""
     if node.support == "free":
         return np.zeros((0, 3))
-    if node.direction is None or drives(node, displacement):
+    if not node.slides or node.direction is None or drives(node, displacement):
         return np.eye(3)
     return np.eye(3) - np.outer(unit(node.direction), unit(node.direction))
 
 
-def components(nodes: Iterable[str], members: Mapping[str, Member]) -> Iterator[list[str]]:
-    """The names of the nodes of each part that members connect."""
+def components(
+    nodes: Iterable[str], members: Mapping[str, Member], springs: Mapping[str, Spring]
+) -> Iterator[list[str]]:
+    """The names of the nodes of each part that members and springs connect."""
     neighbours: dict[str, list[str]] = {name: [] for name in nodes}
-    for member in members.values():
-        first, second = member.nodes
+    pairs = [(m.nodes[0], other) for m in members.values() for other in m.nodes[1:]]
+    for first, second in pairs + [(s.node, s.to) for s in springs.values() if s.to is not None]:
         neighbours[first].append(second)
         neighbours[second].append(first)
     left = dict.fromkeys(neighbours)
@@ -63,7 +66,11 @@ def free_directions(held: Floats, dimension: str) -> Floats:
 
 
 def check_floating(
-    nodes: Mapping[str, Node], members: Mapping[str, Member], motions: Mapping[str, Motion], dimension: str
+    nodes: Mapping[str, Node],
+    members: Mapping[str, Member],
+    springs: Mapping[str, Spring],
+    motions: Mapping[str, Motion],
+    dimension: str,
 ) -> None:
     """Refuse a part of the structure that supports do not hold in every direction.
 
@@ -73,8 +80,14 @@ def check_floating(
         Names the nodes of the part and how it can move.
     """
     moved = {motion.node: motion.displacement for motion in motions.values() if motion.displacement is not None}
-    for part in components(nodes, members):
+    sprung: dict[str, list[Floats]] = {name: [] for name in nodes}
+    for spring in springs.values():
+        if spring.type == "translational" and spring.to is None and spring.stiffness > 0.0:
+            along = spring.direction
+            sprung[spring.node].append(np.eye(3) if along is None else np.array([unit(along)]))
+    for part in components(nodes, members, springs):
         held = np.vstack([held_directions(nodes[name], moved.get(name)) for name in part])
+        held = np.vstack([held, *(rows for name in part for rows in sprung[name])])
         free = free_directions(held, dimension)
         if len(free):
             raise SceneError(_floating(part, held, free))
@@ -102,12 +115,12 @@ def check_motions_once(motions: Mapping[str, Motion]) -> None:
     SceneError
         Names both.
     """
-    taken: dict[tuple[str, str], str] = {}
+    taken: dict[tuple[str, str, tuple[str, str] | None], str] = {}
     for name, motion in motions.items():
         for kind in ("displacement", "rotation"):
             if getattr(motion, kind) is None:
                 continue
-            other = taken.setdefault((motion.node, kind), name)
+            other = taken.setdefault((motion.node, kind, motion.between), name)
             if other != name:
                 message = f"node {motion.node!r} has a {kind} from motions.{other} already"
                 raise SceneError(message, ("motions", name, kind))
@@ -140,3 +153,33 @@ def _check_rotation(motion: Motion, node: Node, dimension: str, reason: str) -> 
         raise SceneError(f"found {found}, accepted: a number, the angle about the axis of the hinge", where)
     if node.turn == "fixed" and number and dimension == "space":
         raise SceneError(f"found {found}, accepted: a rotation vector [x, y, z], as {reason}", where)
+
+
+def check_driven_joint(motion: Motion, node: Node, members: Mapping[str, Member]) -> None:
+    """Refuse to drive what is no hinge or slide between two members.
+
+    Raises
+    ------
+    SceneError
+        Place within the motion.
+    """
+    assert motion.between is not None
+    how = []
+    for name in motion.between:
+        member = members.get(name)
+        if member is None or motion.node not in member.nodes:
+            raise SceneError(f"found {name!r}, accepted: two members that end at {motion.node!r}", ("between",))
+        release = member.release[member.nodes.index(motion.node)]
+        how.append(node.joint if node.joint != "rigid" else release)
+    if motion.rotation is not None and (
+        not isinstance(motion.rotation, float) or not {"hinge", "cylindrical"} & {*how}
+    ):
+        accepted = "a number, the angle of a hinge between the two members"
+        raise SceneError(
+            f"found {say(motion.rotation)} where they are joined {' and '.join(how)}, accepted: {accepted}",
+            ("rotation",),
+        )
+    if motion.displacement is not None and how[1] not in ("slider", "cylindrical"):
+        raise SceneError(
+            f"the second member is joined as {how[1]}, accepted: as slider or cylindrical", ("displacement",)
+        )

@@ -8,7 +8,6 @@ from sfetcas import quaternion as quat
 from sfetcas.equations import Equations, State
 from sfetcas.fields import Fields
 from sfetcas.interpolation import differentiation, evaluation
-from sfetcas.joints import hinge
 from sfetcas.newton import relative_residual
 from sfetcas.prepared import Prepared
 from sfetcas.rotations import Turn
@@ -158,7 +157,7 @@ def test_positive_part_and_elastic_entries(name, assembly, gauss):
     convex = full(equations, equations.at(state, loading, convex=True))
     n = equations.turning_unknowns
     values = np.linalg.eigvalsh(convex[:n, :n])
-    hinged = bool(len(equations.model.rotations.hinges))
+    hinged = bool(equations.model.connections)
     assert values.min() > -1e-11 * np.abs(values).max() or hinged  # a hinge's own part is left as it is
     elastic = np.zeros((equations.total, equations.total))
     elastic[equations.row, equations.column] = equations.elastic_entries()
@@ -167,29 +166,6 @@ def test_positive_part_and_elastic_entries(name, assembly, gauss):
     plain = full(equations, equations.at(unloaded, equations.model.loading(0.0)))
     np.testing.assert_allclose(elastic[:n, :n], plain[:n, :n], atol=1e-13 * np.abs(plain).max())
     assert np.abs(elastic[n:]).max(initial=0.0) == 0.0
-
-
-def test_hinge_is_zero_about_its_axis_and_nowhere_else():
-    axis = np.array([0.2, -1.0, 0.5]) / np.linalg.norm([0.2, -1.0, 0.5])
-    normals = np.linalg.svd(axis[None])[2][1:]
-    first = quat.from_rotation_vector([0.3, 0.9, -0.4])
-    lam = np.array([0.7, -1.2])
-
-    def rows(a, b):
-        return hinge()(np.stack([a, b], axis=1), normals.T, lam)
-
-    for angle in (-2.0, 0.1, 3.0):
-        second = quat.multiply(first, quat.from_rotation_vector(angle * axis))
-        np.testing.assert_allclose(rows(first, second)[0].full(), 0.0, atol=1e-15)
-    off = quat.multiply(first, quat.from_rotation_vector(0.01 * normals[0]))
-    np.testing.assert_allclose(rows(first, off)[0].full().ravel(), [0.01, 0.0], atol=1e-6)
-    # Common rotation of both sides changes nothing; the spin sees only the difference of the two.
-    turn = quat.from_rotation_vector([1.0, -0.3, 0.8])
-    np.testing.assert_allclose(
-        rows(quat.multiply(turn, first), quat.multiply(turn, off))[0].full(), rows(first, off)[0].full(), atol=1e-15
-    )
-    spin = rows(first, off)[1].full()
-    np.testing.assert_allclose(spin[:, :3], -spin[:, 3:], atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ZOO)

@@ -122,8 +122,8 @@ def reference(table, step):
     """The same branch on elements of order 7 that are four times as fine: from the answer's own state."""
     mesh = step.model.mesh
     finer = sfetcas.Mesh(7, mesh.refined().refined().cuts)
-    from_there = transferred(step.model, step.state, sfetcas.assemble(step.model.scene, finer))
     prepared = Prepared(sfetcas.assemble(step.model.scene, finer, assembly=step.model.assembly))
+    from_there = transferred(step.model, step.state, prepared.model)
     found = prepared.correct(from_there, prepared.model.loading(step.factor), iterations=30)
     assert found.residual < 1e-10  # many small elements: rounding of their stiffness
     return Fields(prepared.equations, found.state, prepared.model.loading(step.factor))

@@ -1,0 +1,231 @@
+"""The joints, springs and small members of a scene as groups of one kind each, dimensionless."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array, Index
+from .beams import Scales
+from .bodies import BodyData, body_of
+from .elements import Element
+from .joints import (
+    Body,
+    Connection,
+    DrivenSlide,
+    DrivenTurn,
+    Hinge,
+    LineSpring,
+    Slide,
+    Spring,
+    TurnSpring,
+    Universal,
+)
+from .positions import normals
+from .rotations import Pin, Rotations, end_joints
+from .scene import Scene
+from .segments import Segments
+
+__all__ = ["GROUND", "Group", "body_numbers", "connect", "freedoms"]
+
+GROUND = -1
+"""Number of a side that is the ground: it neither turns nor moves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """All connections of one kind.
+
+    Attributes
+    ----------
+    kind : Connection
+    turns, places : ndarray (n, rotations | places)
+        Numbers of the sides.
+    data : ndarray (n, data)
+    rows : tuple of str
+        Names of the rows, those of the first connection first.
+    names : tuple of str
+        What each connection is: a spring, a member, a motion, or a joint.
+    """
+
+    kind: Connection
+    turns: Index
+    places: Index
+    data: Array
+    rows: tuple[str, ...]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _One:
+    """One connection before it is put to its group."""
+
+    kind: Connection
+    name: str
+    data: Array
+    turns: tuple[int, ...] = ()
+    places: tuple[int, ...] = ()
+    row: str = ""
+
+
+def connect(
+    scene: Scene, segments: Segments, rotations: Rotations, element: Element, scales: Scales
+) -> tuple[Group, ...]:
+    """The groups of a scene; those of a kind in the order of the scene."""
+    maker = _Maker(scene, segments, rotations, element.space, scales)
+    by_kind: dict[Connection, list[_One]] = {}
+    for one in maker.all():
+        by_kind.setdefault(one.kind, []).append(one)
+    return tuple(_grouped(kind, ones) for kind, ones in by_kind.items())
+
+
+def _grouped(kind: Connection, ones: list[_One]) -> Group:
+    turns, places, rows, data, _ = kind.sizes
+    n = len(ones)
+    return Group(
+        kind=kind,
+        turns=np.array([one.turns for one in ones], dtype=np.intp).reshape(n, turns),
+        places=np.array([one.places for one in ones], dtype=np.intp).reshape(n, places),
+        data=np.array([one.data for one in ones], dtype=float).reshape(n, data),
+        rows=tuple(
+            f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
+        ),
+        names=tuple(one.name for one in ones),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Maker:
+    scene: Scene
+    segments: Segments
+    rotations: Rotations
+    space: bool
+    scales: Scales
+
+    @property
+    def axes(self) -> int:
+        return 3 if self.space else 2
+
+    def all(self) -> Iterator[_One]:
+        """Every connection of the scene."""
+        for pin in self.rotations.pins:
+            yield from self._pin(pin)
+        for name, member in self.scene.members.items():
+            for i, (node, joint) in enumerate(end_joints(self.scene, member)):
+                if joint in ("slider", "cylindrical"):
+                    yield self._slide(name, i, node)
+        yield from self._motions()
+        for name in self.scene.springs:
+            yield self._spring(name)
+        for name, member in self.scene.members.items():
+            if member.type == "small":
+                yield self._body(name)
+
+    def _pin(self, pin: Pin) -> Iterator[_One]:
+        node = self.scene.nodes[pin.node]
+        sides = (GROUND if pin.base is None else pin.base, pin.turn)
+        name = f"{pin.joint} of {pin.name} at {pin.node}" if pin.name != pin.node else f"{pin.joint} at {pin.node}"
+        if not self.space:
+            return
+        if pin.joint in ("hinge", "cylindrical"):
+            axis = node.axis if pin.joint == "hinge" else node.direction
+            yield _One(Hinge(True), name, normals(np.asarray(axis), 3).ravel(), sides, row=name)
+        elif pin.joint == "universal":
+            axes = [_unit(a) for a in (node.axis, node.axis2)]
+            yield _One(Universal(True), name, np.concatenate(axes), sides, row=name)
+
+    def _slide(self, member: str, i: int, node: str) -> _One:
+        direction = np.asarray(self.scene.nodes[node].direction, dtype=float)
+        places = self.segments.place(node), self.segments.place(self.segments.ends[member, i])
+        name = f"slide of {member} at {node}"
+        return _One(Slide(self.space), name, normals(direction, self.axes).ravel(), (self._base(node),), places, name)
+
+    def _base(self, node: str) -> int:
+        """Rotation that carries the lines of a node."""
+        number = self.rotations.node_turn[node]
+        return GROUND if number is None else number
+
+    def _end(self, member: str, node: str) -> int:
+        i = self.scene.members[member].nodes.index(node)
+        return self.rotations.ends[member][i]
+
+    def _motions(self) -> Iterator[_One]:
+        for name, motion in self.scene.motions.items():
+            if motion.between is None:
+                continue
+            node, row = self.scene.nodes[motion.node], f"motions.{name}"
+            first, second = motion.between
+            if motion.rotation is not None:
+                released = node.joint != "rigid" or "hinge" in self.scene.members[second].release
+                axis = node.axis if released or node.direction is None else node.direction
+                sides = self._end(first, motion.node), self._end(second, motion.node)
+                yield _One(DrivenTurn(self.space), name, _unit(axis), sides, row=row)
+            if motion.displacement is not None:
+                i = self.scene.members[second].nodes.index(motion.node)
+                places = self.segments.place(motion.node), self.segments.place(self.segments.ends[second, i])
+                along = _unit(node.direction)[: self.axes]
+                yield _One(DrivenSlide(self.space), name, along, (self._base(motion.node),), places, row)
+
+    def _spring(self, name: str) -> _One:
+        spring, scales = self.scene.springs[name], self.scales
+        if spring.type == "rotational":
+            data = np.array([*_unit(spring.axis), spring.stiffness / scales.moment, spring.rest])
+            return _One(TurnSpring(self.space), name, data, self.parties(name))
+        other = spring.to
+        places = GROUND if other is None else self.segments.place(other), self.segments.place(spring.node)
+        stiffness = spring.stiffness * scales.length**2 / scales.moment
+        if spring.direction is not None:
+            data = np.array([*_unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
+            return _One(LineSpring(self.space), name, data, (), places)
+        start = self.scene.nodes[spring.node].position
+        anchor = self.scene.nodes[other].position if other is not None else spring.anchor or start
+        gap = np.asarray(start, dtype=float) - np.asarray(anchor, dtype=float)
+        length = float(np.linalg.norm(gap)) if spring.length is None else spring.length
+        data = np.array([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
+        return _One(Spring(self.space), name, data, (), places)
+
+    def parties(self, name: str) -> tuple[int, int]:
+        """Rotations of the two parties of a rotational spring."""
+        spring = self.scene.springs[name]
+        found = []
+        for party in spring.between or ("ground", spring.node):
+            if party == "ground":
+                found.append(GROUND)
+            elif party == spring.node and party not in self.scene.members:
+                found.append(self._base(party))
+            else:
+                found.append(self._end(party, spring.node))
+        return found[0], found[1]
+
+    def _body(self, name: str) -> _One:
+        member, body = self.scene.members[name], body_of(self.scene, name)
+        data, stiff = body_numbers(body, self.space, self.scales)
+        places = tuple(self.segments.place(self.segments.ends[name, i]) for i in range(len(member.nodes)))
+        kind = Body(self.space, len(member.nodes), stiff)
+        return _One(kind, name, data, self.rotations.ends[name], places, f"member {name} does not stretch")
+
+
+def _unit(direction: object) -> Array:
+    d = np.asarray(direction, dtype=float)
+    return np.asarray(d / np.linalg.norm(d))
+
+
+def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, int]:
+    """Data of :class:`~sfetcas.joints.Body` and its number of rows."""
+    chosen = freedoms(len(body.rest), space)
+    unit = np.tile([scales.length] * 3 + [1.0] * 3, len(body.rest))
+    stiffness = (body.stiffness * unit[:, None] * unit[None, :] / scales.moment)[np.ix_(chosen, chosen)]
+    stiff = (body.stiff * unit)[:, chosen]
+    norms = np.linalg.norm(stiff, axis=1, keepdims=True)
+    axes = 3 if space else 2
+    upper = stiffness.T[np.tril_indices(len(chosen))]
+    rest = (body.rest[:, :axes] / scales.length).ravel()
+    return np.concatenate([rest, upper, (stiff / norms).T.ravel()]), len(stiff)
+
+
+def freedoms(nodes: int, space: bool) -> Index:
+    """Of six freedoms a node those that a model has: all, or x, y and about z."""
+    each = np.arange(6) if space else np.array([0, 1, 5])
+    return (6 * np.arange(nodes)[:, None] + each).ravel()
