@@ -313,7 +313,7 @@ class EquilibriumProblem:
         return ca.MX(sparsity, ca.mtimes(adder, ca.vertcat(*[ca.vec(v) for _, _, _, v in parts])))
 
     def _jacobian(self) -> ca.MX:
-
+        positions = self.model.positions
         blocks, width = [], self.x.numel()
         if self._unit:
             rows, columns = self._norm_parts
