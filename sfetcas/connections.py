@@ -48,6 +48,8 @@ class Group:
         Names of the rows, those of the first connection first.
     names : tuple of str
         What each connection is: a spring, a member, a motion, or a joint.
+    nodes : tuple of str
+        The node at which it is; of a small member its first.
     """
 
     kind: Connection
@@ -56,6 +58,7 @@ class Group:
     data: Array
     rows: tuple[str, ...]
     names: tuple[str, ...]
+    nodes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ class _One:
 
     kind: Connection
     name: str
+    node: str
     data: Array
     turns: tuple[int, ...] = ()
     places: tuple[int, ...] = ()
@@ -93,6 +97,7 @@ def _grouped(kind: Connection, ones: list[_One]) -> Group:
             f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
         ),
         names=tuple(one.name for one in ones),
+        nodes=tuple(one.node for one in ones),
     )
 
 
@@ -131,16 +136,18 @@ class _Maker:
             return
         if pin.joint in ("hinge", "cylindrical"):
             axis = node.axis if pin.joint == "hinge" else node.direction
-            yield _One(Hinge(True), name, normals(np.asarray(axis), 3).ravel(), sides, row=name)
+            yield _One(Hinge(True), name, pin.node, normals(np.asarray(axis), 3).ravel(), sides, row=name)
         elif pin.joint == "universal":
             axes = [_unit(a) for a in (node.axis, node.axis2)]
-            yield _One(Universal(True), name, np.concatenate(axes), sides, row=name)
+            yield _One(Universal(True), name, pin.node, np.concatenate(axes), sides, row=name)
 
     def _slide(self, member: str, i: int, node: str) -> _One:
         direction = np.asarray(self.scene.nodes[node].direction, dtype=float)
         places = self.segments.place(node), self.segments.place(self.segments.ends[member, i])
         name = f"slide of {member} at {node}"
-        return _One(Slide(self.space), name, normals(direction, self.axes).ravel(), (self._base(node),), places, name)
+        return _One(
+            Slide(self.space), name, node, normals(direction, self.axes).ravel(), (self._base(node),), places, name
+        )
 
     def _base(self, node: str) -> int:
         """Rotation that carries the lines of a node."""
@@ -161,30 +168,30 @@ class _Maker:
                 released = node.joint != "rigid" or "hinge" in self.scene.members[second].release
                 axis = node.axis if released or node.direction is None else node.direction
                 sides = self._end(first, motion.node), self._end(second, motion.node)
-                yield _One(DrivenTurn(self.space), name, _unit(axis), sides, row=row)
+                yield _One(DrivenTurn(self.space), name, motion.node, _unit(axis), sides, row=row)
             if motion.displacement is not None:
                 i = self.scene.members[second].nodes.index(motion.node)
                 places = self.segments.place(motion.node), self.segments.place(self.segments.ends[second, i])
                 along = _unit(node.direction)[: self.axes]
-                yield _One(DrivenSlide(self.space), name, along, (self._base(motion.node),), places, row)
+                yield _One(DrivenSlide(self.space), name, motion.node, along, (self._base(motion.node),), places, row)
 
     def _spring(self, name: str) -> _One:
         spring, scales = self.scene.springs[name], self.scales
         if spring.type == "rotational":
             data = np.array([*_unit(spring.axis), spring.stiffness / scales.moment, spring.rest])
-            return _One(TurnSpring(self.space), name, data, self.parties(name))
+            return _One(TurnSpring(self.space), name, spring.node, data, self.parties(name))
         other = spring.to
         places = GROUND if other is None else self.segments.place(other), self.segments.place(spring.node)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
         if spring.direction is not None:
             data = np.array([*_unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
-            return _One(LineSpring(self.space), name, data, (), places)
+            return _One(LineSpring(self.space), name, spring.node, data, (), places)
         start = self.scene.nodes[spring.node].position
         anchor = self.scene.nodes[other].position if other is not None else spring.anchor or start
         gap = np.asarray(start, dtype=float) - np.asarray(anchor, dtype=float)
         length = float(np.linalg.norm(gap)) if spring.length is None else spring.length
         data = np.array([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
-        return _One(Spring(self.space), name, data, (), places)
+        return _One(Spring(self.space), name, spring.node, data, (), places)
 
     def parties(self, name: str) -> tuple[int, int]:
         """Rotations of the two parties of a rotational spring."""
@@ -204,7 +211,9 @@ class _Maker:
         data, stiff = body_numbers(body, self.space, self.scales)
         places = tuple(self.segments.place(self.segments.ends[name, i]) for i in range(len(member.nodes)))
         kind = Body(self.space, len(member.nodes), stiff)
-        return _One(kind, name, data, self.rotations.ends[name], places, f"member {name} does not stretch")
+        return _One(
+            kind, name, member.nodes[0], data, self.rotations.ends[name], places, f"member {name} does not stretch"
+        )
 
 
 def _unit(direction: object) -> Array:

@@ -287,18 +287,26 @@ class Equations:
         # Without any element the sum is of whole numbers.
         return values.astype(float, copy=False)
 
-    def end_moments(self, state: State, loading: Loading) -> dict[str, Array]:
-        """Moment (3,) about the fixed axes that the surroundings exert on the first end of each flexible member."""
+    def shares(self, state: State, loading: Loading) -> tuple[Array, list[Array]]:
+        """What elements and connections take from their surroundings at a state, dimensionless.
+
+        Returns
+        -------
+        moments : ndarray (elements, p + 1, 3)
+            Moments about the fixed axes on the nodes of the elements.
+        links : list of ndarray (n, width)
+            For each group of connections moments on its rotations, then forces on its places.
+        """
         model, loading = self.model, self.effective(state, loading)
         self._kernel.set(0, state.q[model.rotations.turns])
         constant = self.segment_pulls(state.lam, loading)[self._owner]
         self._kernel.set(3, loading.pull + constant[:, None, :])
-        moments = self._kernel()[2]
-        turns = model.element.turns
-        first = [moments[model.beams.first[name], :turns] for name in model.members]
-        return {
-            n: m.copy() if turns == 3 else np.array([0.0, 0.0, m[0]]) for n, m in zip(model.members, first, strict=True)
-        }
+        _, _, moments, _, reach, _ = self._kernel()
+        nodal, _ = self.displacements(state, loading, reach)
+        three = np.zeros((len(moments), len(model.element.nodes), 3))
+        three[:, :, 3 - model.element.turns :] = moments.reshape(len(moments), -1, model.element.turns)
+        pairs = zip(self._linked, loading.loads, strict=True)
+        return three, [link.evaluated(self, state, nodal, load)[3].copy() for link, load in pairs]
 
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
@@ -454,17 +462,8 @@ class _Linked:
     ) -> tuple[float, float, list[Array]]:
         """Energy, its share without loads, and entries; what is out of balance is added to the residual."""
         group, n = self.group, len(self.cells)
-        q = np.vstack([state.q, equations._at_rest(1)])
-        u = np.vstack([places.reshape(-1, equations.model.element.axes), np.zeros((1, equations.model.element.axes))])
+        energy, stored, gaps, gradient, stiffness, spin = self.evaluated(equations, state, places, load)
         rows = slice(self.first_row, self.first_row + n * self.rows)
-        for i, values in enumerate((q[group.turns], u[group.places])):
-            if values.size:
-                self._batch.set(i, values)
-        if load.size:
-            self._batch.set(3, load)
-        if self.rows:
-            self._batch.set(4, state.lam[rows])
-        energy, stored, gaps, gradient, stiffness, spin = self._batch()
         width = self.cells.shape[1]
         gradient = gradient.copy()
         stiffness, spin = stiffness.reshape(n, width, width).copy(), spin.reshape(n, width, self.rows).copy()
@@ -483,6 +482,21 @@ class _Linked:
         residual[equations.unknowns + rows.start : equations.unknowns + rows.stop] = gaps.ravel()
         parts = [stiffness.ravel(), spin.ravel(), spin.ravel()]
         return float(energy.sum()), float(stored.sum()), parts
+
+    def evaluated(self, equations: Equations, state: State, places: Array, load: Array) -> list[Array]:
+        """Results of :func:`~sfetcas.joints.by_turning` at a state."""
+        group, n = self.group, len(self.cells)
+        q = np.vstack([state.q, equations._at_rest(1)])
+        u = np.vstack([places.reshape(-1, equations.model.element.axes), np.zeros((1, equations.model.element.axes))])
+        rows = slice(self.first_row, self.first_row + n * self.rows)
+        for i, values in enumerate((q[group.turns], u[group.places])):
+            if values.size:
+                self._batch.set(i, values)
+        if load.size:
+            self._batch.set(3, load)
+        if self.rows:
+            self._batch.set(4, state.lam[rows])
+        return self._batch()
 
 
 FEW_ROWS = 12

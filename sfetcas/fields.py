@@ -14,6 +14,8 @@ import numpy as np
 
 from . import interpolation, quaternion
 from .arrays import Array
+from .balance import Balance, SpringState
+from .balance import three as _three
 from .equations import Equations, State
 from .loading import Loading
 
@@ -34,7 +36,16 @@ class Fields:
         nodal, _ = equations.displacements(state, loading, reach)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
         self._pull = loading.pull + equations.segment_pulls(state.lam, loading)[model.segments.owner][:, None, :]
-        self._start_moments = equations.end_moments(state, loading)
+
+    @functools.cached_property
+    def balance(self) -> Balance:
+        """The balance of the nodes."""
+        parts, loading = self.model.segments.parts, self._loading
+        starts = [self._start_forces(part.elements) for part in parts]
+        last = [loading.spread[part.elements][-1].sum(axis=0) for part in parts]
+        ends = [force[-1] - spread for force, spread in zip(starts, last, strict=True)]
+        starts = [force[0] for force in starts]
+        return Balance(self._equations, self._state, self._applied, starts, ends, self._nodal)
 
     # -- nodes ----------------------------------------------------------------------------------
 
@@ -50,25 +61,12 @@ class Fields:
 
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
-        model = self.model
-        force = -_three(self._outer_force(node))
-        moment = np.zeros(3)
-        number = model.rotations.node_turn[node]
-        if number is not None:
-            moment -= self._loading.moment[number]
-        for name, member in model.scene.members.items():
-            ends = self.along(name, np.array([0.0, 1.0]), dimensionless=True)
-            if member.nodes[0] == node:
-                force -= ends["force"][0]
-                moment -= ends["moment"][0]
-            if member.nodes[1] == node:
-                force += ends["force"][1]
-                moment += ends["moment"][1]
-        return force * model.scales.force, moment * model.scales.moment
+        force, moment = self.balance.reaction(node)
+        return force * self.model.scales.force, moment * self.model.scales.moment
 
-    def _outer_force(self, node: str) -> Array:
-        """Load on the node itself, not that of the members which begin there."""
-        return self._loading.own[self.model.segments.place(node)]
+    def spring(self, name: str) -> SpringState:
+        """A spring of the scene."""
+        return self.balance.spring(name)
 
     # -- members --------------------------------------------------------------------------------
 
@@ -84,6 +82,8 @@ class Fields:
         """
         model, element = self.model, self.model.element
         x = np.asarray(x, dtype=float)
+        if model.scene.members[member].type == "small":
+            return self._along_body(member, x)
         part, cuts = model.elements_of(member), model.mesh.cuts[member]
         e, xi = _located(cuts, x)
         to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
@@ -93,7 +93,7 @@ class Fields:
         start, moments = self._element_starts(member)
         line = model.scene.center_lines[member]
         position = line.positions(x) + _three(start[e] + here) * model.scales.length
-        force = _three(self._start_forces(member)[e] - np.einsum("nk,nka->na", to_x, spread[e]))
+        force = _three(self._start_forces(part)[e] - np.einsum("nk,nka->na", to_x, spread[e]))
         # m' = -r' x n; the pull at the points is minus the force there.
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
@@ -123,9 +123,44 @@ class Fields:
             rotation = quaternion.from_rotation_vector(vectors)
         return quaternion.matrix(quaternion.multiply(rotation, line.quaternions(x)))
 
-    def _start_forces(self, member: str) -> Array:
-        """Internal force at the start of each element of a member, (elements, axes)."""
-        part, element = self.model.elements_of(member), self.model.element
+    def _along_body(self, member: str, x: Array) -> dict[str, Array]:
+        """Fields of a small member: its ends, and between them the shape of a beam that carries no load."""
+        model = self.model
+        line, ends = model.scene.center_lines[member], model.rotations.ends[member]
+        numbers = [ends[0], ends[-1]]
+        places = [model.segments.place(model.segments.ends[member, i]) for i in (0, len(ends) - 1)]
+        moved = _three(self._nodal[places]) * model.scales.length
+        turned = self._state.q[numbers]
+        if not model.space:
+            turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
+        signed = turned[1] * (1.0 if turned[0] @ turned[1] >= 0.0 else -1.0)
+        # Rotations go linearly from end to end; the rigid motion with them is corrected to meet the second end.
+        mixed = (1.0 - x)[:, None] * turned[0] + x[:, None] * signed
+        mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
+        mean = turned[0] + signed
+        mean /= np.linalg.norm(mean)
+        rest = line.positions(np.concatenate([[0.0], x, [1.0]]))
+        rigid = rest[0] + moved[0] + quaternion.rotate(mean, rest - rest[0])
+        miss = rest[-1] + moved[1] - rigid[-1]
+        bent = x**2 * (3.0 - 2.0 * x)
+        chord = quaternion.rotate(mean, line.tangents(x)) * line.length
+        spins = [2.0 * quaternion.multiply(q, quaternion.conjugate(mean))[1:] for q in (turned[0], signed)]
+        hermite = (x * (1.0 - x) ** 2)[:, None] * np.cross(spins[0], chord) - (x**2 * (1.0 - x))[:, None] * np.cross(
+            spins[1], chord
+        )
+        position = rigid[1:-1] + bent[:, None] * miss + hermite
+        wrenches = self.balance.body_ends(member)
+        force, moment = ((1.0 - x)[:, None] * -wrenches[0][k] + x[:, None] * wrenches[-1][k] for k in range(2))
+        if model.space:
+            rotation = mixed
+        else:
+            rotation = ((1.0 - x) * self._state.q[ends[0], 0] + x * self._state.q[ends[-1], 0])[:, None]
+        scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
+        return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
+
+    def _start_forces(self, part: slice) -> Array:
+        """Internal force at the start of each of consecutive elements, (elements, axes)."""
+        element = self.model.element
         spread = self._loading.spread[part]
         # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
         beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
@@ -143,8 +178,12 @@ class Fields:
         gains = _cross(turned, self._pull[part]).sum(axis=1)
         chain = model.rotations.turns[part]
         # A couple at a cut is a jump of the moment.
-        gains[:-1] -= self._loading.moment[chain[1:, 0]]
-        moment = -self._start_moments[member]
+        if model.scene.members[member].type == "rigid":
+            gains[:-1] -= self._loading.jump[part][1:]
+        else:
+            gains[:-1] -= self._loading.moment[chain[1:, 0]]
+        start = self.balance.start_moment(member)
+        moment = -start
         moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
         return starts, moments
 
@@ -159,11 +198,6 @@ def _per_place(xi: Array, rows: Any) -> Array:
     """Rows of a matrix for places that often repeat."""
     places, inverse = np.unique(xi, return_inverse=True)
     return np.asarray(rows(places)[inverse])
-
-
-def _three(a: Array) -> Array:
-    """Vectors (..., 2) or (..., 3) as (..., 3)."""
-    return a if a.shape[-1] == 3 else np.concatenate([a, np.zeros((*a.shape[:-1], 1))], axis=-1)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -43,6 +43,10 @@ class Loading:
         Moments on rotations, about the fixed axes.
     twist : ndarray (rotations, 3)
         Moments on rotations that turn with them.
+    jump : ndarray (elements, 3)
+        The share of ``moment`` that acts at the start of an element, within a member.
+    couple, couple_twist : ndarray (places, 3)
+        The shares of ``moment`` and ``twist`` that act on nodes themselves.
     following : ndarray (n, axes)
         Forces that turn with a rotation, on the pairs of :attr:`Followers`.
     tangential : ndarray (elements, points, axes)
@@ -63,6 +67,9 @@ class Loading:
     own: Array
     moment: Array
     twist: Array
+    jump: Array
+    couple: Array
+    couple_twist: Array
     following: Array
     tangential: Array
     pull: Array
@@ -93,7 +100,19 @@ class Loading:
         return bool(self.following.any() or self.tangential.any() or self.twist.any())
 
 
-LOADS = ("force", "own", "moment", "twist", "following", "tangential", "pull", "spread")
+LOADS = (
+    "force",
+    "own",
+    "moment",
+    "twist",
+    "jump",
+    "couple",
+    "couple_twist",
+    "following",
+    "tangential",
+    "pull",
+    "spread",
+)
 MOTIONS = ("shift", "turn")
 
 
@@ -205,6 +224,9 @@ class _Writer:
             own=np.zeros((places, self.element.axes)),
             moment=np.zeros((turns, 3)),
             twist=np.zeros((turns, 3)),
+            jump=np.zeros((len(self.beams.weight), 3)),
+            couple=np.zeros((places, 3)),
+            couple_twist=np.zeros((places, 3)),
             following=np.zeros((len(self.followers.names), self.element.axes)),
             tangential=np.zeros(along),
             pull=np.zeros(along),
@@ -261,14 +283,19 @@ class _Writer:
             self.spread(group, str(load.member), density, follows=load.follows)
 
     def _add_moment(self, group: Loading, name: str, load: Load) -> None:
+        value = np.asarray(load.vector) / self.scales.moment
+        # In the plane a moment that follows is one that does not.
+        follows = load.frame == "follower" and self.element.space
         if load.node is not None:
             number = turning(self.rotations, name, load.node)
+            (group.couple_twist if follows else group.couple)[self.segments.place(load.node)] += value
         else:
             chain = self.rotations.chain(self.elements_of(str(load.member)))
-            number = int(chain[self.cut(load) * self.element.order])
-        # In the plane a moment that follows is one that does not.
-        part = group.twist if load.frame == "follower" and self.element.space else group.moment
-        part[number] += np.asarray(load.vector) / self.scales.moment
+            cut = self.cut(load)
+            number = int(chain[cut * self.element.order])
+            if 0 < cut < len(self.mesh.cuts[str(load.member)]) - 1:
+                group.jump[self.beams.first[str(load.member)] + cut] += value
+        (group.twist if follows else group.moment)[number] += value
 
     def _add_point_force(self, group: Loading, load: Load) -> None:
         member = str(load.member)

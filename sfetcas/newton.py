@@ -56,7 +56,11 @@ class Corrected:
 
 def relative_residual(equations: Equations, point: Point) -> float:
     """Largest out-of-balance moment or force over what is added up at its node, or largest gap."""
-    return float((np.abs(point.residual) / point.scale).max(initial=0.0))
+    return float((np.abs(point.residual) / np.maximum(point.scale, TINY)).max(initial=0.0))
+
+
+TINY = 1e-200
+"""Where nothing acts and nothing is stiff, nothing is out of balance."""
 
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:

@@ -50,6 +50,10 @@ class Prepared:
         """The stationarity equations in rotations."""
         return Equations(self.model, kernels=self.kernels)
 
+    @property
+    def _norms(self) -> int:
+        return int((self.model.widths >= 2).sum()) if self.model.space else 0
+
     @functools.cached_property
     def _test(self) -> StabilityTest:
         return StabilityTest(self.equations)
@@ -98,21 +102,28 @@ class Prepared:
         """
         if not self.model.minimisable:
             raise SolveError(Status.FAILED, "loads without potential cannot be minimised, only followed", state)
+        if len(self.model.row_names) > self.model.unknowns - self._norms:
+            # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise.
+            found = self.correct(state, loading, iterations=50)
+            if not found.converged:
+                detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
+                raise SolveError(Status.FAILED, detail, state)
+            return found, 0
         problem = self._problem
         scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
         result = self._ipopt(scale)(
             p=problem.parameters(loading), guess=problem.unknowns(state), lam=problem.multipliers(state) / scale
         )
-        found = problem.state(result.x, result.lam, loading)
-        if not np.all(np.isfinite(found.q)):
+        trial = problem.state(result.x, result.lam, loading)
+        if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
-        polished = self.correct(found, loading)
+        polished = self.correct(trial, loading)
         if not polished.converged and polished.residual > SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
             detail = f"IPOPT: {result.message}, {result.iterations} iterations"
             if status is Status.FAILED:
                 detail += f"; Newton's method left a residual of {polished.residual:.1e}"
-            raise SolveError(status, detail, found)
+            raise SolveError(status, detail, trial)
         return polished, result.iterations
 
     def leave(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:

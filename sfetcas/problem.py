@@ -270,8 +270,8 @@ class EquilibriumProblem:
     def _by_elements(self, z: SparseMap) -> ca.DM:
         """A map of the reaches of segments as one of the reaches of their elements."""
         axes, parts = self.model.element.axes, self.model.segments.parts
-        start = np.array([part.elements.start for part in parts])[z.column // axes]
-        count = np.array([part.elements.stop for part in parts])[z.column // axes] - start
+        start = np.array([part.elements.start for part in parts], dtype=np.intp)[z.column // axes]
+        count = np.array([part.elements.stop for part in parts], dtype=np.intp)[z.column // axes] - start
         element = np.concatenate([np.zeros(0, np.intp), *(a + np.arange(n) for a, n in zip(start, count, strict=True))])
         column = element * axes + np.repeat(z.column % axes, count)
         shape = (z.shape[0], len(self.model.segments.owner) * axes)
@@ -367,7 +367,7 @@ class EquilibriumProblem:
         n, points = model.beams.weight.shape
         norms, closings = len(self._unit), len(model.positions.rows)
         pull = lam_f * self._pull
-        if closings:
+        if closings and n:
             constant = ca.mtimes(self._to_rows.T, lam_g[norms : norms + closings])
             spread = np.repeat(np.arange(n), points)
             pull += ca.reshape(constant, element.axes, n)[:, spread.tolist()]

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import quaternion
 from .arrays import Array
+from .balance import SpringState
 from .equations import Equations, Point, State
 from .errors import SceneError, Status
 from .fields import Fields
@@ -110,9 +111,13 @@ class Equilibrium:
             raise SceneError(f"node {node!r} is free: no ground acts on it")
         return self.fields.reaction(node)
 
+    def spring(self, name: str) -> SpringState:
+        """A spring: angle (rad) and moment (N m) on its second party, or travel (m) and force (N)."""
+        return self.fields.spring(self._known(name, tuple(self.model.scene.springs), "spring"))
+
     def along(self, member: str, at: Any) -> dict[str, Array]:
         """Fields of a member at fractions of its length, see :meth:`Fields.along`; quaternions added."""
-        found = self.fields.along(self._known(member, self.model.members, "member"), np.atleast_1d(at))
+        found = self.fields.along(self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at))
         rotation = found.pop("rotation")
         found["quaternion"] = self._as_quaternions(rotation)
         if not self.model.space:
@@ -121,6 +126,8 @@ class Equilibrium:
 
     def places(self, member: str) -> Array:
         """Fractions of the length that the answer lists: nodes of the elements, or fewer."""
+        if self.model.scene.members[member].type != "flexible":
+            return np.array([0.0, 1.0])
         places = self.model.along(member)
         if len(places) > MOST_PLACES:
             places = self.model.mesh.cuts[member]
@@ -164,11 +171,12 @@ class Equilibrium:
                 force, moment = self.reaction(name)
                 reactions[name] = {"force": force.tolist(), "moment": moment.tolist()}
         members = {}
-        for name in self.model.members:
+        for name in scene.members:
             places = self.places(name)
             found = self.along(name, places)
             members[name] = {"s": places.tolist(), **{key: value.tolist() for key, value in found.items()}}
         answer: dict[str, Any] = {"factor": self.factor, "nodes": nodes, "reactions": reactions, "members": members}
+        answer |= {"springs": {name: self.spring(name).to_dict() for name in scene.springs}} if scene.springs else {}
         answer |= {"energy": self.energy, "certificate": self.certificate.to_dict()}
         return {**answer, "notes": list(self.notes)}
 

@@ -94,10 +94,22 @@ class Work:
             along[followers.elements] = self._along(state_q, loading)
             more, on_places = carried(along, model.segments, model.element)
             pull, spread, force = pull + more, spread + along, force + on_places
+        couple = loading.couple
         if loading.twist.any():
             moment = moment + self._turned(state_q, loading.twist)
-        nothing = {name: np.zeros_like(getattr(loading, name)) for name in ("twist", "following", "tangential")}
-        return replace(loading, force=force, own=own, pull=pull, spread=spread, moment=moment, **nothing)
+            couple = couple + self._turned_couples(state_q, loading)
+        gone = ("twist", "couple_twist", "following", "tangential")
+        nothing = {name: np.zeros_like(getattr(loading, name)) for name in gone}
+        now = {"force": force, "own": own, "pull": pull, "spread": spread, "moment": moment, "couple": couple}
+        return replace(loading, **now, **nothing)
+
+    def _turned_couples(self, state_q: Array, loading: Loading) -> Array:
+        """Moments that act on nodes and follow them, as they are now."""
+        couples = np.zeros_like(loading.couple_twist)
+        for place in np.flatnonzero(loading.couple_twist.any(axis=1)):
+            turn = self._model.rotations.node_turn[self._model.segments.places[place]]
+            couples[place] = self._turned(state_q[turn], loading.couple_twist[place])
+        return couples
 
     # -- entries ----------------------------------------------------------------------------------
 

@@ -53,6 +53,7 @@ ORDER = [
     "prepared",
     "continuation",
     "open_problem",
+    "balance",
     "fields",
     "solution",
     "accuracy",
