@@ -304,7 +304,7 @@ class Equations:
         _, _, moments, _, reach, _ = self._kernel()
         nodal, _ = self.displacements(state, loading, reach)
         three = np.zeros((len(moments), len(model.element.nodes), 3))
-        three[:, :, 3 - model.element.turns :] = moments.reshape(len(moments), -1, model.element.turns)
+        three[:, :, 3 - model.element.turns :] = moments.reshape(three.shape[0], three.shape[1], model.element.turns)
         pairs = zip(self._linked, loading.loads, strict=True)
         return three, [link.evaluated(self, state, nodal, load)[3].copy() for link, load in pairs]
 

@@ -185,16 +185,55 @@ def descend(
 
 def loose_rows(equations: Equations, point: Point) -> Array:
     """Combinations of rows that vanish to first order at this state: orthonormal columns, (rows, n)."""
-    n = equations.unknowns
     if not equations.rows:
         return np.zeros((0, 0))
+    # A row that no rotation changes is loose too, also where it is the only one.
+    usual = float((equations.model.beams.weight**2).sum())
+    find = _smallest if equations.rows > MANY else _all_singular
+    squares, left, largest = find(equations, point)
+    return np.asarray(left[:, squares < SLACK**2 * max(largest, usual)])
+
+
+def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
+    """Squares of all singular values of the rows, their left vectors and the largest square."""
+    n = equations.unknowns
     chosen = (equations.row >= n) & (equations.column < n)
     rows = np.zeros((equations.rows, n))
     rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
     squares, left = np.linalg.eigh(rows @ rows.T)
-    # A row that no rotation changes is loose too, also where it is the only one.
-    usual = float((equations.model.beams.weight**2).sum())
-    return np.asarray(left[:, squares < SLACK**2 * max(squares[-1], usual)])
+    return squares, left, float(squares[-1])
+
+
+def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
+    """The same for the smallest ones only, by inverse iteration with the sparse matrix of the rows."""
+    n = equations.unknowns
+    entries = np.where((equations.row >= n) != (equations.column >= n), point.entries, 0.0)
+    largest = float(np.bincount(equations.row, weights=entries**2, minlength=equations.total)[n:].max())
+    entries[equations.diagonal[:n]] = 1.0
+    entries[equations.diagonal[n:]] -= TINY_SHARE * largest
+    equations.solver.factor(entries)
+    count = 8
+    while True:
+        block = np.random.default_rng(0).standard_normal((equations.total, min(count, equations.rows)))
+        for _ in range(INVERSE):
+            block[:n] = 0.0
+            block[n:] = np.linalg.qr(block[n:])[0]
+            block = equations.solver.solve(block)
+        left, sizes, _ = np.linalg.svd(block[n:], full_matrices=False)
+        squares = 1.0 / sizes - TINY_SHARE * largest
+        if squares.max() > SLACK * largest or count >= equations.rows:
+            return squares[::-1], left[:, ::-1], largest
+        count *= 4
+
+
+MANY = 300
+"""From this many rows on only the loose ones are looked for."""
+
+INVERSE = 3
+"""Inverse iterations: what is loose stands out by twelve digits."""
+
+TINY_SHARE = 1e-15
+"""Share of the largest square that keeps the matrix of loose rows regular."""
 
 
 def redundant_rows(equations: Equations, point: Point) -> list[int]:
