@@ -18,6 +18,7 @@ from .checks import Check, check
 from .elements import ELEMENTS
 from .errors import SceneError, SolveError, Status
 from .model import assemble
+from .prepared import Prepared
 from .scenefile import load
 from .solution import Equilibrium, Solution
 from .statics import Settings, pilot_of, solve
@@ -242,8 +243,9 @@ def _info(options: argparse.Namespace) -> int:
     for block in model.blocks:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")
-    for name in model.members:
-        line = scene.center_lines[name]
-        print(f"  member {name}: length {line.length:.9g} m, {len(mesh.cuts[name]) - 1} elements")
+    for name, member in scene.members.items():
+        cut = f"{len(mesh.cuts[name]) - 1} elements" if member.type == "flexible" else member.type
+        print(f"  member {name}: length {scene.center_lines[name].length:.9g} m, {cut}")
+    print(f"  {Prepared(model).diagnosis.sentence}")
     print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")
     return SOLVED

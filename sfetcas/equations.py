@@ -281,6 +281,11 @@ class Equations:
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
         return Point(potential, stored, residual, scale, entries)
 
+    def places(self, state: State, loading: Loading) -> Array:
+        """Displacements of all places at a state, (places * axes,), dimensionless."""
+        self._kernel.set(0, state.q[self.model.rotations.turns])
+        return self.displacements(state, loading, self._kernel()[4])[0]
+
     def _gathered(self, parts: Array) -> Array:
         """Moments on the nodes of the elements added up on the unknowns."""
         values = np.bincount(self._used_numbers, weights=parts.ravel()[self._used], minlength=self.total)

@@ -43,6 +43,8 @@ class SolveError(RuntimeError):
     Attributes
     ----------
     status : Status
+    detail : str
+        What was tried.
     last : object or None
         Last iterate as the solver left it; never an answer.
     """
@@ -50,4 +52,5 @@ class SolveError(RuntimeError):
     def __init__(self, status: Status, detail: str = "", last: object = None) -> None:
         super().__init__(status.value + (f" ({detail})" if detail else ""))
         self.status = status
+        self.detail = detail
         self.last = last

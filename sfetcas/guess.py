@@ -11,10 +11,10 @@ from .arrays import Array
 from .equations import Equations, State
 from .loading import Loading
 from .model import Model
-from .newton import TURN, descend, redundant_rows
+from .newton import TURN, descend, loose_rows
 from .rotations import Turn
 
-__all__ = ["first_guess", "lead", "restore"]
+__all__ = ["first_guess", "lacks_slack", "lead", "restore"]
 
 LEADING, SETTLING = 30, 10
 """Steps in which nodes are led to the places wished for them, and in which they settle there."""
@@ -27,6 +27,20 @@ NEAR = 0.3
 
 BOW = 0.2
 """Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
+
+
+def lacks_slack(equations: Equations) -> bool:
+    """Whether straight members keep closings from giving way to first order; what joints hold twice does not count.
+
+    A bow of the members gives slack, redundant joints stay redundant.
+    """
+    state = equations.start(equations.model.loading(0.0, 0.0))
+    nothing = equations.model.loading(0.0, 0.0)
+    loose = loose_rows(equations, equations.at(state, nothing))
+    if not loose.size:
+        return False
+    bowed = replace(state, q=_turned_by(equations, state, _bow(equations)))
+    return bool(loose_rows(equations, equations.at(bowed, nothing)).shape[1] < loose.shape[1])
 
 
 def restore(equations: Equations, state: State, loading: Loading, weight: Array) -> tuple[State, float]:
@@ -98,7 +112,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[
     if np.any(loading.turn):
         state = _carried(equations, loading)
     targets = _wished(equations)
-    if equations.rows and targets is None and redundant_rows(equations, equations.at(state, loading)):
+    if equations.rows and targets is None and lacks_slack(equations):
         state = _bent(equations, state, loading, weight)
     if targets is not None:
         state = _placed(equations, state, loading, weight, targets)

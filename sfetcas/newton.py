@@ -33,6 +33,9 @@ SHORT = 0.05
 ROUNDING = 3e-15
 """Relative residual at which there is nothing left to gain."""
 
+ENORMOUS = 1e4
+"""Changes of multipliers above this are looked into: they may be those of redundant closings."""
+
 DUAL = 1e-12
 """Softness of the closings in the matrix (not in the equations), against redundant ones."""
 
@@ -71,7 +74,13 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
     entries[diagonal[:n]] += PROXIMAL * weight
     entries[diagonal[equations.unknowns : total]] -= DUAL
     equations.solver.factor(entries)
-    return equations.solver.solve(-point.residual)
+    step = equations.solver.solve(-point.residual)
+    rows = slice(equations.unknowns, None)
+    if np.abs(step[rows]).max(initial=0.0) > ENORMOUS:
+        # Of redundant closings only the softness above limits the multipliers: their loose part has no meaning.
+        loose = loose_rows(equations, point)
+        step[rows] -= loose @ (loose.T @ step[rows])
+    return step
 
 
 def correct(

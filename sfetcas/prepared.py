@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from . import quaternion
+from .doctor import Diagnosis, diagnose
 from .equations import Equations, State
 from .errors import SolveError, Status
-from .guess import first_guess, restore
+from .guess import first_guess, lacks_slack, restore
 from .kernels import Kernels
 from .loading import Loading
 from .model import Model
@@ -49,6 +50,16 @@ class Prepared:
     def equations(self) -> Equations:
         """The stationarity equations in rotations."""
         return Equations(self.model, kernels=self.kernels)
+
+    @functools.cached_property
+    def diagnosis(self) -> Diagnosis:
+        """What the undeformed structure is free to do, and what its joints hold twice."""
+        return diagnose(self.equations, self._test.weight)
+
+    @functools.cached_property
+    def lacks_slack(self) -> bool:
+        """Whether straight members keep the closings from giving way, see :func:`~sfetcas.guess.lacks_slack`."""
+        return lacks_slack(self.equations)
 
     @property
     def _norms(self) -> int:

@@ -18,6 +18,7 @@ import numpy as np
 from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
 from .continuation import follow
+from .doctor import in_words, moves_nodes
 from .elements import ELEMENTS
 from .equations import State
 from .errors import SceneError, SolveError, Status
@@ -25,7 +26,7 @@ from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import assemble
-from .newton import Corrected, loose_rows, redundant_rows, relative_residual, rows_in
+from .newton import Corrected, loose_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
 from .solution import Equilibrium, Solution, equilibrium
@@ -259,13 +260,25 @@ class _Run:
         status = Status.SOLVED if reached or not self.asked else Status.SHORT
         return Solution(self.scene, status, tuple(steps), self.seconds)
 
+    def _named(self, pilot: Prepared, error: SolveError) -> SolveError:
+        """The error with the motions that nothing holds, where there are any."""
+        try:
+            free = pilot.diagnosis
+        except (RuntimeError, np.linalg.LinAlgError):
+            return error
+        if not free.mobility:
+            return error
+        detail = f"{error.detail}; free to move without load: {'; '.join(free.motions[:3])}"
+        return SolveError(error.status, detail, error.last)
+
     def _found(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found:
         """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
         try:
             return self._on_pilot(pilot, factor, last)
-        except SolveError as error:
-            if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed:
-                raise
+        except SolveError as found:
+            error = self._named(pilot, found)
+            if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
+                raise error from None
             try:
                 return self._on_pilot(self._prepared(pilot.model.mesh.refined().refined()), factor, None)
             except SolveError:
@@ -327,10 +340,13 @@ class _Run:
             if found is not None:
                 return found
         zero = pilot.equations.start(model.loading(0.0, 0.0))
-        if redundant_rows(pilot.equations, pilot.equations.at(zero, model.loading(0.0, 0.0))):
+        if pilot.lacks_slack:
             # Straight members without slack: no way leads from here but the one that motions make.
             moved = np.any(model.loading(factor).shift) and not self.scene.histories
             return self._grown_from_bent(pilot, factor) if moved else None
+        if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
+            # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
+            return self._grown_from_bent(pilot, factor)
         if self.scene.histories and factor != 0.0:
             # With histories the way leads through the factors, after the loads of factor 0 have grown.
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero)
@@ -439,6 +455,7 @@ class _Run:
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
+        _refuse_free(prepared, found.corrected, stability)
         if stability.negative > 0 and self.leave and prepared.model.minimisable:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
@@ -465,6 +482,23 @@ class _Run:
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+
+def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> None:
+    """Refuse a mechanism of which neither stiffness nor loads hold some motion.
+
+    Raises
+    ------
+    SceneError
+        Names the motion.
+    """
+    if stability.stable != "neutral" or not prepared.diagnosis.mobility:
+        return
+    shape = np.concatenate([stability.shape, stability.travel])
+    if moves_nodes(prepared.equations, shape, found.state):
+        motion = in_words(prepared.equations, shape)
+        message = f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
+        raise SceneError(message)
 
 
 def _with_unique_reactions(found: _Found, loading: Loading) -> _Found:

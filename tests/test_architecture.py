@@ -47,6 +47,7 @@ ORDER = [
     "work",
     "equations",
     "newton",
+    "doctor",
     "guess",
     "stability",
     "problem",

@@ -1,0 +1,180 @@
+"""Before anything is solved: what a structure is free to do, and what its joints hold twice.
+
+*Mobility* is the number of motions that strain nothing and that closings, joints and supports allow; at the
+undeformed scene they are the null space of the elastic stiffness on the closings.  *Redundant* rows are
+combinations of closings and joints that no rotation or displacement changes: their multipliers are not unique.
+Both are found by inverse iteration with the sparse matrix of the equations, so the effort grows with the scene as
+that of a solve does.
+
+Source: Maxwell 1864 and Calladine 1978 (counting), here by rank; theory of mechanisms calls it mobility.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array
+from .equations import Equations, State
+from .newton import loose_rows, rows_in
+
+__all__ = ["Diagnosis", "diagnose", "free_motions", "in_words", "moves_nodes"]
+
+SOFT = 1e-7
+"""Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing."""
+
+MOST = 40
+"""Free motions looked for at most: a chain of as many links without any spring."""
+
+ITERATIONS = 4
+"""Inverse iterations: each gains the ratio of the softest stiffness to the shift, seven digits."""
+
+SHARE = 0.05
+"""A member takes part in a motion when it turns by this share of the largest rotation."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What the joints leave free and what they hold twice, in the undeformed scene.
+
+    Attributes
+    ----------
+    mobility : int
+        Independent motions that strain nothing.
+    motions : tuple of str
+        Each in words.
+    redundant : tuple of str
+        Names of the closings and joints that take part in redundant combinations.
+    excess : int
+        Number of redundant combinations.
+    """
+
+    mobility: int
+    motions: tuple[str, ...]
+    redundant: tuple[str, ...]
+    excess: int
+
+    @property
+    def sentence(self) -> str:
+        """One sentence for a report."""
+        free = f"mobility {self.mobility}" + (f": {'; '.join(self.motions[:4])}" if self.motions else "")
+        if not self.excess:
+            return free
+        held = ", ".join(dict.fromkeys(self.redundant))
+        return f"{free}; {self.excess} redundant among {held}"
+
+
+def diagnose(equations: Equations, weight: Array) -> Diagnosis:
+    """Mobility and redundancy of a model at its undeformed state."""
+    state = _undeformed(equations)
+    motions = free_motions(equations, weight, state)
+    loose = loose_rows(equations, equations.at(state, equations.model.loading(0.0, 0.0)))
+    names = tuple(equations.row_names[row] for row in rows_in(loose))
+    words = tuple(in_words(equations, motion) for motion in motions.T)
+    return Diagnosis(motions.shape[1], words, names, loose.shape[1] if loose.size else 0)
+
+
+def _undeformed(equations: Equations) -> State:
+    return equations.start(equations.model.loading(0.0, 0.0))
+
+
+def free_motions(equations: Equations, weight: Array, state: State) -> Array:
+    """Motions that strain nothing at a state: columns (unknowns, n), each with one unknown of its own."""
+    n, total, turning = equations.unknowns, equations.total, equations.turning_unknowns
+    if n == 0:
+        return np.zeros((0, 0))
+    point = equations.at(state, equations.model.loading(0.0, 0.0))
+    coupling = (equations.row >= n) != (equations.column >= n)
+    stiffness = np.where(coupling, point.entries, equations.elastic_entries())
+    metric = np.concatenate([weight, np.full(n - turning, float(weight.mean()) if turning else 1.0)])
+    shifted = stiffness.copy()
+    shifted[equations.diagonal[:n]] += 0.01 * SOFT * metric
+    shifted[equations.diagonal[n:]] -= 1e-11
+    equations.solver.factor(shifted)
+    count = min(4, n)
+    while True:
+        values, vectors = _lowest(equations, stiffness, metric, count)
+        free = vectors[:, values < SOFT]
+        if free.shape[1] < count or count >= min(n, MOST):
+            return _told_apart(free)
+        count = min(4 * count, n, MOST)
+
+
+def _lowest(equations: Equations, stiffness: Array, metric: Array, count: int) -> tuple[Array, Array]:
+    """Lowest eigenvalues of the stiffness on the closings against the metric, and their motions."""
+    n, root = equations.unknowns, np.sqrt(metric)[:, None]
+    block = np.random.default_rng(1).standard_normal((n, count))
+    loads = np.zeros((equations.total, count))
+    for _ in range(ITERATIONS):
+        loads[:n] = root * block
+        block = np.linalg.qr(root * equations.solver.solve(loads)[:n])[0]
+    motions = block / root
+    chosen = (equations.row < n) & (equations.column < n)
+    products = np.zeros((n, count))
+    np.add.at(products, equations.row[chosen], stiffness[chosen][:, None] * motions[equations.column[chosen]])
+    # What opens a closing is no motion.
+    rows = (equations.row >= n) & (equations.column < n)
+    gaps = np.zeros((equations.total - n, count))
+    np.add.at(gaps, equations.row[rows] - n, stiffness[rows][:, None] * motions[equations.column[rows]])
+    values, turn = np.linalg.eigh(motions.T @ products + gaps.T @ gaps)
+    return values, motions @ turn
+
+
+def _told_apart(motions: Array) -> Array:
+    """The same space with a basis in which each motion has an unknown that the others leave alone."""
+    basis = motions.copy()
+    for i in range(basis.shape[1]):
+        row = int(np.abs(basis[:, i:]).max(axis=1).argmax())
+        pivot = i + int(np.abs(basis[row, i:]).argmax())
+        basis[:, [i, pivot]] = basis[:, [pivot, i]]
+        basis[:, i] /= basis[row, i]
+        others = np.arange(basis.shape[1]) != i
+        basis[:, others] -= np.outer(basis[:, i], basis[row, others])
+    peak = np.abs(basis).max(axis=0, initial=0.0)
+    return np.where(np.abs(basis) > 1e-6 * peak, basis, 0.0)
+
+
+def in_words(equations: Equations, motion: Array) -> str:
+    """Which members turn, and which nodes move, in a motion."""
+    model = equations.model
+    turned = np.where(equations.number >= 0, motion[equations.number], 0.0)
+    sizes = np.linalg.norm(turned, axis=1)
+    by_member = {name: float(sizes[list(ends)].max()) for name, ends in model.rotations.ends.items()}
+    largest = max(by_member.values(), default=0.0)
+    turning = [name for name, size in by_member.items() if size > SHARE * largest > 0.0]
+    moving = [
+        name
+        for name, size in zip(model.nodes, _node_travel(equations, motion), strict=True)
+        if size > 1e-6 * max(largest, 1.0)
+    ]
+    words = [f"{_listed('member', turning)} turning"] if turning else []
+    words += [f"{_listed('node', moving)} moving"] if moving else []
+    return " with ".join(words) or "a rotation that nothing is joined to"
+
+
+def _listed(kind: str, names: list[str]) -> str:
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(names[:4])}{more}"
+
+
+def _node_travel(equations: Equations, motion: Array, state: State | None = None) -> Array:
+    """How far each node travels per unit of a motion, by a small step both ways."""
+    state = _undeformed(equations) if state is None else state
+    loading = equations.model.loading(0.0, 0.0)
+    step = np.zeros(equations.total)
+    step[: equations.unknowns] = STEP * motion
+    ahead, behind = (equations.places(equations.moved(state, sign * step), loading) for sign in (1.0, -1.0))
+    travel = (ahead - behind) / (2.0 * STEP)
+    return np.linalg.norm(travel.reshape(-1, equations.model.element.axes)[: len(equations.model.nodes)], axis=1)
+
+
+STEP = 1e-5
+"""Step of the central difference: 1e-10 of the motion is left out."""
+
+
+def moves_nodes(equations: Equations, motion: Array, state: State) -> bool:
+    """Whether a motion moves any node, or in the plane turns any member: a spin about its own axis does not."""
+    if not equations.model.space and np.abs(motion[: equations.turning_unknowns]).max(initial=0.0) > 0.0:
+        return True
+    return bool(_node_travel(equations, motion, state).max(initial=0.0) > 1e-6 * np.abs(motion).max(initial=1.0))
