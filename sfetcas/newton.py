@@ -62,8 +62,8 @@ def relative_residual(equations: Equations, point: Point) -> float:
     return float((np.abs(point.residual) / np.maximum(point.scale, TINY)).max(initial=0.0))
 
 
-TINY = 1e-200
-"""Where nothing acts and nothing is stiff, nothing is out of balance."""
+TINY = 1e-14
+"""Of the units of the model: where nothing acts and nothing is stiff, less than this is nothing."""
 
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
