@@ -16,6 +16,7 @@ __all__ = [
     "correct",
     "descend",
     "loose_rows",
+    "newton_step",
     "redundant_rows",
     "relative_residual",
     "rows_in",

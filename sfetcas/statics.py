@@ -24,10 +24,11 @@ from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, first_mesh, uniform_mesh
-from .model import assemble
+from .model import Model, assemble
 from .newton import Corrected, loose_rows, redundant_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
+from .several import RUNS, Search, long_elements, missing, same, search
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
@@ -49,6 +50,9 @@ HUGE = 2000
 LEVELS = 40
 """Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
 
+DRIFT = 0.3
+"""An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
+
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -69,6 +73,8 @@ class Settings:
         ``auto``, ``closing`` or ``nodal``.
     branch : bool
         Check the branch by following the loads from zero.
+    runs : int
+        Newton runs at most in a search for several equilibria, for each factor.
     """
 
     accuracy: float | None = None
@@ -77,6 +83,7 @@ class Settings:
     gauss: bool = False
     assembly: Literal["auto", "closing", "nodal"] = "auto"
     branch: bool = True
+    runs: int = RUNS
 
     def __post_init__(self) -> None:
         if self.accuracy is not None and not 0.0 < self.accuracy <= 0.1:
@@ -85,6 +92,8 @@ class Settings:
             raise SceneError(f"element: found {self.element!r}, accepted: {', '.join(ELEMENTS)}")
         if self.elements is not None and not 1 <= self.elements <= 1_000_000:
             raise SceneError(f"elements: found {self.elements}, accepted: 1 to 1000000")
+        if not 0 <= self.runs <= 1_000_000:
+            raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
 
@@ -185,13 +194,14 @@ def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
 
 @dataclass
 class _Found:
-    """An equilibrium on the way: where it stands and what was said about it."""
+    """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other."""
 
     prepared: Prepared
     corrected: Corrected
     stability: Stability
     notes: tuple[str, ...] = ()
     iterations: int = 0
+    kept: bool = False
 
 
 class _Run:
@@ -205,6 +215,7 @@ class _Run:
         self.assembly: Any = settings.assembly
         self.leave = scene.analysis.unstable == "leave"
         self.started = any(node.start is not None for node in scene.nodes.values())
+        self.others: list[tuple[Model, State]] = []
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
         self.asked = self.asked or not self.fixed
@@ -253,6 +264,8 @@ class _Run:
             found = self._found(pilot, factor, last)
             last = (factor, found) if found.prepared is pilot else None
             steps.append(self._refined(found, factor))
+            if self.scene.analysis.equilibria == "all":
+                steps[-1:] = self._several(found, steps[-1], factor)
         self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
         reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
         status = Status.SOLVED if reached or not self.asked else Status.SHORT
@@ -365,6 +378,50 @@ class _Run:
         )
         return _Found(pilot, corrected, pilot.stability(corrected), notes)
 
+    # -- several equilibria ---------------------------------------------------------------------
+
+    def _several(self, found: _Found, answer: Equilibrium, factor: float) -> list[Equilibrium]:
+        """The answer, and further equilibria of the same factor with rising energy."""
+        result, answers = self._searched(found, factor), [answer]
+        dropped = 0
+        for i, corrected in enumerate(result.found[1:], start=1):
+            notes = result.family_note(i)
+            candidate = _Found(result.prepared, corrected, result.prepared.stability(corrected), notes, kept=True)
+            try:
+                further = self._refined(candidate, factor)
+            except SolveError:
+                dropped += 1
+                continue
+            if not any(same(further, other) for other in answers):
+                answers.append(further)
+        note = result.sentence() + missing(answers)
+        if dropped:
+            note += f"; {dropped} more on the mesh of the search are none on finer ones"
+        answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
+        return [replace(other, notes=(*other.notes, note)) for other in answers]
+
+    def _searched(self, found: _Found, factor: float) -> Search:
+        """The search on half the element lengths of the pilot: coarser meshes miss what is strongly curled."""
+        mesh = found.prepared.model.mesh
+        if self.fixed != set(self.scene.members):
+            mesh = self._halved(found)
+        elif self.pilot_mesh is not self.target:
+            mesh = mesh.refined()
+        first = found if mesh is found.prepared.model.mesh else self._onto(mesh, found, factor)
+        while mesh is not found.prepared.model.mesh:
+            loading = first.prepared.model.loading(factor)
+            marks = long_elements(first.prepared, loading, first.corrected)
+            marks = {name: marked & (name not in self.fixed) for name, marked in marks.items()}
+            if not any(marked.any() for marked in marks.values()):
+                break
+            first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
+        prepared = first.prepared
+        starts = [transferred(model, state, prepared.model) for model, state in self.others]
+        loading = prepared.model.loading(factor)
+        result = search(prepared, loading, first.corrected, starts, self.settings.runs)
+        self.others = [(prepared.model, other.state) for other in result.found]
+        return result
+
     # -- accuracy -------------------------------------------------------------------------------
 
     def _onto(self, mesh: Mesh, source: _Found, factor: float) -> _Found:
@@ -373,6 +430,8 @@ class _Run:
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)
         corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
+            raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
         if not corrected.converged:
             corrected, _ = prepared.minimise(loading, state)
         return replace(source, prepared=prepared, corrected=corrected)
@@ -381,7 +440,8 @@ class _Run:
         if self.fixed == set(self.scene.members):
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh
-        there = mesh is self.target or (mesh is not self.pilot_mesh and mesh.order == self.target.order)
+        own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
+        there = mesh is self.target or own
         now = pilot if there else self._onto(self.target, pilot, factor)
         smooth = np.sqrt(self.accuracy)
         loading = now.prepared.model.loading(factor)
@@ -426,7 +486,7 @@ class _Run:
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
-        if stability.negative > 0 and self.leave:
+        if stability.negative > 0 and self.leave and not found.kept:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             found = replace(found, corrected=corrected, notes=(*found.notes, note))
