@@ -17,6 +17,7 @@ import numpy as np
 
 from .accuracy import largest_difference
 from .arrays import Array
+from .continuation import follow
 from .deflation import deflated, turned_between, unheld
 from .equations import State
 from .guess import restore
@@ -28,8 +29,8 @@ from .solution import Equilibrium
 
 __all__ = ["RUNS", "Search", "long_elements", "missing", "same", "search"]
 
-RUNS = 250
-"""Newton runs at most, by default: 1 to 4 s in the plane."""
+RUNS = 300
+"""Newton runs at most, by default: 0.5 to 4 s for a member or two."""
 
 APART = 1e-4
 """States that differ by more than this somewhere, rad, are different equilibria."""
@@ -40,10 +41,13 @@ SHAPES = 4
 NUDGE = 0.5
 """Largest rotation of a nudge, rad."""
 
-BENT = (1.0, -1.0, 2.5, -2.5, 4.0, -4.0)
+BENT = (2.0, -2.0, 4.0, -4.0, 6.5, -6.5)
 """Largest rotations of the shapes of the undeformed scene that a run begins with, rad."""
 
-KINK = 1.5
+SHARES, FARTHER = (0.1, 0.3162), 3.162
+"""Shares of the loads at which the search begins, since fewer equilibria are easier to find, and their ratio."""
+
+KINK = 1.3
 """A larger rotation from node to node within an element, rad, is an artefact of the mesh."""
 
 LARGE = 700
@@ -55,13 +59,13 @@ EQUAL = 1e-8
 
 FAMILY = "one of a continuous family of neutral equilibria with the same energy, of which no other is listed"
 
-LAYERS = 2.0
+LAYERS = 1.2
 """Longest element of the search in ``sqrt(EI / force)``, within which a beam turns over."""
 
 MOST_ELEMENTS = 80
 """The mesh of the search is not refined beyond this."""
 
-KINDS = ("given", "mirrored", "nudged", "bent", "half-way")
+KINDS = ("carried", "given", "mirrored", "nudged", "bent", "half-way")
 """Kinds of starts in the order of what they bring for their cost (measured)."""
 
 
@@ -81,6 +85,8 @@ class Search:
         Numbers of the equilibria that stand for a continuous family.
     exhausted : bool
         Whether the runs were used up before the starts.
+    smaller : int
+        Runs under smaller loads that were done before.
     waiting : dict
         Starts still to be tried, by kind.
     """
@@ -95,17 +101,19 @@ class Search:
     arrived: int = 0
     family: set[int] = field(default_factory=set)
     exhausted: bool = False
+    smaller: int = 0
     waiting: dict[str, deque[tuple[Callable[[], State], bool]]] = field(
         default_factory=lambda: {kind: deque() for kind in KINDS}
     )
 
     def sentence(self) -> str:
         """How the search was done, for a reader."""
-        total, kinds = sum(self.counts.values()), ", ".join(f"{n} {kind}" for kind, n in self.counts.items())
+        kinds = ", ".join(f"{n} {kind}" for kind, n in self.counts.items())
         end = "stopped at its largest number of runs" if self.exhausted else "went through all its starts"
         return (
-            f"searched by {total} Newton runs, {self.deflated} of them deflated ({kinds}), of which {self.arrived} "
-            f"arrived; the search {end}; there may be more equilibria"
+            f"searched by {self.total} Newton runs, {self.deflated} of them deflated ({kinds}), of which "
+            f"{self.arrived} arrived, after {self.smaller} under smaller loads; the search {end}; there may be more "
+            "equilibria"
         )
 
     def family_note(self, number: int) -> tuple[str, ...]:
@@ -193,9 +201,9 @@ class Search:
         """The undeformed scene moved along its lowest shapes, without and with deflation."""
         unloaded = self.loading.scaled(0.0)
         rest = self.prepared.correct(self.prepared.equations.start(unloaded), unloaded, iterations=0)
-        vectors = [size * shape for size in BENT for shape in self._shapes(rest, 2 * SHAPES)]
-        for deflate in (False, True):
-            self.offer("bent", *(partial(self.moved, self.begin, vector) for vector in vectors), deflate=deflate)
+        shapes = self._shapes(rest, SHAPES)
+        starts = [partial(self.moved, self.begin, size * shape) for size in BENT for shape in shapes]
+        self.offer("bent", *starts, deflate=False)
 
     def offer_around(self, found: Corrected) -> None:
         """What a new equilibrium gives: mirror images, nudges, and places half-way to those found before."""
@@ -210,12 +218,25 @@ class Search:
                 half = 0.5 * turned_between(equations, other.state, state)
                 self.offer("half-way", partial(self.moved, state, half), deflate=True)
 
+    def look(self) -> None:
+        """Begin at the undeformed scene and go on until there is no start or no run left."""
+        for deflate in (False, True):
+            self.offer("given", partial(self.closed, self.begin), deflate=deflate)
+        self.offer_bent()
+        while self.go_on():
+            pass
+
+    @property
+    def total(self) -> int:
+        """Runs done."""
+        return sum(self.counts.values())
+
     def go_on(self) -> bool:
         """Try the next start; whether there was one and a run left for it."""
         kind = next((kind for kind, queue in self.waiting.items() if queue), None)
         if kind is None:
             return False
-        if sum(self.counts.values()) >= self.runs:
+        if self.total >= self.runs:
             self.exhausted = True
             return False
         make, deflate = self.waiting[kind].popleft()
@@ -241,15 +262,33 @@ def search(
     runs : int
         Newton runs at most.
     """
-    result = Search(prepared, loading, runs, mirrors(prepared.model), [first])
-    result.offer("given", *(partial(result.closed, start) for start in starts), deflate=False)
-    for deflate in (False, True):
-        result.offer("given", lambda: result.begin, deflate=deflate)
+    images = mirrors(prepared.model)
+    carried: list[State] = []
+    left = runs
+    for share in SHARES:
+        part = Search(prepared, loading.scaled(share), runs // 5, images)
+        part.offer("carried", *(partial(part.closed, state) for state in carried), deflate=False)
+        part.look()
+        left -= part.total
+        carried = _carried(part, loading.scaled(share * FARTHER))
+    result = Search(prepared, loading, left, images, [first])
     result.offer_around(first)
-    result.offer_bent()
-    while result.go_on():
-        pass
+    for kind, states in (("carried", carried), ("given", starts)):
+        result.offer(kind, *(partial(result.closed, state) for state in states), deflate=False)
+    result.smaller = runs - left
+    result.look()
     return result
+
+
+def _carried(smaller: Search, loading: Loading) -> list[State]:
+    """Equilibria followed from smaller loads to larger ones, as far as their branches go."""
+    change = loading.plus(smaller.loading.scaled(-1.0))
+    states = []
+    for found in smaller.found:
+        followed = follow(smaller.prepared, lambda t: smaller.loading.plus(change.scaled(t)), found.state, leave=False)
+        if followed.reached:
+            states.append(followed.state)
+    return states
 
 
 def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dict[str, Array]:

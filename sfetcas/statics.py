@@ -18,6 +18,7 @@ import numpy as np
 from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
 from .continuation import follow
+from .deflation import deflated
 from .elements import ELEMENTS
 from .equations import State
 from .errors import SceneError, SolveError, Status
@@ -50,7 +51,7 @@ HUGE = 2000
 LEVELS = 40
 """Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
 
-DRIFT = 0.3
+DRIFT = 1.0
 """An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
 
 MOST_ELEMENTS = 20_000
@@ -381,12 +382,12 @@ class _Run:
     # -- several equilibria ---------------------------------------------------------------------
 
     def _several(self, found: _Found, answer: Equilibrium, factor: float) -> list[Equilibrium]:
-        """The answer, and further equilibria of the same factor with rising energy."""
-        result, answers = self._searched(found, factor), [answer]
-        dropped = 0
-        for i, corrected in enumerate(result.found[1:], start=1):
-            notes = result.family_note(i)
-            candidate = _Found(result.prepared, corrected, result.prepared.stability(corrected), notes, kept=True)
+        """The answer, then further equilibria of the same factor with rising energy."""
+        result = self._searched(found, factor)
+        answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
+        for number, corrected in enumerate(result.found[1:], start=1):
+            stability = result.prepared.stability(corrected)
+            candidate = _Found(result.prepared, corrected, stability, result.family_note(number), kept=True)
             try:
                 further = self._refined(candidate, factor)
             except SolveError:
@@ -396,28 +397,25 @@ class _Run:
                 answers.append(further)
         note = result.sentence() + missing(answers)
         if dropped:
-            note += f"; {dropped} more on the mesh of the search are none on finer ones"
+            note += f"; {dropped} of the mesh of the search are none on finer ones"
         answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
         return [replace(other, notes=(*other.notes, note)) for other in answers]
 
     def _searched(self, found: _Found, factor: float) -> Search:
-        """The search on half the element lengths of the pilot: coarser meshes miss what is strongly curled."""
-        mesh = found.prepared.model.mesh
+        """The search, on a mesh fine enough for what is strongly curled, but for elements that are prescribed."""
+        first = found
         if self.fixed != set(self.scene.members):
-            mesh = self._halved(found)
+            first = self._onto(self._halved(found), found, factor)
         elif self.pilot_mesh is not self.target:
-            mesh = mesh.refined()
-        first = found if mesh is found.prepared.model.mesh else self._onto(mesh, found, factor)
-        while mesh is not found.prepared.model.mesh:
-            loading = first.prepared.model.loading(factor)
-            marks = long_elements(first.prepared, loading, first.corrected)
-            marks = {name: marked & (name not in self.fixed) for name, marked in marks.items()}
+            first = self._onto(found.prepared.model.mesh.refined(), found, factor)
+        for _ in range(LEVELS if first is not found else 0):
+            long = long_elements(first.prepared, first.prepared.model.loading(factor), first.corrected)
+            marks = {name: marked & (name not in self.fixed) for name, marked in long.items()}
             if not any(marked.any() for marked in marks.values()):
                 break
             first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
-        prepared = first.prepared
+        prepared, loading = first.prepared, first.prepared.model.loading(factor)
         starts = [transferred(model, state, prepared.model) for model, state in self.others]
-        loading = prepared.model.loading(factor)
         result = search(prepared, loading, first.corrected, starts, self.settings.runs)
         self.others = [(prepared.model, other.state) for other in result.found]
         return result
@@ -430,6 +428,8 @@ class _Run:
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)
         corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        if source.kept and not corrected.converged:
+            corrected = deflated(prepared, state, loading, ()) or corrected
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
         if not corrected.converged:
