@@ -36,7 +36,7 @@ APART = 1e-4
 """States that differ by more than this somewhere, rad, are different equilibria."""
 
 SHAPES = 4
-"""Lowest shapes along which each equilibrium is nudged, and twice as many of the undeformed scene."""
+"""Lowest shapes, of each equilibrium and of the undeformed scene, along which states are moved."""
 
 NUDGE = 0.5
 """Largest rotation of a nudge, rad."""
@@ -55,7 +55,6 @@ LARGE = 700
 
 EQUAL = 1e-8
 """Energies that differ by less than this, relative, are those of one family."""
-
 
 FAMILY = "one of a continuous family of neutral equilibria with the same energy, of which no other is listed"
 
@@ -127,6 +126,7 @@ class Search:
         self.counts[kind] = self.counts.get(kind, 0) + 1
         self.deflated += deflate
         there = deflated(self.prepared, start, self.loading, [f.state for f in self.found] if deflate else ())
+        there = there and self._wound_back(there)
         if there is None:
             return False
         self.arrived += 1
@@ -134,6 +134,16 @@ class Search:
             return False
         self.found.append(there)
         return True
+
+    def _wound_back(self, there: Corrected) -> Corrected:
+        """The same without whole turns of parts that nothing holds."""
+        turns = there.state.q.copy()
+        parts = () if self.prepared.model.space else unheld(self.prepared.model)
+        for part in parts:
+            turns[part] -= 2.0 * np.pi * np.round(turns[part].mean() / (2.0 * np.pi))
+        if np.array_equal(turns, there.state.q):
+            return there
+        return self.prepared.correct(replace(there.state, q=turns), self.loading)
 
     def _known(self, state: State) -> bool:
         equations = self.prepared.equations
