@@ -27,10 +27,10 @@ from .newton import Corrected
 from .prepared import Prepared
 from .solution import Equilibrium
 
-__all__ = ["RUNS", "Search", "long_elements", "missing", "same", "search"]
+__all__ = ["Search", "long_elements", "missing", "same", "search"]
 
-RUNS = 300
-"""Newton runs at most, by default: 0.5 to 4 s for a member or two."""
+RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
+"""Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
 
 APART = 1e-4
 """States that differ by more than this somewhere, rad, are different equilibria."""
@@ -208,7 +208,7 @@ class Search:
         self.waiting[kind].extend((start, deflate) for start in starts)
 
     def offer_bent(self) -> None:
-        """The undeformed scene moved along its lowest shapes, without and with deflation."""
+        """The undeformed scene moved along its lowest shapes."""
         unloaded = self.loading.scaled(0.0)
         rest = self.prepared.correct(self.prepared.equations.start(unloaded), unloaded, iterations=0)
         shapes = self._shapes(rest, SHAPES)
@@ -259,7 +259,7 @@ class Search:
 
 
 def search(
-    prepared: Prepared, loading: Loading, first: Corrected, starts: Sequence[State] = (), runs: int = RUNS
+    prepared: Prepared, loading: Loading, first: Corrected, starts: Sequence[State] = (), runs: int | None = None
 ) -> Search:
     """Look for further equilibria under the loads of a known one.
 
@@ -269,10 +269,15 @@ def search(
         Equilibrium under ``loading``.
     starts : sequence of State
         Further states to begin with, such as equilibria under other loads.
-    runs : int
-        Newton runs at most.
+    runs : int, optional
+        Newton runs at most; the default falls with the number of unknowns.
     """
+    if runs is None:
+        effort = prepared.equations.unknowns * (2 if prepared.model.space else 1)
+        runs = max(FEWEST_RUNS, min(RUNS, EFFORT // effort))
     images = mirrors(prepared.model)
+    if not prepared.equations.turning_unknowns:
+        return Search(prepared, loading, runs, images, [first])
     carried: list[State] = []
     left = runs
     for share in SHARES:

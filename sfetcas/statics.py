@@ -29,7 +29,7 @@ from .model import Model, assemble
 from .newton import Corrected, loose_rows, redundant_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
-from .several import RUNS, Search, long_elements, missing, same, search
+from .several import Search, long_elements, missing, same, search
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
@@ -50,6 +50,9 @@ HUGE = 2000
 
 LEVELS = 40
 """Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
+
+MOST_FURTHER = 300
+"""The same for what a search found: what needs more is seldom an equilibrium of a beam."""
 
 DRIFT = 1.0
 """An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
@@ -74,8 +77,8 @@ class Settings:
         ``auto``, ``closing`` or ``nodal``.
     branch : bool
         Check the branch by following the loads from zero.
-    runs : int
-        Newton runs at most in a search for several equilibria, for each factor.
+    runs : int or None
+        Newton runs at most in a search for several equilibria, for each factor; None takes what suits the size.
     """
 
     accuracy: float | None = None
@@ -84,7 +87,7 @@ class Settings:
     gauss: bool = False
     assembly: Literal["auto", "closing", "nodal"] = "auto"
     branch: bool = True
-    runs: int = RUNS
+    runs: int | None = None
 
     def __post_init__(self) -> None:
         if self.accuracy is not None and not 0.0 < self.accuracy <= 0.1:
@@ -93,7 +96,7 @@ class Settings:
             raise SceneError(f"element: found {self.element!r}, accepted: {', '.join(ELEMENTS)}")
         if self.elements is not None and not 1 <= self.elements <= 1_000_000:
             raise SceneError(f"elements: found {self.elements}, accepted: 1 to 1000000")
-        if not 0 <= self.runs <= 1_000_000:
+        if self.runs is not None and not 0 <= self.runs <= 1_000_000:
             raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
@@ -388,18 +391,25 @@ class _Run:
         for number, corrected in enumerate(result.found[1:], start=1):
             stability = result.prepared.stability(corrected)
             candidate = _Found(result.prepared, corrected, stability, result.family_note(number), kept=True)
-            try:
-                further = self._refined(candidate, factor)
-            except SolveError:
+            further = self._further(candidate, factor)
+            if further is None:
                 dropped += 1
-                continue
-            if not any(same(further, other) for other in answers):
+            elif not any(same(further, other) for other in answers):
                 answers.append(further)
         note = result.sentence() + missing(answers)
         if dropped:
             note += f"; {dropped} of the mesh of the search are none on finer ones"
         answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
         return [replace(other, notes=(*other.notes, note)) for other in answers]
+
+    def _further(self, candidate: _Found, factor: float) -> Equilibrium | None:
+        """The answer to what a search found; None where finer meshes do not have it."""
+        try:
+            answer = self._refined(candidate, factor)
+        except SolveError:
+            return None
+        short = (answer.certificate.error_estimate or 0.0) > self.accuracy
+        return None if short and self.fixed != set(self.scene.members) else answer
 
     def _searched(self, found: _Found, factor: float) -> Search:
         """The search, on a mesh fine enough for what is strongly curled, but for elements that are prescribed."""
@@ -454,7 +464,7 @@ class _Run:
                 if error <= self.accuracy:
                     return self._answer(now, factor, error)
                 smooth *= 0.1
-            elif now.prepared.model.mesh.elements > MOST_ELEMENTS:
+            elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
                 now = self._onto(now.prepared.model.mesh.refined(marked), now, factor)

@@ -275,8 +275,11 @@ def test_deflation_keeps_newtons_method_away_from_what_is_known():
 
 def test_rotations_between_states_in_space_and_plane():
     rng = np.random.default_rng(5)
-    for dimension in ("plane", "space"):
-        ready, loading = prepared(cantilever(dimension=dimension))
+    for dimension, support in (("plane", "clamped"), ("space", "clamped"), ("space", "hinge")):
+        table = cantilever(dimension=dimension)
+        table["nodes"]["A"] |= {"support": support, "axis": [0, 1, 1]} if support == "hinge" else {}
+        table["nodes"]["B"]["support"] = "ball" if support == "hinge" else "free"
+        ready, loading = prepared(table)
         equations = ready.equations
         step = np.zeros(equations.total)
         step[: equations.turning_unknowns] = 0.3 * rng.standard_normal(equations.turning_unknowns)
