@@ -273,7 +273,7 @@ def search(
         Newton runs at most; the default falls with the number of unknowns.
     """
     if runs is None:
-        effort = prepared.equations.unknowns * (2 if prepared.model.space else 1)
+        effort = max(1, prepared.equations.unknowns * (2 if prepared.model.space else 1))
         runs = max(FEWEST_RUNS, min(RUNS, EFFORT // effort))
     images = mirrors(prepared.model)
     if not prepared.equations.turning_unknowns:

@@ -4,18 +4,19 @@ import itertools
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scenes import cantilever
 
-from sfetcas import Scene, SceneError, assemble, solve, uniform_mesh
+from sfetcas import Scene, SceneError, assemble, quaternion, solve, uniform_mesh
 from sfetcas.checks import check
 from sfetcas.cli import main
 from sfetcas.deflation import deflated, turned_between, unheld
 from sfetcas.mirrors import mirrored, mirrors
 from sfetcas.prepared import Prepared
-from sfetcas.several import search
+from sfetcas.several import Search, search
 from sfetcas.statics import Settings
 
 FIRST_LOAD = 0.25 * math.pi**2
@@ -321,6 +322,42 @@ def test_mirror_images_of_an_equilibrium_of_a_symmetric_scene_are_equilibria():
                 assert np.abs(point.residual).max() < 1e-9
                 images += 1
         assert images == 3
+
+
+@pytest.mark.parametrize(("dimension", "count"), [("plane", 3), ("space", 7)])
+def test_mirrored_rotations_turn_tangents_into_mirrored_tangents(dimension, count):
+    ready, loading = prepared(cantilever(dimension=dimension))
+    state = ready.equations.start(loading)
+    rng = np.random.default_rng(3)
+    state = ready.equations.moved(state, rng.standard_normal(ready.equations.total))
+    chain = ready.model.chain("m")
+
+    def tangents(q):
+        if dimension == "space":
+            return quaternion.rotate(q[chain], np.array([1.0, 0.0, 0.0]))
+        return np.stack([np.cos(q[chain, 0]), np.sin(q[chain, 0]), 0.0 * q[chain, 0]], axis=-1)
+
+    for mirror in mirrors(ready.model):
+        image = tangents(mirrored(ready.model, state, mirror).q)
+        source = tangents(state.q) @ mirror.matrix.T
+        # A line that runs against its image has the opposite tangent there.
+        (_, backwards), sign = mirror.images["m"], mirror.matrix[0, 0]
+        np.testing.assert_allclose(image, sign * (source[::-1] if backwards else source), atol=1e-12)
+    assert len(mirrors(ready.model)) == count
+
+
+def test_whole_turns_are_taken_back_where_nothing_holds():
+    scene = right_angled_frame(0.5)
+    ready = Prepared(assemble(scene, uniform_mesh(scene, 4, 4)), kernels="interpreted")
+    loading = ready.model.loading(1.0)
+    start = ready.equations.start(loading)
+    wound = replace(start, q=start.q + 6.0 * math.pi)
+    found = []
+    for state in (start, wound):
+        result = Search(ready, loading, 1, ())
+        assert result.run("given", state, deflate=False)
+        found.append(result.found[0].state.q)
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
 
 
 def test_mirrors_of_an_arc_and_of_a_crooked_frame():
