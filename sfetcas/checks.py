@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,13 +44,17 @@ def check(scene: Scene, solution: Solution) -> list[Check]:
         A quantity that the answer does not have.
     """
     checks = []
+    entries = _assigned(scene, solution)
     for i, expect in enumerate(scene.expect):
         try:
-            value = look_up(_step(solution, expect), expect.quantity, expect.at)
+            entry, own = entries[i] if i in entries else (_step(solution, expect), True)
+            value = look_up(entry, expect.quantity, expect.at)
         except SceneError as error:
             raise error.within("expect", str(i), "quantity") from None
         try:
-            checks.append(_compared(expect, value))
+            compared = _compared(expect, value)
+            # More numbers than equilibria: one that another number has taken cannot meet this one too.
+            checks.append(compared if own else replace(compared, error=np.inf, passed=False))
         except SceneError as error:
             raise error.within("expect", str(i), "value") from None
         except (TypeError, ValueError):
@@ -102,6 +106,60 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
         "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, springs.NAME.KEY, energy.KEY, certificate.KEY, factor"
     )
     raise SceneError(f"found {quantity!r}, accepted: {known}")
+
+
+def _assigned(scene: Scene, solution: Solution) -> dict[int, tuple[Equilibrium, bool]]:
+    """Entry of each expect, by its place, where a search listed several of one factor; whether it is its own.
+
+    Numbers of ``equilibrium`` go to different entries so that as many as possible are met; an expect without one
+    is about the first entry of its factor, the default answer.
+    """
+    if scene.analysis.equilibria != "all":
+        return {}
+    chosen: dict[int, tuple[Equilibrium, bool]] = {}
+    groups: dict[float, dict[int, list[int]]] = {}
+    for i, expect in enumerate(scene.expect):
+        factor = (solution.last if expect.step is None else _step(solution, expect)).factor
+        if expect.equilibrium is None:
+            chosen[i] = next(step for step in solution.steps if step.factor == factor), True
+        else:
+            groups.setdefault(factor, {}).setdefault(int(expect.equilibrium), []).append(i)
+    for factor, numbers in groups.items():
+        entries = [step for step in solution.steps if step.factor == factor]
+        matched = _matched([[scene.expect[i] for i in places] for places in numbers.values()], entries)
+        for places, (entry, own) in zip(numbers.values(), matched, strict=True):
+            chosen |= dict.fromkeys(places, (entries[entry], own))
+    return chosen
+
+
+def _matched(groups: list[list[Expect]], entries: list[Equilibrium]) -> list[tuple[int, bool]]:
+    """Entry of each group of expects, as many as possible met, by augmenting paths; the others take what is left."""
+    failures = [[sum(not _met(expect, entry) for expect in group) for entry in entries] for group in groups]
+    taken: dict[int, int] = {}
+
+    def place(group: int, seen: set[int]) -> bool:
+        for entry, failed in enumerate(failures[group]):
+            if not failed and entry not in seen:
+                seen.add(entry)
+                if entry not in taken or place(taken[entry], seen):
+                    taken[entry] = group
+                    return True
+        return False
+
+    unmet = [group for group in range(len(groups)) if not place(group, set())]
+    for group in unmet:
+        free = [entry for entry in range(len(entries)) if entry not in taken]
+        if free:
+            taken[min(free, key=lambda entry: failures[group][entry])] = group
+    found = {group: (entry, True) for entry, group in taken.items()}
+    return [found.get(group, (0, False)) for group in range(len(groups))]
+
+
+def _met(expect: Expect, entry: Equilibrium) -> bool:
+    try:
+        return _compared(expect, look_up(entry, expect.quantity, expect.at)).passed
+    except (SceneError, TypeError, ValueError):
+        return False
 
 
 def _entry(table: dict[str, Any], key: str) -> Any:

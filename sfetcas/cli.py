@@ -163,14 +163,22 @@ def _report(solution: Solution, seconds: float) -> None:
     print(
         f"  {model.mesh.elements} elements {model.element.name}, {model.unknowns} unknowns, {model.assembly} assembly"
     )
-    for step in solution.steps:
-        _report_step(step)
+    for step, place in zip(solution.steps, _places(solution), strict=True):
+        _report_step(step, place)
     split = f"model {solution.seconds['model']:.3f} s, solve {solution.seconds['solve']:.3f} s"
     print(f"{solution.status.value} in {seconds:.3f} s ({split})")
 
 
-def _report_step(step: Equilibrium) -> None:
-    print(f"factor {step.factor:g}")
+def _places(solution: Solution) -> list[str]:
+    """Which of several equilibria of its factor each entry is, in words; empty where one was asked for."""
+    factors = [step.factor for step in solution.steps]
+    if solution.scene.analysis.equilibria == "one":
+        return [""] * len(factors)
+    return [f", equilibrium {factors[: i + 1].count(f)} of {factors.count(f)}" for i, f in enumerate(factors)]
+
+
+def _report_step(step: Equilibrium, place: str) -> None:
+    print(f"factor {step.factor:g}{place}")
     for name in step.model.nodes[:MOST_NODES]:
         angle = step.angle(name)
         turned = f"  angle {angle:.9g} rad" if angle is not None else ""
@@ -222,6 +230,7 @@ def _row(c: Check) -> tuple[str, ...]:
     expect = c.expect
     place = "" if expect.at is None else f" at {expect.at:g}"
     step = "" if expect.step is None else f" step {expect.step:g}"
+    step += "" if expect.equilibrium is None else f" equilibrium {expect.equilibrium}"
     tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"
     verdict = "ok" if c.passed else "FAILED"
     return expect.quantity + place + step, _short(c.value), _short(expect.value), f"{c.error:.1e}", tolerance, verdict

@@ -81,7 +81,7 @@ def _undeformed(equations: Equations) -> State:
 
 def free_motions(equations: Equations, weight: Array, state: State) -> Array:
     """Motions that strain nothing at a state: columns (unknowns, n), each with one unknown of its own."""
-    n, total, turning = equations.unknowns, equations.total, equations.turning_unknowns
+    n, turning = equations.unknowns, equations.turning_unknowns
     if n == 0:
         return np.zeros((0, 0))
     point = equations.at(state, equations.model.loading(0.0, 0.0))

@@ -27,13 +27,11 @@ _LATER = {
     "Analysis.output": "spacings of answers in time",
     "Analysis.step": "time steps",
     "Analysis.integrator": "integrators",
-    "Analysis.equilibria = all": "searches for all equilibria",
     "Expect.time": "expectations at a time",
     "Expect.crossing": "expectations at a crossing of a path",
     "Expect.limit_point": "expectations at a limit point",
     "Expect.bifurcation": "expectations at a bifurcation",
     "Expect.flutter_point": "expectations at a flutter point",
-    "Expect.equilibrium": "expectations for one of several equilibria",
 }
 """Each row leaves with the version that brings what it names: ``Record.key`` or ``Record.key = value``."""
 

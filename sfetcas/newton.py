@@ -16,7 +16,7 @@ __all__ = [
     "correct",
     "descend",
     "loose_rows",
-    "redundant_rows",
+    "newton_step",
     "relative_residual",
     "rows_in",
 ]
@@ -243,11 +243,6 @@ INVERSE = 3
 
 TINY_SHARE = 1e-15
 """Share of the largest square that keeps the matrix of loose rows regular."""
-
-
-def redundant_rows(equations: Equations, point: Point) -> list[int]:
-    """Rows that depend on others to first order at this state; empty where the multipliers are unique."""
-    return rows_in(loose_rows(equations, point))
 
 
 def rows_in(loose: Array) -> list[int]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import quaternion
+from .arrays import Array
 from .doctor import Diagnosis, diagnose
 from .equations import Equations, State
 from .errors import SolveError, Status
@@ -102,6 +103,15 @@ class Prepared:
         if not self.model.has_potential:
             return 0
         return self._test.negative(found.point)
+
+    def spectrum(self, found: Corrected, count: int) -> tuple[Array, Array]:
+        """Eigenvalues and lowest shapes at a state, see :meth:`StabilityTest.spectrum`."""
+        return self._test.spectrum(found.point, count)
+
+    @property
+    def weight(self) -> Array:
+        """Weight of the turning unknowns, see :class:`~sfetcas.stability.StabilityTest`."""
+        return self._test.weight
 
     def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
         """IPOPT from a state, then Newton's method to rounding; the equilibrium and IPOPT's iterations.

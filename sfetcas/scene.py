@@ -39,6 +39,12 @@ def _tolerance(value: float) -> float:
     return value
 
 
+def _counting(value: float) -> int:
+    if value < 1.0 or value != int(value):
+        raise ValueError(f"found {value:g}, accepted: a whole number from 1 on")
+    return int(value)
+
+
 def _expected(value: Any) -> Any:
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)) and value:
@@ -57,14 +63,14 @@ class Analysis(Staged):
     accuracy : wanted error of the positions relative to the size of the scene, up to 0.1
     steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
     unstable : leave an unstable equilibrium for a stable one, or stay there
-    equilibria : one, to which the loads lead when they grow together from zero
+    equilibria : one, to which the loads lead when they grow together from zero, or all that a search finds
     """
 
     type: Literal["static"] = "static"
     accuracy: Annotated[Number, AfterValidator(_accuracy)] = 1e-4
     steps: Numbers = (1.0,)
     unstable: Literal["leave", "stay"] = "leave"
-    equilibria: Literal["one"] = "one"
+    equilibria: Literal["one", "all"] = "one"
 
 
 class Expect(Staged):
@@ -79,6 +85,7 @@ class Expect(Staged):
     source : where the value is from
     at : fraction of the length of a member
     step : factor of the answer; left out: the last step
+    equilibrium : expects of the same number are met by one of several equilibria, which one is free
     """
 
     quantity: str
@@ -88,6 +95,7 @@ class Expect(Staged):
     source: str = ""
     at: Fraction | None = None
     step: Number | None = None
+    equilibrium: Annotated[Number, AfterValidator(_counting)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Expect:
@@ -339,6 +347,9 @@ def _check_supports(scene: Scene) -> None:
 def _check_expect(scene: Scene) -> None:
     tables = {"nodes": scene.nodes, "reactions": scene.nodes, "members": scene.members, "springs": scene.springs}
     for i, expect in enumerate(scene.expect):
+        if expect.equilibrium is not None and scene.analysis.equilibria != "all":
+            message = "found with analysis.equilibria = 'one', accepted: with analysis.equilibria = 'all'"
+            raise SceneError(message, ("expect", str(i), "equilibrium"))
         kind, _, rest = expect.quantity.partition(".")
         if kind in tables:
             _known(rest.partition(".")[0], tables[kind], kind, "expect", str(i), "quantity")

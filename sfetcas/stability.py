@@ -155,6 +155,16 @@ class StabilityTest:
         # Displacements without stiffness of their own make the sparse factorisation without pivots break down.
         return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.elastic_displacements) else DENSE)
 
+    def spectrum(self, point: Point, count: int) -> tuple[Array, Array]:
+        """All eigenvalues, zero where they are neutral, and the lowest shapes (count or fewer, turning unknowns)."""
+        entries, rows = self._weighted(point), self._rows(point)
+        projected, basis = self._projected(entries, rows)
+        values, vectors = np.linalg.eigh(projected)
+        turning = self.equations.turning_unknowns
+        shapes = ((basis @ vectors[:, :count]).T / np.sqrt(self._weights))[:, :turning]
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
+        return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
+
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
         """The full matrix on the null space of the rows, and a basis of that."""
         h = np.zeros((self._n, self._n))

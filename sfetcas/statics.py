@@ -18,6 +18,7 @@ import numpy as np
 from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
 from .continuation import follow
+from .deflation import deflated
 from .doctor import in_words, moves_nodes
 from .elements import ELEMENTS
 from .equations import State
@@ -25,10 +26,11 @@ from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, first_mesh, uniform_mesh
-from .model import assemble
+from .model import Model, assemble
 from .newton import Corrected, loose_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
+from .several import Search, long_elements, missing, same, search
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
@@ -50,6 +52,12 @@ HUGE = 2000
 LEVELS = 40
 """Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
 
+MOST_FURTHER = 300
+"""The same for what a search found: what needs more is seldom an equilibrium of a beam."""
+
+DRIFT = 1.0
+"""An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
+
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -70,6 +78,8 @@ class Settings:
         ``auto``, ``closing`` or ``nodal``.
     branch : bool
         Check the branch by following the loads from zero.
+    runs : int or None
+        Newton runs at most in a search for several equilibria, for each factor; None takes what suits the size.
     """
 
     accuracy: float | None = None
@@ -78,6 +88,7 @@ class Settings:
     gauss: bool = False
     assembly: Literal["auto", "closing", "nodal"] = "auto"
     branch: bool = True
+    runs: int | None = None
 
     def __post_init__(self) -> None:
         if self.accuracy is not None and not 0.0 < self.accuracy <= 0.1:
@@ -86,6 +97,8 @@ class Settings:
             raise SceneError(f"element: found {self.element!r}, accepted: {', '.join(ELEMENTS)}")
         if self.elements is not None and not 1 <= self.elements <= 1_000_000:
             raise SceneError(f"elements: found {self.elements}, accepted: 1 to 1000000")
+        if self.runs is not None and not 0 <= self.runs <= 1_000_000:
+            raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
 
@@ -186,13 +199,14 @@ def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
 
 @dataclass
 class _Found:
-    """An equilibrium on the way: where it stands and what was said about it."""
+    """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other."""
 
     prepared: Prepared
     corrected: Corrected
     stability: Stability
     notes: tuple[str, ...] = ()
     iterations: int = 0
+    kept: bool = False
 
 
 class _Run:
@@ -206,6 +220,7 @@ class _Run:
         self.assembly: Any = settings.assembly
         self.leave = scene.analysis.unstable == "leave"
         self.started = any(node.start is not None for node in scene.nodes.values())
+        self.others: list[tuple[Model, State]] = []
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
         self.asked = self.asked or not self.fixed
@@ -234,6 +249,11 @@ class _Run:
         else:
             self.pilot_mesh = first_mesh(scene, max(order, PILOT_ORDER), turning=1.0)
 
+    @property
+    def _prescribed(self) -> bool:
+        """Whether the meshes of all flexible members are asked for."""
+        return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
+
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
         prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly))
@@ -255,6 +275,8 @@ class _Run:
             found = self._found(pilot, factor, last)
             last = (factor, found) if found.prepared is pilot else None
             steps.append(self._refined(found, factor))
+            if self.scene.analysis.equilibria == "all":
+                steps[-1:] = self._several(found, steps[-1], factor)
         self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
         reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
         status = Status.SOLVED if reached or not self.asked else Status.SHORT
@@ -394,6 +416,57 @@ class _Run:
         )
         return _Found(pilot, corrected, pilot.stability(corrected), notes)
 
+    # -- several equilibria ---------------------------------------------------------------------
+
+    def _several(self, found: _Found, answer: Equilibrium, factor: float) -> list[Equilibrium]:
+        """The answer, then further equilibria of the same factor with rising energy."""
+        if not found.prepared.model.minimisable:
+            accepted = "'one', as loads without potential have no energy to search by"
+            raise SceneError(f"found 'all', accepted: {accepted}", ("analysis", "equilibria"))
+        result = self._searched(found, factor)
+        answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
+        for number, corrected in enumerate(result.found[1:], start=1):
+            stability = result.prepared.stability(corrected)
+            candidate = _Found(result.prepared, corrected, stability, result.family_note(number), kept=True)
+            further = self._further(candidate, factor)
+            if further is None:
+                dropped += 1
+            elif not any(same(further, other) for other in answers):
+                answers.append(further)
+        note = result.sentence() + missing(answers)
+        if dropped:
+            note += f"; {dropped} of the mesh of the search are none on finer ones"
+        answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
+        return [replace(other, notes=(*other.notes, note)) for other in answers]
+
+    def _further(self, candidate: _Found, factor: float) -> Equilibrium | None:
+        """The answer to what a search found; None where finer meshes do not have it."""
+        try:
+            answer = self._refined(candidate, factor)
+        except SolveError:
+            return None
+        short = (answer.certificate.error_estimate or 0.0) > self.accuracy
+        return None if short and not self._prescribed else answer
+
+    def _searched(self, found: _Found, factor: float) -> Search:
+        """The search, on a mesh fine enough for what is strongly curled, but for elements that are prescribed."""
+        first = found
+        if self.fixed != set(self.scene.members):
+            first = self._onto(self._halved(found), found, factor)
+        elif self.pilot_mesh is not self.target:
+            first = self._onto(found.prepared.model.mesh.refined(), found, factor)
+        for _ in range(LEVELS if first is not found else 0):
+            long = long_elements(first.prepared, first.prepared.model.loading(factor), first.corrected)
+            marks = {name: marked & (name not in self.fixed) for name, marked in long.items()}
+            if not any(marked.any() for marked in marks.values()):
+                break
+            first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
+        prepared, loading = first.prepared, first.prepared.model.loading(factor)
+        starts = [transferred(model, state, prepared.model) for model, state in self.others]
+        result = search(prepared, loading, first.corrected, starts, self.settings.runs)
+        self.others = [(prepared.model, other.state) for other in result.found]
+        return result
+
     # -- accuracy -------------------------------------------------------------------------------
 
     def _onto(self, mesh: Mesh, source: _Found, factor: float) -> _Found:
@@ -402,15 +475,20 @@ class _Run:
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)
         corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        if source.kept and not corrected.converged:
+            corrected = deflated(prepared, state, loading, ()) or corrected
+        if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
+            raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
         if not corrected.converged:
             corrected, _ = prepared.minimise(loading, state)
         return replace(source, prepared=prepared, corrected=corrected)
 
     def _refined(self, pilot: _Found, factor: float) -> Equilibrium:
-        if self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}:
+        if self._prescribed:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh
-        there = mesh is self.target or (mesh is not self.pilot_mesh and mesh.order == self.target.order)
+        own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
+        there = mesh is self.target or own
         now = pilot if there else self._onto(self.target, pilot, factor)
         smooth = np.sqrt(self.accuracy)
         loading = now.prepared.model.loading(factor)
@@ -423,7 +501,7 @@ class _Run:
                 if error <= self.accuracy:
                     return self._answer(now, factor, error)
                 smooth *= 0.1
-            elif now.prepared.model.mesh.elements > MOST_ELEMENTS:
+            elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
                 now = self._onto(now.prepared.model.mesh.refined(marked), now, factor)
@@ -455,8 +533,9 @@ class _Run:
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
-        _refuse_free(prepared, found.corrected, stability)
-        if stability.negative > 0 and self.leave and prepared.model.minimisable:
+        if not found.kept:
+            _refuse_free(prepared, found.corrected, stability)
+        if stability.negative > 0 and self.leave and prepared.model.minimisable and not found.kept:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             found = replace(found, corrected=corrected, notes=(*found.notes, note))

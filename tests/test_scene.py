@@ -227,7 +227,7 @@ def test_unknown_keys(place, sentence):
         ("analysis/steps", 1.0, "analysis.steps: found 1.0, accepted: a list of numbers"),
         ("analysis/steps", [1, float("nan")], "analysis.steps: found nan, accepted: a finite number"),
         ("analysis/unstable", "go", "analysis.unstable: found 'go', accepted: leave, stay"),
-        ("analysis/equilibria", "two", "analysis.equilibria: found 'two', accepted: one"),
+        ("analysis/equilibria", "two", "analysis.equilibria: found 'two', accepted: all, one"),
         ("histories/h", {"t": [0, 1]}, "histories.h: accepted: either value or polynomial, one of them"),
         (
             "histories/h",
@@ -336,11 +336,6 @@ def test_combinations(changes, sentence):
         ("analysis/output", 0.1, "analysis.output: spacings of answers in time are not available yet"),
         ("analysis/step", 0.1, "analysis.step: time steps are not available yet"),
         ("analysis/integrator", "a", "analysis.integrator: integrators are not available yet"),
-        (
-            "analysis/equilibria",
-            "all",
-            "analysis.equilibria: searches for all equilibria are not available yet",
-        ),
         *(
             (
                 "expect",
@@ -353,7 +348,6 @@ def test_combinations(changes, sentence):
                 "limit_point": "at a limit point",
                 "bifurcation": "at a bifurcation",
                 "flutter_point": "at a flutter point",
-                "equilibrium": "for one of several equilibria",
             }.items()
         ),
     ],
