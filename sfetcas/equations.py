@@ -79,6 +79,8 @@ class Equations:
 
     def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
         self.model = model
+        # Whether rows depend on each other where Newton's method began; looked for when it does.
+        self.redundant: bool | None = None
         element = model.element
         self._number_unknowns()
         n = len(model.rotations.turns)

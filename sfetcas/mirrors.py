@@ -43,6 +43,8 @@ def mirrors(model: Model) -> tuple[Mirror, ...]:
     """All symmetries about the fixed axes and the principal axes of the scene, the identity left out."""
     x = np.linspace(0.0, 1.0, 9)
     places = {name: model.scene.center_lines[name].positions(x) for name in model.members}
+    if not places:
+        return ()
     cloud = np.vstack(list(places.values()))
     ends = 0.5 * (cloud.max(axis=0) + cloud.min(axis=0))
     found: list[Mirror] = []

@@ -33,9 +33,6 @@ SHORT = 0.05
 ROUNDING = 3e-15
 """Relative residual at which there is nothing left to gain."""
 
-ENORMOUS = 1e4
-"""Changes of multipliers above this are looked into: they may be those of redundant closings."""
-
 DUAL = 1e-12
 """Softness of the closings in the matrix (not in the equations), against redundant ones."""
 
@@ -75,11 +72,13 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
     entries[diagonal[equations.unknowns : total]] -= DUAL
     equations.solver.factor(entries)
     step = equations.solver.solve(-point.residual)
-    rows = slice(equations.unknowns, None)
-    if np.abs(step[rows]).max(initial=0.0) > ENORMOUS:
+    if equations.redundant is None:
+        equations.redundant = bool(loose_rows(equations, point).size)
+    if equations.redundant:
         # Of redundant closings only the softness above limits the multipliers: their loose part has no meaning.
-        loose = loose_rows(equations, point)
-        step[rows] -= loose @ (loose.T @ step[rows])
+        rows, loose = slice(equations.unknowns, None), loose_rows(equations, point)
+        if loose.size:
+            step[rows] -= loose @ (loose.T @ step[rows])
     return step
 
 
