@@ -144,7 +144,9 @@ class Model:
         return self.rotations.chain(self.elements_of(member))
 
     def along(self, member: str) -> Array:
-        """Fractions of the length at which the rotations of :meth:`chain` stand."""
+        """Fractions of the length at which the rotations of :meth:`chain` stand; of a small member its ends."""
+        if member not in self.mesh.cuts:
+            return np.array([0.0, 1.0])
         cuts = self.mesh.cuts[member]
         inner = cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.nodes[:-1]
         return np.append(inner.ravel(), 1.0)

@@ -602,11 +602,14 @@ def _sketch_load(sketch: _Sketch, name: str, load: Load, largest: float) -> None
         return _sketch_distributed(sketch, name, load, value)
     ink = _Ink(f"load-{name}", LOAD, 1.8)
     if load.node is not None:
-        point, along = sketch.at(load.node), sketch.leaving(load.node)[0]
+        point, along, turned = sketch.at(load.node), sketch.leaving(load.node)[0], sketch.step.quaternion(load.node)
     else:
         assert load.member is not None
         x = np.array([load.at])
         point, along = sketch.along(load.member, x)[0], _tangents(sketch.step, load.member, x)[0]
+        turned = sketch.step.along(load.member, x)["quaternion"][0]
+    if load.frame == "follower" and turned is not None:
+        value = quaternion.rotate(turned, value)
     if load.type == "moment":
         _sketch_turn(sketch, point, along, value, "N m", ink)
     else:
@@ -670,7 +673,10 @@ def _sketch_distributed(sketch: _Sketch, name: str, load: Load, value: Array) ->
     if peak == 0.0:
         return
     places = sketch.along(load.member, x)
-    ends = places - 0.6 * ARROW * sketch.size * (profile / peak)[:, None] * value / _norm(value)
+    values = np.broadcast_to(value, places.shape)
+    if load.frame == "follower":
+        values = quaternion.rotate(sketch.step.along(load.member, x)["quaternion"], values)
+    ends = places - 0.6 * ARROW * sketch.size * (profile / peak)[:, None] * values / _norm(value)
     ink = _Ink(f"load-{name}", LOAD, 1.0)
     sketch.line(ends, ink.name, colour=LOAD, width=0.8)
     for i in range(0, len(x), 6):
