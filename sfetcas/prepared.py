@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from . import quaternion
-from .equations import Equations, State
+from .arrays import Array
+from .equations import Equations, Point, State
 from .errors import SolveError, Status
 from .guess import first_guess, restore
 from .kernels import Kernels
@@ -19,7 +20,7 @@ from .model import Model
 from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem
-from .stability import Stability, StabilityTest
+from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
 
@@ -77,6 +78,19 @@ class Prepared:
     def stability(self, found: Corrected) -> Stability:
         """The stability test at a state."""
         return self._test.test(found.point)
+
+    @property
+    def weight(self) -> Array:
+        """Weight of the turning unknowns, see :class:`~sfetcas.stability.StabilityTest`."""
+        return self._test.weight
+
+    def inertia(self, point: Point) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues: the one place where a path asks for them."""
+        return self._test.inertia(point)
+
+    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+        """Eigenvalues around zero, see :class:`~sfetcas.stability.StabilityTest`."""
+        return self._test.around_zero(point)
 
     def negative(self, found: Corrected) -> int:
         """Number of negative eigenvalues at a state."""

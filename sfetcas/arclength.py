@@ -1,0 +1,232 @@
+"""Following a curve of equilibria by its arc length, through limit points.
+
+The unknowns are those of the stationarity equations and the factor of loads and motions.  A step goes along the
+tangent, bent as the last two tangents say, and returns to the equilibria across it: Newton's method with one more
+row, which holds what is left across the tangent.  The length of a step is measured in the root mean square of
+the rotations, rad, and in the factor over a unit, so that it does not depend on the mesh.
+
+Multipliers take no part in lengths: where a structure carries more load without moving, only the factor counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import Array
+from .equations import Point, State
+from .loading import Loading
+from .newton import DUAL, PROXIMAL, ROUNDING, relative_residual
+from .prepared import Prepared
+from .stability import Inertia
+
+__all__ = ["Curve", "Standing", "Tangent"]
+
+TOLERANCE = 1e-12
+"""Relative residual that counts as converged; one more iteration is made while it gains."""
+
+ITERATIONS = 10
+"""Newton iterations of a step at most."""
+
+TURN = 0.6
+"""No node turns by more than this, rad, in the corrections of a step."""
+
+HELD = 1e-3
+"""Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Direction of the curve, of length one: rates of the unknowns and multipliers, and of the factor."""
+
+    z: Array
+    factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A point of the curve.
+
+    Attributes
+    ----------
+    state, factor, loading, point
+        The equilibrium and the equations there.
+    tangent : Tangent
+    inertia : Inertia
+        Numbers of negative and of vanishing eigenvalues of the energy on the closings.
+    arc : float
+        Arc length from the start of the curve.
+    iterations : int
+        Newton iterations that led here.
+    """
+
+    state: State
+    factor: float
+    loading: Loading
+    point: Point
+    tangent: Tangent
+    inertia: Inertia
+    arc: float
+    iterations: int
+
+
+class Curve:
+    """The equilibria of a model as a curve over a factor.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    unit : float
+        Change of the factor that counts as much as a radian.
+    """
+
+    def __init__(self, prepared: Prepared, unit: float) -> None:
+        self.prepared, self.unit = prepared, unit
+        equations = prepared.equations
+        self.equations, self.model = equations, prepared.model
+        turning = equations.turning_unknowns
+        self.weight = np.zeros(equations.total)
+        self.weight[:turning] = equations.mass / equations.model.beams.weight.sum()
+        self._turning, self._proximal = turning, PROXIMAL * prepared.weight
+        self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
+        groups = self.model.groups
+        self._linear = set(groups) == {None} and not np.any(groups[None].turn)
+
+    # -- lengths --------------------------------------------------------------------------------
+
+    def inner(self, a: Tangent, b: Tangent) -> float:
+        """Inner product of two directions."""
+        return float(a.z @ (self.weight * b.z)) + a.factor * b.factor / self.unit**2
+
+    def normed(self, direction: Tangent) -> Tangent:
+        """The direction with length one."""
+        length = np.sqrt(self.inner(direction, direction))
+        return Tangent(direction.z / length, direction.factor / length)
+
+    # -- derivative by the factor ---------------------------------------------------------------
+
+    def slope(self, state: State, factor: float, point: Point) -> Array:
+        """Derivative of the residual by the factor at a state.
+
+        Exact where loads and motions are linear in the factor; fourth order differences where a history or
+        the rotation of a held node enters.
+        """
+        equations, model = self.equations, self.model
+        if self._linear:
+            there = equations.at(state, model.loading(factor + self.unit))
+            return (there.residual - point.residual) / self.unit
+        turns = max((float(np.abs(group.turn).max(initial=0.0)) for group in model.groups.values()), default=0.0)
+        h = HELD * min(self.unit, 1.0 / max(turns, 1e-300))
+        a, b = ((self._moved(state, factor + w) - self._moved(state, factor - w)) / (2.0 * w) for w in (h, 2.0 * h))
+        return np.asarray((4.0 * a - b) / 3.0)
+
+    def _moved(self, state: State, factor: float) -> Array:
+        loading = self.model.loading(factor)
+        return self.equations.at(self.equations.holding(state, loading), loading).residual
+
+    # -- points ---------------------------------------------------------------------------------
+
+    def solved(self, point: Point, right: Array) -> Array:
+        """Solutions for the Newton matrix of a point; what makes neutral directions harmless as in Newton's."""
+        entries = point.entries.copy()
+        entries[self._diagonal[0]] += self._proximal
+        entries[self._diagonal[1]] -= DUAL
+        self.equations.solver.factor(entries)
+        return self.equations.solver.solve(right)
+
+    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> Tangent:
+        """Direction of the curve at a state, to the side of another direction."""
+        try:
+            rate = self.solved(point, -self.slope(state, factor, point))
+        except np.linalg.LinAlgError:
+            return along
+        if not np.all(np.isfinite(rate)):
+            return along
+        found = self.normed(Tangent(rate, 1.0))
+        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor)
+
+    def standing(
+        self, state: State, factor: float, along: Tangent, *, arc: float = 0.0, iterations: int = 0
+    ) -> Standing:
+        """Everything that is known of an equilibrium on the curve."""
+        loading = self.model.loading(factor)
+        point = self.equations.at(state, loading)
+        tangent = self.tangent(state, factor, point, along)
+        return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, iterations)
+
+    def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
+        """State and factor a length along the tangent, bent by the rate of the tangent over the arc."""
+        z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
+        if bend is not None:
+            z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
+        return self.equations.moved(start.state, z), factor
+
+    def corrected(self, state: State, factor: float, across: Tangent, arc: float = 0.0) -> Standing | None:
+        """The equilibrium that lies across a direction from a state near the curve; None where none is found."""
+        equations, n = self.equations, self._turning
+        row = self.weight * across.z
+        loading = self.model.loading(factor)
+        state = equations.holding(state, loading)
+        point = equations.at(state, loading)
+        residual, last, turned = relative_residual(equations, point), np.inf, 0.0
+        for count in range(ITERATIONS):
+            if count and residual <= ROUNDING:
+                break
+            try:
+                both = self.solved(point, np.column_stack([-point.residual, -self.slope(state, factor, point)]))
+            except np.linalg.LinAlgError:
+                return None
+            base, rate = both[:, 0], both[:, 1]
+            change = -float(row @ base) / (float(row @ rate) + across.factor / self.unit**2)
+            step = base + change * rate
+            length = float(np.abs(step[:n]).max(initial=0.0))
+            turned += length
+            if not np.isfinite(length + change) or turned > TURN or (count and residual > 1e-9 and length > last):
+                return None
+            last = length
+            loading = self.model.loading(factor + change)
+            trial = equations.holding(equations.moved(state, step), loading)
+            there = equations.at(trial, loading)
+            gained = relative_residual(equations, there)
+            if residual <= TOLERANCE and gained > 0.25 * residual and count:
+                break
+            state, factor, point, residual = trial, factor + change, there, gained
+            if not np.isfinite(residual):
+                return None
+        if residual > TOLERANCE:
+            return None
+        tangent = self.tangent(state, factor, point, across)
+        loading = self.model.loading(factor)
+        return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, count)
+
+    def at_factor(self, near: Standing, factor: float) -> Standing | None:
+        """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there."""
+        found = self.prepared.correct(near.state, self.model.loading(factor), most=TURN)
+        if not found.converged or self.prepared.distance(found.state, near.state) > TURN:
+            return None
+        return self.standing(found.state, factor, near.tangent, arc=near.arc)
+
+    # -- between two points ---------------------------------------------------------------------
+
+    def between(self, a: Standing, b: Standing) -> Callable[[float], Standing | None]:
+        """The curve from one of its points to the next as a function of the arc length from the first."""
+        bend = self.bend(a, b)
+
+        def at(length: float) -> Standing | None:
+            return self.corrected(*self.predicted(a, length, bend), a.tangent, a.arc + length)
+
+        return at
+
+    def bend(self, a: Standing, b: Standing) -> Tangent | None:
+        """Rate of the tangent over the arc, from two points."""
+        arc = b.arc - a.arc
+        if arc == 0.0:
+            return None
+        return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
+
+    def reversed(self, standing: Standing) -> Standing:
+        """The same point, looking back."""
+        back = Tangent(-standing.tangent.z, -standing.tangent.factor)
+        return replace(standing, tangent=back)
