@@ -14,19 +14,22 @@ Source: Barraco and Munteanu, A special finite element for static and dynamic st
 large motion, Part 1.
 """
 
+from .analyses import solve
 from .checks import check
 from .errors import SceneError, SolveError, Status
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Model, assemble
 from .nlp import NLP, Ipopt, NLPResult, Solver
 from .open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
+from .path import Branch, Path, PathPoint
+from .paths import switch
 from .prepared import Prepared
 from .scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
 from .scenefile import dump, load
 from .sections import CrossSection
 from .shapes import Arc, Curvature, Helix, Spline, Straight
 from .solution import Certificate, Equilibrium, Solution
-from .statics import Settings, solve, solve_model
+from .statics import Settings, solve_model
 
 __version__ = "0.1.0"
 
@@ -34,6 +37,7 @@ __all__ = [
     "NLP",
     "Analysis",
     "Arc",
+    "Branch",
     "Certificate",
     "CrossSection",
     "Curvature",
@@ -51,6 +55,8 @@ __all__ = [
     "Node",
     "OpenAnswer",
     "OpenProblem",
+    "Path",
+    "PathPoint",
     "Prepared",
     "Scene",
     "SceneError",
@@ -69,5 +75,6 @@ __all__ = [
     "load",
     "solve",
     "solve_model",
+    "switch",
     "uniform_mesh",
 ]

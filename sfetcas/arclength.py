@@ -11,7 +11,7 @@ Multipliers take no part in lengths: where a structure carries more load without
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,6 +35,9 @@ TURN = 0.6
 
 HELD = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
+
+HISTORY = 1e-5
+"""Share of the unit of the factor over which loads with histories are differenced: second order, so 1e-10."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +83,12 @@ class Curve:
     prepared : Prepared
     unit : float
         Change of the factor that counts as much as a radian.
+    piece : tuple of float
+        Factors between which no history has a knot.
     """
 
-    def __init__(self, prepared: Prepared, unit: float) -> None:
-        self.prepared, self.unit = prepared, unit
+    def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
+        self.prepared, self.unit, self.piece = prepared, unit, piece
         equations = prepared.equations
         self.equations, self.model = equations, prepared.model
         turning = equations.turning_unknowns
@@ -91,8 +96,7 @@ class Curve:
         self.weight[:turning] = equations.mass / equations.model.beams.weight.sum()
         self._turning, self._proximal = turning, PROXIMAL * prepared.weight
         self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
-        groups = self.model.groups
-        self._linear = set(groups) == {None} and not np.any(groups[None].turn)
+        self._linear = set(self.model.groups) == {None}
 
     # -- lengths --------------------------------------------------------------------------------
 
@@ -107,24 +111,33 @@ class Curve:
 
     # -- derivative by the factor ---------------------------------------------------------------
 
+    def rate(self, factor: float) -> Loading:
+        """Change of loads and motions with the factor; at a knot of a history, on the side of the piece."""
+        if self._linear:
+            return self.model.groups[None]
+        low, high = self.piece
+        h = min(HISTORY * self.unit, 0.25 * (high - low))
+        middle = min(max(factor, low + h), high - h)
+        after, before = self.model.loading(middle + h), self.model.loading(middle - h)
+        return after.plus(before.scaled(-1.0)).scaled(0.5 / h)
+
     def slope(self, state: State, factor: float, point: Point) -> Array:
         """Derivative of the residual by the factor at a state.
 
-        Exact where loads and motions are linear in the factor; fourth order differences where a history or
-        the rotation of a held node enters.
+        Exact but for the turns of held nodes, which enter by fourth order differences.
         """
-        equations, model = self.equations, self.model
-        if self._linear:
-            there = equations.at(state, model.loading(factor + self.unit))
-            return (there.residual - point.residual) / self.unit
-        turns = max((float(np.abs(group.turn).max(initial=0.0)) for group in model.groups.values()), default=0.0)
-        h = HELD * min(self.unit, 1.0 / max(turns, 1e-300))
-        a, b = ((self._moved(state, factor + w) - self._moved(state, factor - w)) / (2.0 * w) for w in (h, 2.0 * h))
-        return np.asarray((4.0 * a - b) / 3.0)
+        loading, rate = self.model.loading(factor), self.rate(factor)
 
-    def _moved(self, state: State, factor: float) -> Array:
-        loading = self.model.loading(factor)
-        return self.equations.at(self.equations.holding(state, loading), loading).residual
+        def residual(w: float) -> Array:
+            there = loading.plus(rate.scaled(w))
+            return self.equations.at(self.equations.holding(state, there), there).residual
+
+        turning = float(np.abs(rate.turn).max(initial=0.0))
+        if turning == 0.0:
+            return np.asarray((residual(self.unit) - point.residual) / self.unit)
+        h = min(self.unit, HELD / turning)
+        a, b = ((residual(w) - residual(-w)) / (2.0 * w) for w in (h, 2.0 * h))
+        return np.asarray((4.0 * a - b) / 3.0)
 
     # -- points ---------------------------------------------------------------------------------
 
@@ -225,8 +238,3 @@ class Curve:
         if arc == 0.0:
             return None
         return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
-
-    def reversed(self, standing: Standing) -> Standing:
-        """The same point, looking back."""
-        back = Tangent(-standing.tangent.z, -standing.tangent.factor)
-        return replace(standing, tangent=back)

@@ -160,7 +160,21 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 
 
 def shapes_at(curve: Curve, event: Event) -> Array:
-    """Shapes of the eigenvalues that vanish at a bifurcation, columns, largest entry of each one."""
+    """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest entry 1.
+
+    Of several, the first is the one with most rotation about z, then about y: so that meshes agree.
+    """
     _, values, shapes = curve.prepared.around_zero(event.standing.point)
     chosen = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]]
-    return np.asarray(chosen / chosen[np.abs(chosen).argmax(axis=0), np.arange(chosen.shape[1])])
+    if chosen.shape[1] > 1:
+        number = curve.equations.number
+        liking = np.zeros(len(chosen))
+        for axis in range(number.shape[1]):
+            liking[number[number[:, axis] >= 0, axis]] = float(axis)
+        weight = curve.prepared.weight
+        chosen = chosen @ np.linalg.eigh(chosen.T @ ((weight * liking)[:, None] * chosen))[1][:, ::-1]
+    peaks = np.abs(chosen).max(axis=0)
+    # The sign is that of the first entry that counts: the largest may be one of two that differ by rounding.
+    first = (np.abs(chosen) > 0.3 * peaks).argmax(axis=0)
+    signs = np.sign(chosen[first, np.arange(chosen.shape[1])])
+    return np.asarray(chosen * (signs / peaks))

@@ -14,8 +14,9 @@ import numpy as np
 from .arclength import Curve, Standing, Tangent
 from .arrays import Array
 from .critical import Event, events_between
+from .equations import State
 
-__all__ = ["Traced", "start_of", "switched", "trace"]
+__all__ = ["Traced", "switched", "trace"]
 
 TURNING = 0.25
 """Angle between the tangents of neighbouring points, rad, that steps aim at."""
@@ -37,6 +38,9 @@ SHORTEST = 1e-7
 
 FINE = 1e-4
 """Below this length a step may meet several eigenvalues at once."""
+
+FIRST = 0.1
+"""Length of the first step, rad or shares of the unit."""
 
 EXPECTED = 3
 """Newton iterations of a step that is as long as it should be."""
@@ -60,17 +64,36 @@ class Traced:
     end: str
 
 
-def start_of(curve: Curve, standing: Standing) -> Standing:
-    """A first point, looking the way in which its tangent was given."""
-    return replace(standing, arc=0.0)
+def trace(
+    curve: Curve, start: Standing, span: tuple[float, float], count: int, knots: tuple[float, ...] = ()
+) -> Traced:
+    """Follow a curve from a point until the factor leaves the span, or for so many points.
+
+    At the knots of histories the curve has a corner: it is followed from one to the next.
+    """
+    traced = Traced([start], [], "range")
+    stops = [span[0], *knots, span[1]]
+    while traced.end == "range":
+        now = traced.points[-1]
+        pieces = [(a, b) for a, b in zip(stops, stops[1:], strict=False) if a <= now.factor <= b]
+        ahead = [(a, b) for a, b in pieces if now.factor != (b if now.tangent.factor > 0.0 else a)]
+        if not ahead:
+            return traced
+        if knots:
+            curve.piece = ahead[0]
+            along = Tangent(np.zeros_like(now.tangent.z), now.tangent.factor)
+            now = curve.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
+        part = _piece(curve, now, ahead[0], count - len(traced.points) + len(traced.events))
+        traced = Traced(traced.points + part.points[1:], traced.events + part.events, part.end)
+    return traced
 
 
-def trace(curve: Curve, start: Standing, span: tuple[float, float], count: int) -> Traced:
-    """Follow a curve from a point until the factor leaves the span, or for so many points."""
-    points, events = [start], []
-    now, before, length = start, None, 0.1
-    regular = 1
-    while regular < count:
+def _piece(curve: Curve, start: Standing, span: tuple[float, float], more: int) -> Traced:
+    """The same within one piece."""
+    points: list[Standing] = [start]
+    events: list[Event] = []
+    now, before, length = start, None, FIRST
+    for _ in range(more):
         length = min(length, _longest(curve, now, span))
         step = _step(curve, now, before, length, span)
         if step is None:
@@ -83,7 +106,6 @@ def trace(curve: Curve, start: Standing, span: tuple[float, float], count: int) 
             return Traced(points, events, "range")
         length = used * _growth(curve, now, there)
         before, now = now, there
-        regular += 1
     return Traced(points, events, "points")
 
 
@@ -110,11 +132,11 @@ def _step(
     return None
 
 
-def _same_curve(curve: Curve, now: Standing, there: Standing, expected: object, length: float) -> bool:
+def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, length: float) -> bool:
     if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST * TURNING):
         return False
     turned = length * float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
-    if curve.prepared.distance(expected, there.state) > FAR * turned + SHORTEST:  # type: ignore[arg-type]
+    if curve.prepared.distance(expected, there.state) > FAR * turned + SHORTEST:
         return False
     folded = now.tangent.factor * there.tangent.factor < 0.0
     changed = abs(there.inertia.negative - now.inertia.negative)
