@@ -141,10 +141,10 @@ class Curve:
 
     # -- points ---------------------------------------------------------------------------------
 
-    def solved(self, point: Point, right: Array) -> Array:
-        """Solutions for the Newton matrix of a point; what makes neutral directions harmless as in Newton's."""
+    def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
+        """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
         entries = point.entries.copy()
-        entries[self._diagonal[0]] += self._proximal
+        entries[self._diagonal[0]] += firm * self._proximal
         entries[self._diagonal[1]] -= DUAL
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
@@ -176,8 +176,13 @@ class Curve:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
         return self.equations.moved(start.state, z), factor
 
-    def corrected(self, state: State, factor: float, across: Tangent, arc: float = 0.0) -> Standing | None:
-        """The equilibrium that lies across a direction from a state near the curve; None where none is found."""
+    def corrected(
+        self, state: State, factor: float, across: Tangent, arc: float = 0.0, *, firm: float = 1.0
+    ) -> Standing | None:
+        """The equilibrium that lies across a direction from a state near the curve; None where none is found.
+
+        With a ``firm`` proximal term directions that the equations leave open stay as they are.
+        """
         equations, n = self.equations, self._turning
         row = self.weight * across.z
         loading = self.model.loading(factor)
@@ -188,7 +193,8 @@ class Curve:
             if count and residual <= ROUNDING:
                 break
             try:
-                both = self.solved(point, np.column_stack([-point.residual, -self.slope(state, factor, point)]))
+                right = np.column_stack([-point.residual, -self.slope(state, factor, point)])
+                both = self.solved(point, right, firm)
             except np.linalg.LinAlgError:
                 return None
             base, rate = both[:, 0], both[:, 1]
@@ -224,8 +230,11 @@ class Curve:
     # -- between two points ---------------------------------------------------------------------
 
     def between(self, a: Standing, b: Standing) -> Callable[[float], Standing | None]:
-        """The curve from one of its points to the next as a function of the arc length from the first."""
+        """The curve from one of its points to the next as a function of the way along the first tangent."""
         bend = self.bend(a, b)
+        if bend is not None:
+            along = self.inner(bend, a.tangent)
+            bend = Tangent(bend.z - along * a.tangent.z, bend.factor - along * a.tangent.factor)
 
         def at(length: float) -> Standing | None:
             return self.corrected(*self.predicted(a, length, bend), a.tangent, a.arc + length)

@@ -8,12 +8,12 @@ are bracketed by what the two points say.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from .arclength import Curve, Standing
+from .arclength import Curve, Standing, Tangent
 from .arrays import Array
 
 __all__ = ["Event", "at_factors", "events_between", "root", "shapes_at"]
@@ -23,6 +23,12 @@ SHARP = 1e-11
 
 APART = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
+
+ASIDE = 0.01
+"""Share of the arc at which a bifurcation point is interpolated from both sides."""
+
+FIRM = 1e6
+"""Times the weight of the proximal term that holds the open direction at a bifurcation point."""
 
 BESIDE = 1e-3
 """Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
@@ -72,12 +78,41 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
         standing = _sought(curve, a, b, value)
         if standing is None:
             continue
+        standing = _settled(curve, a, b, standing)
         twin = next((e for e in found if abs(e.standing.arc - standing.arc) <= APART * (b.arc - a.arc)), None)
         if twin is not None:
             found[found.index(twin)] = Event("bifurcation", twin.standing, twin.multiplicity + 1)
         else:
             found.append(Event("bifurcation", standing))
     return sorted(found, key=lambda event: event.standing.arc)
+
+
+def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing:
+    """A bifurcation point cleared of what rounding does in the direction that the equations leave open there.
+
+    State and tangent come from two points beside it, where the equations leave nothing open; Newton's method
+    then closes what that interpolation misses, held in the open direction.
+    """
+    at, place = curve.between(a, b), found.arc - a.arc
+    reach = min(ASIDE * (b.arc - a.arc), 0.5 * place, 0.5 * (b.arc - found.arc))
+    left, right = at(place - reach), at(place + reach)
+    if left is None or right is None or reach == 0.0:
+        return replace(found, tangent=_mean(curve, a, b))
+    tangent = _mean(curve, left, right)
+    # Between the two points what counts is the way along the tangent of a, as in looking for the point.
+    left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
+    state, factor = curve.predicted(left, reach, curve.bend(left, right))
+    settled = curve.corrected(state, factor, a.tangent, found.arc, firm=FIRM)
+    close = settled is not None and curve.prepared.distance(settled.state, found.state) < 1e-3
+    return replace(settled if settled is not None and close else found, tangent=tangent)
+
+
+def _per_way(tangent: Tangent, way: float) -> Tangent:
+    return Tangent(tangent.z / way, tangent.factor / way)
+
+
+def _mean(curve: Curve, a: Standing, b: Standing) -> Tangent:
+    return curve.normed(Tangent(a.tangent.z + b.tangent.z, a.tangent.factor + b.tangent.factor))
 
 
 def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], float]:

@@ -102,9 +102,12 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         raise SceneError(f"side: found {side}, accepted: 1 or -1")
     run = _Run(path.scene, Settings())
     curve = Curve(path.prepared, path.unit)
-    at = [point for point in path.points if point.kind == "bifurcation"][bifurcation - 1]
-    flat = Tangent(np.zeros(curve.equations.total), 1.0)
-    event = Event("bifurcation", curve.standing(at.state, at.factor, flat), _vanishing(curve, at.state, at.factor))
+    number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
+    flat = Tangent(np.zeros(curve.equations.total), path.points[number + 1].factor - path.points[number - 1].factor)
+    before, at, after = (curve.standing(p.state, p.factor, flat) for p in path.points[number - 1 : number + 2])
+    mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
+    here = replace(at, tangent=curve.normed(mean))
+    event = Event("bifurcation", here, max(1, here.inertia.zero))
     if not 1 <= shape <= event.multiplicity:
         raise SceneError(f"shape: found {shape}, accepted: 1 to {event.multiplicity}, those that vanish there")
     traced = run.branch(curve, event, side, shape, points or path.scene.analysis.points)
@@ -112,10 +115,6 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
     stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
     return run.answered(curve, stretch, {})
-
-
-def _vanishing(curve: Curve, state: State, factor: float) -> int:
-    return max(1, curve.prepared.inertia(curve.equations.at(state, curve.model.loading(factor))).zero)
 
 
 @dataclass
