@@ -286,7 +286,7 @@ class _Run:
         """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
         curve = coarse.curve
         steady = [p for p in traced.points if abs(p.tangent.factor) >= STEADY * curve.unit and not p.inertia.zero]
-        chosen = np.unique(np.linspace(0, len(steady) - 1, SAMPLES).round().astype(int)) if steady else []
+        chosen = np.unique(np.linspace(0, len(steady) - 1, SAMPLES).round().astype(int)).tolist() if steady else []
         largest = 0.0
         for i in chosen:
             state = transferred(curve.model, steady[i].state, fine.curve.model)
