@@ -174,14 +174,22 @@ class Curve:
         z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
         if bend is not None:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
-        return self.equations.moved(start.state, z), factor
+        return self.equations.holding(self.equations.moved(start.state, z), self.model.loading(factor)), factor
 
     def corrected(
-        self, state: State, factor: float, across: Tangent, arc: float = 0.0, *, firm: float = 1.0
+        self,
+        state: State,
+        factor: float,
+        across: Tangent,
+        arc: float = 0.0,
+        *,
+        firm: float = 1.0,
+        sharp: bool = True,
     ) -> Standing | None:
         """The equilibrium that lies across a direction from a state near the curve; None where none is found.
 
-        With a ``firm`` proximal term directions that the equations leave open stay as they are.
+        With a ``firm`` proximal term directions that the equations leave open stay as they are; a ``sharp`` one is
+        iterated to rounding.
         """
         equations, n = self.equations, self._turning
         row = self.weight * across.z
@@ -190,7 +198,7 @@ class Curve:
         point = equations.at(state, loading)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
         for count in range(ITERATIONS):
-            if count and residual <= ROUNDING:
+            if count and residual <= (ROUNDING if sharp else TOLERANCE):
                 break
             try:
                 right = np.column_stack([-point.residual, -self.slope(state, factor, point)])

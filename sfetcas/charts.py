@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as File
 from typing import Any
 
@@ -29,6 +29,9 @@ ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
 STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-."}
 MARKS = {"limit point": "o", "bifurcation": "s"}
+LOADED = 5.0
+"""A loaded node is told of unless another one moves by more than this many times as far."""
+
 SHAPES = 6
 """Deformed shapes drawn at most."""
 
@@ -64,15 +67,24 @@ class _Quantity:
 
     name: str
     values: list[Array]
+    node: str | None = None
     upright: bool = False
 
 
 def _telling(path: Path) -> _Quantity:
-    """The component that changes most: of a reaction where only motions are prescribed, else of a displacement."""
+    """The component that changes most: of a reaction where only motions are prescribed, else of a displacement.
+
+    A loaded node comes before others that do not move by far more.
+    """
     scene = path.scene
     driven = not scene.loads and scene.gravity is None
     found = list(_reactions(path) if driven else _displacements(path))
-    return max(found, key=lambda quantity: float(np.ptp(np.concatenate(quantity.values))))
+    loaded = {load.node for load in scene.loads.values()}
+
+    def change(quantity: _Quantity) -> float:
+        return float(np.ptp(np.concatenate(quantity.values))) * (LOADED if quantity.node in loaded else 1.0)
+
+    return max(found, key=change)
 
 
 def _displacements(path: Path) -> Iterator[_Quantity]:
@@ -81,7 +93,8 @@ def _displacements(path: Path) -> Iterator[_Quantity]:
     for name, node in scene.nodes.items():
         if name not in moved:
             rest = np.asarray(node.position)
-            yield from _components(f"{name}", [path.positions(name, i) - rest for i in range(len(path.branches))])
+            tables = [path.positions(name, i) - rest for i in range(len(path.branches))]
+            yield from (replace(found, node=name) for found in _components(name, tables))
     for name in scene.members:
         rest = scene.center_lines[name].positions(np.array([0.5]))[0]
         yield from _components(f"middle of {name}", [_middles(path, branch, name) - rest for branch in path.branches])

@@ -73,12 +73,12 @@ class Point:
 class Equations:
     """The stationarity equations of one model, prepared for repeated evaluation."""
 
-    def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
+    def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
         self.model = model
         element, positions = model.element, model.positions
         self._number_unknowns()
         n = len(model.rotations.turns)
-        calls = 12.0 * n
+        calls = evaluations * n
         self._kernel = Batch(chosen(element.turning, calls, kernels), n)
         self._kernel.set(1, model.beams.stiffness)
         self._kernel.set(2, model.beams.tangent)

@@ -44,6 +44,9 @@ MOST_ELEMENTS = 3000
 SAMPLES = 8
 """Points of a stretch that are compared between two meshes, beside those that were asked for."""
 
+EVALUATIONS = 500.0
+"""About as often the equations are evaluated along a path."""
+
 STEADY = 0.3
 """Share of the factor in the tangent from which on a point may be compared at its factor."""
 
@@ -180,7 +183,7 @@ class _Run:
 
     def _level(self, mesh: Mesh) -> _Level:
         begin = time.perf_counter()
-        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly))
+        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly), evaluations=EVALUATIONS)
         self.assembly = prepared.model.assembly
         _ = prepared.equations
         self.seconds["model"] += time.perf_counter() - begin

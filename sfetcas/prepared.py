@@ -40,16 +40,19 @@ class Prepared:
     kernels : str
         ``auto`` compiles element functions where that pays in one run; ``compiled`` always, for many solves;
         ``interpreted`` never.  Without a compiler everything is interpreted.
+    evaluations : float
+        How often the equations will be evaluated, for ``auto``.
     """
 
-    def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
+    def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
         self.model = model
+        self._evaluations = evaluations
         self.kernels: Kernels = kernels
 
     @functools.cached_property
     def equations(self) -> Equations:
         """The stationarity equations in rotations."""
-        return Equations(self.model, kernels=self.kernels)
+        return Equations(self.model, kernels=self.kernels, evaluations=self._evaluations)
 
     @functools.cached_property
     def _test(self) -> StabilityTest:

@@ -121,7 +121,7 @@ def _step(
     bend = None if before is None else curve.bend(before, now)
     while length > SHORTEST:
         guess = curve.predicted(now, length, bend)
-        there = curve.corrected(*guess, now.tangent, now.arc + length)
+        there = curve.corrected(*guess, now.tangent, now.arc + length, sharp=False)
         if there is not None and _same_curve(curve, now, there, guess[0], length):
             if span[0] <= there.factor <= span[1]:
                 return there, length, False
