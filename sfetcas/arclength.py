@@ -10,6 +10,7 @@ Multipliers take no part in lengths: where a structure carries more load without
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -98,6 +99,12 @@ class Curve:
         self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
         self._linear = set(self.model.groups) == {None}
 
+    def within(self, piece: tuple[float, float]) -> Curve:
+        """The same curve between two factors."""
+        there = copy.copy(self)
+        there.piece = piece
+        return there
+
     # -- lengths --------------------------------------------------------------------------------
 
     def inner(self, a: Tangent, b: Tangent) -> float:
@@ -110,6 +117,12 @@ class Curve:
         return Tangent(direction.z / length, direction.factor / length)
 
     # -- derivative by the factor ---------------------------------------------------------------
+
+    def loading(self, factor: float) -> Loading:
+        """Loads and motions at a factor; beyond the piece as they would go on without the knot at its end."""
+        within = min(max(factor, self.piece[0]), self.piece[1])
+        there = self.model.loading(within)
+        return there if within == factor else there.plus(self.rate(within).scaled(factor - within))
 
     def rate(self, factor: float) -> Loading:
         """Change of loads and motions with the factor; at a knot of a history, on the side of the piece."""
@@ -126,7 +139,7 @@ class Curve:
 
         Exact but for the turns of held nodes, which enter by fourth order differences.
         """
-        loading, rate = self.model.loading(factor), self.rate(factor)
+        loading, rate = self.loading(factor), self.rate(factor)
 
         def residual(w: float) -> Array:
             there = loading.plus(rate.scaled(w))
@@ -164,7 +177,7 @@ class Curve:
         self, state: State, factor: float, along: Tangent, *, arc: float = 0.0, iterations: int = 0
     ) -> Standing:
         """Everything that is known of an equilibrium on the curve."""
-        loading = self.model.loading(factor)
+        loading = self.loading(factor)
         point = self.equations.at(state, loading)
         tangent = self.tangent(state, factor, point, along)
         return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, iterations)
@@ -174,7 +187,7 @@ class Curve:
         z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
         if bend is not None:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
-        return self.equations.holding(self.equations.moved(start.state, z), self.model.loading(factor)), factor
+        return self.equations.holding(self.equations.moved(start.state, z), self.loading(factor)), factor
 
     def corrected(
         self,
@@ -193,7 +206,7 @@ class Curve:
         """
         equations, n = self.equations, self._turning
         row = self.weight * across.z
-        loading = self.model.loading(factor)
+        loading = self.loading(factor)
         state = equations.holding(state, loading)
         point = equations.at(state, loading)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
@@ -213,7 +226,7 @@ class Curve:
             if not np.isfinite(length + change) or turned > TURN or (count and residual > 1e-9 and length > last):
                 return None
             last = length
-            loading = self.model.loading(factor + change)
+            loading = self.loading(factor + change)
             trial = equations.holding(equations.moved(state, step), loading)
             there = equations.at(trial, loading)
             gained = relative_residual(equations, there)
@@ -225,12 +238,12 @@ class Curve:
         if residual > TOLERANCE:
             return None
         tangent = self.tangent(state, factor, point, across)
-        loading = self.model.loading(factor)
+        loading = self.loading(factor)
         return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, count)
 
     def at_factor(self, near: Standing, factor: float) -> Standing | None:
         """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there."""
-        found = self.prepared.correct(near.state, self.model.loading(factor), most=TURN)
+        found = self.prepared.correct(near.state, self.loading(factor), most=TURN)
         if not found.converged or self.prepared.distance(found.state, near.state) > TURN:
             return None
         return self.standing(found.state, factor, near.tangent, arc=near.arc)

@@ -152,7 +152,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
 
     Source: Chandrupatla 1997, A new hybrid quadratic/bisection algorithm.
     """
-    if fa * fb > 0.0 or not np.isfinite(fa * fb):
+    if fa * fb >= 0.0 or not np.isfinite(fa * fb):
         return a if abs(fa) < abs(fb) else b
     # b is the latest place, a the other end of the bracket.
     tolerance, share = SHARP * abs(b - a), 0.5

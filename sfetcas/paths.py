@@ -220,7 +220,7 @@ class _Run:
         up = 1.0 if self.span[1] > 0.0 else -1.0
         state, factor, notes = self._first_state(prepared, up)
         widest = max(map(abs, self.span))
-        curve = Curve(prepared, widest, self._first_piece(factor, up))
+        curve = Curve(prepared, widest)
         along = Tangent(np.zeros(prepared.equations.total), up)
         tangent = curve.standing(state, factor, along).tangent
         share = (tangent.factor / widest) ** 2
@@ -228,10 +228,6 @@ class _Run:
         if share < 0.5:
             curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), 1e-6 * widest)
         return curve, curve.standing(state, factor, along), notes
-
-    def _first_piece(self, factor: float, up: float) -> tuple[float, float]:
-        stops = [-np.inf, *self.knots, np.inf]
-        return next((a, b) for a, b in zip(stops, stops[1:], strict=False) if a <= factor + 1e-12 * up < b)
 
     def _first_state(self, prepared: Prepared, up: float) -> tuple[State, float, tuple[str, ...]]:
         model, equations = prepared.model, prepared.equations

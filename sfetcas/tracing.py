@@ -79,11 +79,11 @@ def trace(
         ahead = [(a, b) for a, b in pieces if now.factor != (b if now.tangent.factor > 0.0 else a)]
         if not ahead:
             return traced
-        if knots:
-            curve.piece = ahead[0]
+        here = curve.within(ahead[0]) if curve.model.scene.histories else curve
+        if here is not curve:
             along = Tangent(np.zeros_like(now.tangent.z), now.tangent.factor)
-            now = curve.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
-        part = _piece(curve, now, ahead[0], count - len(traced.points) + len(traced.events))
+            now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
+        part = _piece(here, now, ahead[0], count - len(traced.points) + len(traced.events))
         traced = Traced(traced.points + part.points[1:], traced.events + part.events, part.end)
     return traced
 
