@@ -60,6 +60,8 @@ def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     limit = _limit(curve, a, b)
     if limit is None:
         return []
+    if abs(b.inertia.negative - a.inertia.negative) == 1:
+        return [Event("limit", limit)]
     at, arc, place = curve.between(a, b), b.arc - a.arc, limit.arc - a.arc
     left = at(place - min(BESIDE * arc, 0.5 * place)) or a
     right = at(place + min(BESIDE * arc, 0.5 * (arc - place))) or b
@@ -152,7 +154,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
 
     Source: Chandrupatla 1997, A new hybrid quadratic/bisection algorithm.
     """
-    if fa * fb >= 0.0 or not np.isfinite(fa * fb):
+    if a == b or fa * fb >= 0.0 or not np.isfinite(fa * fb):
         return a if abs(fa) < abs(fb) else b
     # b is the latest place, a the other end of the bracket.
     tolerance, share = SHARP * abs(b - a), 0.5

@@ -35,8 +35,11 @@ from .tracing import Traced, switched, trace
 
 __all__ = ["follow_path", "switch"]
 
-LEVELS = 6
+LEVELS = 10
 """Most halvings of the first mesh."""
+
+PATIENCE = 5
+"""After so many halvings one that does not halve the error is the last."""
 
 MOST_ELEMENTS = 3000
 """A mesh that the library chooses does not grow beyond this."""
@@ -162,19 +165,42 @@ class _Run:
     def path(self) -> Path:
         """The answer."""
         begin = time.perf_counter()
-        ends = self.analysis.model_copy(update={"steps": tuple(f for f in self.span if f)})
-        coarse = self._level(pilot_of(self.scene.model_copy(update={"analysis": ends}), self.settings))
+        coarse, last = self._level(self._first_mesh()), np.inf
         for count in range(LEVELS):
             fine = self._level(self._halved(coarse.curve.model.mesh))
             errors = self._errors(coarse, fine)
             largest = max(errors.values(), default=0.0)
-            enough = largest <= self.accuracy or count == LEVELS - 1
             if self.fixed == set(self.scene.members):
                 return self._answer(coarse, errors, largest, begin)
-            if enough or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
-                return self._answer(fine, errors, largest, begin)
-            coarse = fine
-        raise AssertionError("the loop above returns")
+            hopeless = count >= PATIENCE and largest > 0.5 * last
+            if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
+                break
+            coarse, last = fine, largest
+        return self._answer(fine, errors, largest, begin)
+
+    def _first_mesh(self) -> Mesh:
+        """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
+        plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
+        if graded.elements <= 2 * plain.elements:
+            return graded
+        curve, start, _ = self._start(self._prepared(plain))
+        met = [point.factor for point in trace(curve, start, self.span, self.analysis.points, self.knots).points]
+        return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
+
+    def _mesh(self, factors: tuple[float, ...]) -> Mesh:
+        """The mesh that statics begins with at the given factors."""
+        steps = tuple(factor for factor in factors if factor) or (self._widest,)
+        analysis = self.analysis.model_copy(update={"steps": steps})
+        return pilot_of(self.scene.model_copy(update={"analysis": analysis}), self.settings)
+
+    def _prepared(self, mesh: Mesh) -> Prepared:
+        begin = time.perf_counter()
+        model = assemble(self.scene, mesh, assembly=self.assembly)
+        prepared = Prepared(model, evaluations=EVALUATIONS)
+        self.assembly = model.assembly
+        _ = prepared.equations
+        self.seconds["model"] += time.perf_counter() - begin
+        return prepared
 
     def _halved(self, mesh: Mesh) -> Mesh:
         everything = self.fixed == set(self.scene.members)
@@ -182,15 +208,11 @@ class _Run:
         return mesh.refined(marks)
 
     def _level(self, mesh: Mesh) -> _Level:
-        begin = time.perf_counter()
-        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly), evaluations=EVALUATIONS)
-        self.assembly = prepared.model.assembly
-        _ = prepared.equations
-        self.seconds["model"] += time.perf_counter() - begin
-        curve, start, notes = self._start(prepared)
+        curve, start, notes = self._start(self._prepared(mesh))
         main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
-        if len(main.traced.points) < 2:
-            detail = f"the path cannot be followed from factor {start.factor:g}"
+        way = max(abs(point.factor - start.factor) for point in main.traced.points)
+        if main.traced.end == "lost" and way < BEGINNING * self._widest:
+            detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
         level = _Level(curve, [main], notes)
         bends = [event for event in main.traced.events if event.kind == "bifurcation"]

@@ -42,6 +42,9 @@ FINE = 1e-4
 FIRST = 0.1
 """Length of the first step, rad or shares of the unit."""
 
+MOST_AT_ONCE = 6
+"""So many eigenvalues at most change their signs at once: more do so where a mesh is too coarse for what it carries."""
+
 EXPECTED = 3
 """Newton iterations of a step that is as long as it should be."""
 
@@ -141,7 +144,7 @@ def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, l
     folded = now.tangent.factor * there.tangent.factor < 0.0
     changed = abs(there.inertia.negative - now.inertia.negative)
     plausible = changed == 1 if folded else changed <= 2
-    return plausible or length < FINE
+    return plausible or (length < FINE and changed <= MOST_AT_ONCE)
 
 
 def _at_end(curve: Curve, now: Standing, there: Standing, span: tuple[float, float]) -> Standing | None:
