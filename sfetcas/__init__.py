@@ -4,7 +4,8 @@ The flow, in the order of the names below:
 
 1. a :class:`Scene` says what there is: sections, nodes, members, loads, motions (or :func:`load` a file);
 2. :func:`solve` finds its equilibria, to the accuracy asked for, each with a certificate;
-3. a :class:`Solution` answers by the names of the scene.
+3. a :class:`Solution` answers by the names of the scene; a :class:`Path` does so along a path, and :func:`switch`
+   follows other branches from its bifurcations.
 
 Underneath: :func:`assemble` makes the :class:`Model` of a scene on a :class:`Mesh`; :class:`Prepared` keeps its
 solvers for repeated solves by :func:`solve_model`; :func:`equilibrium_nlp` opens the problem as a CasADi program
@@ -14,19 +15,22 @@ Source: Barraco and Munteanu, A special finite element for static and dynamic st
 large motion, Part 1.
 """
 
+from .analyses import solve
 from .checks import check
 from .errors import SceneError, SolveError, Status
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Model, assemble
 from .nlp import NLP, Ipopt, NLPResult, Solver
 from .open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
+from .path import Branch, Path, PathPoint
+from .paths import switch
 from .prepared import Prepared
 from .scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
 from .scenefile import dump, load
 from .sections import CrossSection
 from .shapes import Arc, Curvature, Helix, Spline, Straight
 from .solution import Certificate, Equilibrium, Solution
-from .statics import Settings, solve, solve_model
+from .statics import Settings, solve_model
 
 __version__ = "0.1.0"
 
@@ -34,6 +38,7 @@ __all__ = [
     "NLP",
     "Analysis",
     "Arc",
+    "Branch",
     "Certificate",
     "CrossSection",
     "Curvature",
@@ -51,6 +56,8 @@ __all__ = [
     "Node",
     "OpenAnswer",
     "OpenProblem",
+    "Path",
+    "PathPoint",
     "Prepared",
     "Scene",
     "SceneError",
@@ -69,5 +76,6 @@ __all__ = [
     "load",
     "solve",
     "solve_model",
+    "switch",
     "uniform_mesh",
 ]

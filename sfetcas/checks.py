@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .errors import SceneError
+from .path import Path
 from .records import nearest, say
 from .scene import Expect, Scene
 from .solution import Equilibrium, Solution
@@ -35,7 +38,7 @@ class Check:
     passed: bool
 
 
-def check(scene: Scene, solution: Solution) -> list[Check]:
+def check(scene: Scene, solution: Solution | Path) -> list[Check]:
     """Compare the answers with all expectations of the scene, in their order.
 
     Raises
@@ -47,7 +50,10 @@ def check(scene: Scene, solution: Solution) -> list[Check]:
     entries = _assigned(scene, solution)
     for i, expect in enumerate(scene.expect):
         try:
-            entry, own = entries[i] if i in entries else (_step(solution, expect), True)
+            entry, own = entries[i] if i in entries else (_entry_of(solution, expect), True)
+        except SceneError as error:
+            raise error.within("expect", str(i)) from None
+        try:
             value = look_up(entry, expect.quantity, expect.at)
         except SceneError as error:
             raise error.within("expect", str(i), "quantity") from None
@@ -63,10 +69,31 @@ def check(scene: Scene, solution: Solution) -> list[Check]:
     return checks
 
 
-def _step(solution: Solution, expect: Expect) -> Equilibrium:
+def _entry_of(solution: Solution | Path, expect: Expect) -> Equilibrium:
+    """The answer that an expectation speaks of."""
+    if isinstance(solution, Path):
+        return _entry_on_path(solution, expect)
     if expect.step is None:
         return solution.last
     return min(solution.steps, key=lambda step: abs(step.factor - float(expect.step or 0.0)))
+
+
+def _entry_on_path(path: Path, expect: Expect) -> Equilibrium:
+    for key in ("limit_point", "bifurcation"):
+        number = getattr(expect, key)
+        if number is not None:
+            return _numbered(getattr(path, f"{key}s"), number, key)
+    if expect.step is None:
+        return path.last
+    factor = expect.step
+    met = [step for step in path.steps if math.isclose(step.factor, factor, abs_tol=1e-12)]
+    return _numbered(met, expect.crossing or 1, "crossing")
+
+
+def _numbered(entries: Sequence[Equilibrium], number: int, key: str) -> Equilibrium:
+    if number > len(entries):
+        raise SceneError(f"found {number}, but the path has {len(entries)}", (key,))
+    return entries[number - 1]
 
 
 def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
@@ -108,7 +135,7 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 
 
-def _assigned(scene: Scene, solution: Solution) -> dict[int, tuple[Equilibrium, bool]]:
+def _assigned(scene: Scene, solution: Solution | Path) -> dict[int, tuple[Equilibrium, bool]]:
     """Entry of each expect, by its place, where a search listed several of one factor; whether it is its own.
 
     Numbers of ``equilibrium`` go to different entries so that as many as possible are met; an expect without one
@@ -119,7 +146,7 @@ def _assigned(scene: Scene, solution: Solution) -> dict[int, tuple[Equilibrium, 
     chosen: dict[int, tuple[Equilibrium, bool]] = {}
     groups: dict[float, dict[int, list[int]]] = {}
     for i, expect in enumerate(scene.expect):
-        factor = (solution.last if expect.step is None else _step(solution, expect)).factor
+        factor = (solution.last if expect.step is None else _entry_of(solution, expect)).factor
         if expect.equilibrium is None:
             chosen[i] = next(step for step in solution.steps if step.factor == factor), True
         else:

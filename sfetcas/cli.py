@@ -14,14 +14,17 @@ from typing import Any
 
 import numpy as np
 
+from .analyses import solve
 from .checks import Check, check
 from .elements import ELEMENTS
 from .errors import SceneError, SolveError, Status
 from .model import assemble
+from .path import Branch
+from .path import Path as Course
 from .prepared import Prepared
 from .scenefile import load
 from .solution import Equilibrium, Solution
-from .statics import Settings, pilot_of, solve
+from .statics import Settings, pilot_of
 
 __all__ = ["main"]
 
@@ -103,7 +106,7 @@ def _run(options: argparse.Namespace) -> int:
             _check_writable(path)
             if path.exists() and path.samefile(options.file):
                 raise SceneError(f"{path}: is the scene itself, accepted: another file")
-    drawing = _drawing(options.plot)
+    drawing = _drawing(options.plot, scene.analysis.type == "path")
     solution = solve(scene, settings)
     if options.json is not None:
         _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
@@ -115,15 +118,16 @@ def _run(options: argparse.Namespace) -> int:
     return SOLVED if solution.status is Status.SOLVED and all(c.passed for c in checks) else SHORT
 
 
-def _drawing(path: Path | None) -> Callable[[Solution, Path], None] | None:
+def _drawing(path: Path | None, chart: bool) -> Callable[[Any, Path], None] | None:
     if path is None:
         return None
     # Matplotlib costs more than most solves: only a picture pays for it.
+    from .charts import save_chart
     from .plotting import ENDINGS, save_picture
 
     if path.suffix.lower() not in ENDINGS:
         raise SceneError(f"{path}: found the ending {path.suffix!r} of a picture, accepted: {', '.join(ENDINGS)}")
-    return save_picture
+    return save_chart if chart else save_picture
 
 
 def _check_writable(path: Path) -> None:
@@ -156,20 +160,49 @@ def _umask() -> int:
     return mask
 
 
-def _report(solution: Solution, seconds: float) -> None:
+def _report(solution: Solution | Course, seconds: float) -> None:
     model = solution.last.model
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(
         f"  {model.mesh.elements} elements {model.element.name}, {model.unknowns} unknowns, {model.assembly} assembly"
     )
+    if isinstance(solution, Course):
+        _report_path(solution)
     for step, place in zip(solution.steps, _places(solution), strict=True):
         _report_step(step, place)
     split = f"model {solution.seconds['model']:.3f} s, solve {solution.seconds['solve']:.3f} s"
     print(f"{solution.status.value} in {seconds:.3f} s ({split})")
 
 
-def _places(solution: Solution) -> list[str]:
+def _report_path(path: Course) -> None:
+    for branch in path.branches:
+        name = f"branch at bifurcation {branch.bifurcation}, side {branch.side:+d}" if branch.bifurcation else "path"
+        low, high = branch.factors.min(), branch.factors.max()
+        print(f"{name}: {len(branch.points)} points, factors {low:.6g} to {high:.6g}; {branch.end}")
+        for stable, first, last in branch.stretches():
+            ends = " to ".join(f"{branch.points[i].factor:.9g}" for i in (first, last))
+            kind = {"True": "stable", "False": "unstable"}.get(str(stable), "neutral")
+            print(f"  {kind} from factor {ends}")
+        _report_events(branch)
+    if path.error_estimate is not None:
+        print(f"  estimated error along it {path.error_estimate:.1e}")
+    for note in path.notes:
+        print(f"  note: {note}")
+
+
+def _report_events(branch: Branch) -> None:
+    for kind, entries in (("limit point", branch.limit_points), ("bifurcation", branch.bifurcations)):
+        for i, entry in enumerate(entries, start=1):
+            error = entry.certificate.error_estimate
+            said = "" if error is None else f", estimated error {error:.1e}"
+            ways = f", {entry.certificate.negative} ways out" if entry.certificate.negative else ""
+            print(f"  {kind} {i}: factor {entry.factor:.12g}{ways}{said}")
+            for note in entry.notes:
+                print(f"    note: {note}")
+
+
+def _places(solution: Solution | Course) -> list[str]:
     """Which of several equilibria of its factor each entry is, in words; empty where one was asked for."""
     factors = [step.factor for step in solution.steps]
     if solution.scene.analysis.equilibria == "one":
@@ -191,10 +224,9 @@ def _report_step(step: Equilibrium, place: str) -> None:
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
     proof = step.certificate
     kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
-    print(
-        f"  {kind}, smallest eigenvalue {proof.smallest:.4g} N, residual {proof.residual:.1e}, "
-        f"estimated error {proof.error_estimate:.1e} of the size"
-    )
+    error = proof.error_estimate
+    said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
+    print(f"  {kind}, smallest eigenvalue {proof.smallest:.4g} N, residual {proof.residual:.1e}, {said}")
     for note in step.notes:
         print(f"  note: {note}")
 
@@ -231,6 +263,9 @@ def _row(c: Check) -> tuple[str, ...]:
     place = "" if expect.at is None else f" at {expect.at:g}"
     step = "" if expect.step is None else f" step {expect.step:g}"
     step += "" if expect.equilibrium is None else f" equilibrium {expect.equilibrium}"
+    for key in ("crossing", "limit_point", "bifurcation"):
+        number = getattr(expect, key)
+        step += "" if number is None else f" {key.replace('_', ' ')} {number}"
     tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"
     verdict = "ok" if c.passed else "FAILED"
     return expect.quantity + place + step, _short(c.value), _short(expect.value), f"{c.error:.1e}", tolerance, verdict

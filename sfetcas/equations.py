@@ -72,19 +72,20 @@ class Point:
     residual: Array
     scale: Array
     entries: Array
+    spin: Array
 
 
 class Equations:
     """The stationarity equations of one model, prepared for repeated evaluation."""
 
-    def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
+    def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
         self.model = model
         # Whether rows depend on each other where Newton's method began; looked for when it does.
         self.redundant: bool | None = None
         element = model.element
         self._number_unknowns()
         n = len(model.rotations.turns)
-        calls = 12.0 * n
+        calls = evaluations * n
         self._kernel = Batch(chosen(element.turning, calls, kernels), n)
         self._kernel.set(1, model.beams.stiffness)
         self._kernel.set(2, model.beams.tangent)
@@ -281,7 +282,17 @@ class Equations:
             parts.append(self._work.entries(state.q, applied, convex=convex))
         values = np.concatenate([*parts, self._zeros])[self._valid]
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
-        return Point(potential, stored, residual, scale, entries)
+        return Point(potential, stored, residual, scale, entries, np.array(spin))
+
+    def slope(self, point: Point, rate: Loading) -> Array:
+        """Derivative of the residual along a change of nodal loads and displacements at a point."""
+        positions = self.model.positions
+        constant = self.segment_pulls(np.zeros(self.rows), rate)[self._owner]
+        slope = self._gathered(np.einsum("eca,ea->ec", point.spin, constant))
+        slope[: self.turning_unknowns] -= self._on_unknowns(rate.moment)
+        slope[self.turning_unknowns : self.unknowns] = -(positions.Y.T @ rate.force.ravel())
+        slope[self.unknowns : self.unknowns + len(positions.rows)] = positions.BZ @ rate.shift
+        return slope
 
     def places(self, state: State, loading: Loading) -> Array:
         """Displacements of all places at a state, (places * axes,), dimensionless."""

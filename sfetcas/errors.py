@@ -31,6 +31,7 @@ class Status(enum.Enum):
 
     SOLVED = "solved"
     SHORT = "solved, but not to the accuracy asked for"
+    CUT = "solved, but the path could not be followed to the end of its range"
     INFEASIBLE = "no shape of the members satisfies all supports, joints and motions"
     UNBOUNDED = "the loads are not held: the energy falls without bound"
     ITERATIONS = "the solver used up its iterations"

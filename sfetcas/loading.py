@@ -95,6 +95,17 @@ class Loading:
         return Loading(**parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
 
     @property
+    def nodal(self) -> bool:
+        """Whether it is forces and moments on places, and displacements of them, only."""
+        loaded = any(load.any() for load in self.loads)
+        return not (self.follows or self.pull.any() or loaded)
+
+    @property
+    def driven(self) -> float:
+        """Largest angle or travel of a driven joint."""
+        return max((float(np.abs(load).max()) for load in self.loads if load.shape[1] == 1), default=0.0)
+
+    @property
     def follows(self) -> bool:
         """Whether forces or moments turn with what they act on."""
         return bool(self.following.any() or self.tangential.any() or self.twist.any())

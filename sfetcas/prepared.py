@@ -12,7 +12,7 @@ import numpy as np
 from . import quaternion
 from .arrays import Array
 from .doctor import Diagnosis, diagnose
-from .equations import Equations, State
+from .equations import Equations, Point, State
 from .errors import SolveError, Status
 from .guess import first_guess, lacks_slack, restore
 from .kernels import Kernels
@@ -21,7 +21,7 @@ from .model import Model
 from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem
-from .stability import Stability, StabilityTest
+from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
 
@@ -41,16 +41,19 @@ class Prepared:
     kernels : str
         ``auto`` compiles element functions where that pays in one run; ``compiled`` always, for many solves;
         ``interpreted`` never.  Without a compiler everything is interpreted.
+    evaluations : float
+        How often the equations will be evaluated, for ``auto``.
     """
 
-    def __init__(self, model: Model, *, kernels: Kernels = "auto") -> None:
+    def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
         self.model = model
+        self._evaluations = evaluations
         self.kernels: Kernels = kernels
 
     @functools.cached_property
     def equations(self) -> Equations:
         """The stationarity equations in rotations."""
-        return Equations(self.model, kernels=self.kernels)
+        return Equations(self.model, kernels=self.kernels, evaluations=self._evaluations)
 
     @functools.cached_property
     def diagnosis(self) -> Diagnosis:
@@ -97,6 +100,16 @@ class Prepared:
             nothing = np.zeros(equations.turning_unknowns), np.zeros(equations.displacement_unknowns)
             return Stability("not defined", 0, np.nan, *nothing)
         return self._test.test(found.point)
+
+    def inertia(self, point: Point) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues, none where there is no potential; paths ask here."""
+        if not self.model.has_potential:
+            return Inertia(0, 0)
+        return self._test.inertia(point)
+
+    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+        """Eigenvalues around zero, see :class:`~sfetcas.stability.StabilityTest`."""
+        return self._test.around_zero(point)
 
     def negative(self, found: Corrected) -> int:
         """Number of negative eigenvalues at a state; none is counted where there is no potential."""

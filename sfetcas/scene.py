@@ -39,10 +39,25 @@ def _tolerance(value: float) -> float:
     return value
 
 
-def _counting(value: float) -> int:
-    if value < 1.0 or value != int(value):
-        raise ValueError(f"found {value:g}, accepted: a whole number from 1 on")
-    return int(value)
+def _whole(value: Any, least: int) -> int:
+    found = number(value)
+    if found != int(found) or not least <= found <= MOST_POINTS:
+        raise ValueError(f"found {say(value)}, accepted: a whole number from {least} to {MOST_POINTS}")
+    return int(found)
+
+
+MOST_POINTS = 100_000
+"""Points of a path, and with them everything that is counted along one."""
+
+Points = Annotated[int, BeforeValidator(lambda value: _whole(value, 2))]
+Bends = Annotated[int, BeforeValidator(lambda value: _whole(value, 0))]
+Count = Annotated[int, BeforeValidator(lambda value: _whole(value, 1))]
+
+
+def _range(value: tuple[float, ...]) -> tuple[float, float]:
+    if len(value) != 2 or not value[0] <= 0.0 <= value[1] or value[0] == value[1]:
+        raise ValueError(f"found {say(value)}, accepted: two rising numbers with zero between them or at one end")
+    return value[0], value[1]
 
 
 def _expected(value: Any) -> Any:
@@ -59,18 +74,47 @@ class Analysis(Staged):
 
     Parameters
     ----------
-    type : static
+    type : static, or path: the equilibria from factor 0 on, through limit points
     accuracy : wanted error of the positions relative to the size of the scene, up to 0.1
     steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
     unstable : leave an unstable equilibrium for a stable one, or stay there
     equilibria : one, to which the loads lead when they grow together from zero, or all that a search finds
+    range : (2,) - path: the factors between which it is followed, downwards where the range ends at 0
+    points : path: it ends after so many points
+    branches : path: from the first so many bifurcation points the branches that cross there are followed too, to
+        both sides, each for so many points; their answers stand after those of the path
+
+    On a path each crossing of a factor of ``steps`` is an answer, in the order in which they are met.
     """
 
-    type: Literal["static"] = "static"
+    type: Literal["static", "path"] = "static"
     accuracy: Annotated[Number, AfterValidator(_accuracy)] = 1e-4
     steps: Numbers = (1.0,)
     unstable: Literal["leave", "stay"] = "leave"
     equilibria: Literal["one", "all"] = "one"
+    range: Annotated[Numbers, AfterValidator(_range)] | None = None
+    points: Points = 200
+    branches: Bends = 0
+
+    @model_validator(mode="after")
+    def _check(self) -> Analysis:
+        if self.type == "path" and self.range is None:
+            raise SceneError("the key 'range' is missing: a path is followed between two factors")
+        if self.type == "path" and self.equilibria == "all":
+            raise SceneError(
+                "found 'all', accepted: 'one' on a path; its branches are the key 'branches'", ("equilibria",)
+            )
+        if self.type != "path":
+            for key in ("range", "points", "branches"):
+                if key in self.model_fields_set:
+                    raise SceneError(f"found type {self.type!r}, accepted: type 'path' with this key", (key,))
+        return self
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The range of a path."""
+        assert self.range is not None
+        return self.range[0], self.range[1]
 
 
 class Expect(Staged):
@@ -86,6 +130,8 @@ class Expect(Staged):
     at : fraction of the length of a member
     step : factor of the answer; left out: the last step
     equilibrium : expects of the same number are met by one of several equilibria, which one is free
+    crossing : path: which crossing of that factor, 1 is the first
+    limit_point, bifurcation : path: which limit or bifurcation point
     """
 
     quantity: str
@@ -95,10 +141,17 @@ class Expect(Staged):
     source: str = ""
     at: Fraction | None = None
     step: Number | None = None
-    equilibrium: Annotated[Number, AfterValidator(_counting)] | None = None
+    equilibrium: Count | None = None
+    crossing: Count | None = None
+    limit_point: Count | None = None
+    bifurcation: Count | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Expect:
+        if self.crossing is not None and self.step is None:
+            raise SceneError("the key 'step' is missing: a crossing is one of a factor", ("crossing",))
+        if sum(key is not None for key in (self.step, self.limit_point, self.bifurcation)) > 1:
+            raise SceneError("accepted: one of the keys step, limit_point, bifurcation")
         if self.tolerance is None and isinstance(self.value, (float, tuple)):
             raise SceneError(
                 "the key 'tolerance' is missing: only true, false, whole numbers and texts are met exactly"
@@ -356,6 +409,10 @@ def _check_expect(scene: Scene) -> None:
         if expect.step is not None and not any(math.isclose(expect.step, f) for f in scene.analysis.steps):
             accepted = f"a factor of analysis.steps, {say(scene.analysis.steps)}"
             raise SceneError(f"found {expect.step:g}, accepted: {accepted}", ("expect", str(i), "step"))
+        for key in ("crossing", "limit_point", "bifurcation"):
+            if getattr(expect, key) is not None and scene.analysis.type != "path":
+                message = f"found the analysis {scene.analysis.type!r}, accepted: 'path' with this key"
+                raise SceneError(message, ("expect", str(i), key))
 
 
 _RULES: tuple[Callable[[Scene], None], ...] = (

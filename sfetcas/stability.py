@@ -20,7 +20,7 @@ import numpy as np
 from .arrays import Array
 from .equations import Equations, Point
 
-__all__ = ["Stability", "StabilityTest"]
+__all__ = ["LIGHT", "Inertia", "Stability", "StabilityTest"]
 
 NEUTRAL = 1e-7
 """Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
@@ -30,6 +30,14 @@ ROUNDING = 2e-15
 
 DENSE = 120
 """Up to this many unknowns all eigenvalues by LAPACK are cheaper than factorisations (measured)."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Numbers of eigenvalues below zero, and of those that cannot be told from zero."""
+
+    negative: int
+    zero: int
 
 
 @dataclass(frozen=True)
@@ -165,6 +173,34 @@ class StabilityTest:
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
+    def inertia(self, point: Point) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues alone."""
+        if self._n == 0:
+            return Inertia(0, 0)
+        entries = self._weighted(point)
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        if not self._is_dense:
+            below = self._below(point, entries, -limit)
+            return Inertia(below, self._below(point, entries, limit) - below)
+        values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
+        below = int((values < -limit).sum())
+        return Inertia(below, int((values <= limit).sum()) - below)
+
+    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+        """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
+
+        Few unknowns: all eigenvalues.  Many: the few that are nearest to zero.
+        """
+        entries, turning = self._weighted(point), self.equations.turning_unknowns
+        root = np.sqrt(self._weights)[:, None]
+        if self._is_dense:
+            projected, basis = self._projected(entries, self._rows(point))
+            values, vectors = np.linalg.eigh(projected)
+            return 0, values, (basis @ vectors / root)[:turning]
+        values, vectors = self._inverse_iterated(point, entries)
+        before = self._below(point, entries, float(values[0] - 1e-6 * np.abs(values).max()))
+        return before, values, (vectors / root)[:turning]
+
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
         """The full matrix on the null space of the rows, and a basis of that."""
         h = np.zeros((self._n, self._n))
@@ -278,6 +314,33 @@ class StabilityTest:
                 shift = new[0] - 0.1 * (new[-1] - new[0]) - 1e-3 * abs(new[0])
         return smallest, block[:, 0]
 
+    def _inverse_iterated(self, point: Point, entries: Array) -> tuple[Array, Array]:
+        """The eigenvalues nearest to zero, half of a block, and their vectors."""
+        equations, n = self.equations, self._n
+        root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
+        block = np.random.default_rng(0).standard_normal((n, width))
+        loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
+        starts = np.searchsorted(self._h_column, np.arange(n))
+        shifted = point.entries.copy()
+        shifted[equations.diagonal[self._chosen]] += NEUTRAL**2 * self._weights
+        shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
+        equations.solver.factor(shifted)
+        for _ in range(60):
+            loads[self._chosen] = root * block
+            block = np.linalg.qr(root * equations.solver.solve(loads)[self._chosen])[0]
+            # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
+            product = np.add.reduceat(entries[:, None] * block[self._h_row], starts, axis=0)
+            values, turn = np.linalg.eigh(block.T @ product)
+            block = block @ turn
+            nearest = np.sort(np.argsort(np.abs(values))[:NEAREST])
+            if np.abs(values[nearest] - last).max() <= 1e-10 * np.abs(values[nearest]).max():
+                break
+            last = values[nearest]
+        return values[nearest], block[:, nearest]
+
+
+NEAREST = 4
+"""Eigenvalues that are looked at around zero where there are many: in space two may vanish at once."""
 
 DENSE_WITH_TRAVEL = 500
 """The same where displacements take part."""

@@ -1,0 +1,44 @@
+"""What a scene asks for is what is done: statics or a path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from . import paths, statics
+from .path import Path
+from .scene import Scene
+from .solution import Solution
+from .statics import Settings
+
+__all__ = ["solve"]
+
+
+def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution | Path:
+    """The answer of a scene, by the type of its analysis.
+
+    Parameters
+    ----------
+    scene : Scene
+    settings : Settings, optional
+        Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
+
+    Returns
+    -------
+    Solution or Path
+        Both have ``steps``, ``last``, ``status`` and ``to_dict``.
+
+    Raises
+    ------
+    SceneError
+        The scene asks for what cannot be modelled.
+    SolveError
+        There is no equilibrium that could be found; the sentence says why.
+
+    Example
+    -------
+    >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
+    >>> solve(scene).last.position("tip")                       # doctest: +SKIP
+    """
+    settings = replace(settings or Settings(), **changes)
+    return paths.follow_path(scene, settings) if scene.analysis.type == "path" else statics.solve(scene, settings)

@@ -1,0 +1,630 @@
+"""Paths: what they meet, where, and that they are equilibria to the accuracy asked for."""
+
+import copy
+import json
+import time
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+
+from sfetcas import Scene, SceneError, SolveError, Status, check, load, solve, solve_model, switch
+from sfetcas.arclength import Curve, Tangent
+from sfetcas.charts import chart
+from sfetcas.cli import main
+from sfetcas.critical import events_between, root
+from sfetcas.equations import State
+from sfetcas.mesh import uniform_mesh
+from sfetcas.model import assemble
+from sfetcas.prepared import Prepared
+from sfetcas.tracing import trace
+
+PROBLEMS = File(__file__).parent.parent / "problems"
+P_LEE = (1.85587465394782, -0.942128745387476)
+"""Limit loads of Lee's frame: collocation and shooting, agreeing to 1e-14."""
+EULER = {
+    ("clamped", None): np.pi**2 * np.array([0.25, 2.25, 6.25]),
+    ("hinge", "hinge"): np.pi**2 * np.array([1.0, 4.0, 9.0]),
+    ("clamped", "fixed"): np.array([4.0 * np.pi**2, 80.7629142257065, 16.0 * np.pi**2]),
+}
+
+
+def table(name, **analysis):
+    """The scene of a problem file as a dictionary, with another analysis and nothing expected."""
+    found = load(PROBLEMS / f"{name}.toml").to_dict()
+    found.pop("expect")
+    found["analysis"] = {"type": "path", **analysis}
+    return found
+
+
+def made(found, **changes):
+    found = copy.deepcopy(found)
+    for place, value in changes.items():
+        *outer, last = place.split("__")
+        here = found
+        for key in outer:
+            here = here[key]
+        here[last] = value
+    return Scene.from_dict(found)
+
+
+def lee(**analysis):
+    return table("lee_frame", **{"range": [-1.5, 2.5], **analysis})
+
+
+def column(foot="clamped", head=None, *, space=False, **analysis):
+    found = table("euler_column_clamped_free", **analysis)
+    found["nodes"]["foot"]["support"] = foot
+    if head is not None:
+        found["nodes"]["head"] |= {"support": "slider", "direction": [1, 0], "rotation": head}
+    if space:
+        found["dimension"] = "space"
+        found["sections"]["strip"] = {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}
+    return found
+
+
+def curve_of(scene, elements=2):
+    """The curve of a scene from the undeformed state on a uniform mesh, and its first point."""
+    prepared = Prepared(assemble(scene, uniform_mesh(scene, 4, elements)))
+    curve = Curve(prepared, max(map(abs, scene.analysis.span)))
+    state = prepared.equations.start(prepared.model.loading(0.0))
+    return curve, curve.standing(state, 0.0, Tangent(np.zeros(prepared.equations.total), 1.0))
+
+
+@pytest.fixture(scope="module")
+def lee_path():
+    return solve(made(lee(accuracy=1e-8, steps=[0.5])))
+
+
+# -- what a path consists of ----------------------------------------------------------------------
+
+
+def test_points_are_what_repeated_solves_find(lee_path):
+    prepared = lee_path.prepared
+    first = [point for point in lee_path.points if not point.kind][:12]
+    before = None
+    for point in first[1:]:
+        before = solve_model(prepared, point.factor, start=before)
+        # Both are polished to rounding; the frame is 120 m high.
+        assert lee_path.fields(point).position("load") == pytest.approx(before.position("load"), abs=1e-9)
+
+
+def test_every_point_is_an_equilibrium(lee_path):
+    for point in lee_path.points:
+        found = lee_path.prepared.equations.at(point.state, point.loading)
+        # 1e-10 is what the steps converge to; a point between would miss by 1e-3.
+        assert (np.abs(found.residual) / found.scale).max() < 2e-10
+
+
+def test_energy_grows_by_the_work_of_the_load(lee_path):
+    equations, model = lee_path.prepared.equations, lee_path.model
+    energy = [equations.at(p.state, p.loading).strain * model.scales.moment for p in lee_path.points]
+    sunk = -lee_path.positions("load")[:, 1]
+    factors = lee_path.main.factors
+    work = np.sum(0.5 * (factors[1:] + factors[:-1]) * np.diff(sunk))
+    # Trapezoids over about 70 steps.
+    assert work == pytest.approx(energy[-1] - energy[0], rel=5e-3)
+    assert energy[-1] > 50.0
+
+
+def test_neighbours_are_near_and_look_the_same_way():
+    scene = made(lee())
+    curve, start = curve_of(scene)
+    points = trace(curve, start, scene.analysis.span, 200).points
+    for a, b in zip(points, points[1:], strict=False):
+        assert curve.inner(a.tangent, b.tangent) > np.cos(0.63)
+        assert curve.prepared.distance(a.state, b.state) < 0.6
+
+
+def test_range_and_points_end_a_path():
+    path = solve(made(lee(range=[-3, 1.0])))
+    assert path.main.factors[[0, -1]].tolist() == [0.0, 1.0]
+    assert "leaves the range at 1" in path.main.end
+    down = solve(made(lee(range=[-2, 0])))
+    assert down.main.factors.min() == pytest.approx(-2.0, abs=1e-12)
+    assert np.all(np.diff(down.main.factors) < 0.0)
+    short = solve(made(lee(points=7)))
+    assert len(short.points) == 7
+    assert short.main.end == "7 points"
+
+
+def test_crossings_stand_in_the_order_met(lee_path):
+    path = solve(made(lee(steps=[0.5, -0.5, 1.0], accuracy=1e-5)))
+    assert [step.factor for step in path.steps] == [0.5, 1.0, 1.0, 0.5, -0.5, -0.5, 0.5, 1.0]
+    assert [step.certificate.stable for step in path.steps] == [True, True, False, False, False, True, True, True]
+    assert path.last is path.steps[-1]
+
+
+def test_a_factor_that_is_not_met_has_no_crossing():
+    scene = made(lee(range=[0, 1.0], steps=[0.0, 0.5, 1.0, 2.0]))
+    path = solve(scene)
+    assert [step.factor for step in path.steps] == [0.0, 0.5, 1.0]
+
+
+# -- limit points ---------------------------------------------------------------------------------
+
+
+def test_limit_points_of_lee_frame_with_few_elements():
+    # Asked of the library: 1e-6 relative with at most 16 elements SFET5 in total.
+    found = lee()
+    for name, count in (("column", 6), ("short", 3), ("long", 7)):
+        found["members"][name] |= {"elements": count, "element": "SFET5"}
+    path = solve(made(found))
+    assert path.model.mesh.elements == 16
+    for entry, reference in zip(path.limit_points, P_LEE, strict=True):
+        assert entry.factor == pytest.approx(reference, rel=1e-6)
+        assert abs(entry.factor / reference - 1.0) < entry.certificate.error_estimate
+
+
+def test_limit_point_of_the_215_degree_arch_with_few_elements():
+    path = solve(made(table("arch_215_degrees", range=[0, 1000], points=40)), element="SFET5", elements=8)
+    assert path.model.mesh.elements == 16
+    assert path.limit_points[0].factor == pytest.approx(897.308996972261, rel=1e-6)
+
+
+def test_the_factor_stands_still_at_a_limit_point():
+    scene = made(lee())
+    curve, start = curve_of(scene, 4)
+    traced = trace(curve, start, scene.analysis.span, 200)
+    limits = [event for event in traced.events if event.kind == "limit"]
+    assert len(limits) == 2
+    for event in limits:
+        # 1e-11 of the step is where the root is sought.
+        assert abs(event.standing.tangent.factor) < 1e-8
+        i = traced.points.index(event.standing)
+        sides = {np.sign(traced.points[j].factor - event.standing.factor) for j in (i - 1, i + 1)}
+        assert len(sides) == 1
+
+
+def test_limit_loads_converge_with_order_eight():
+    errors = []
+    for elements in (2, 4):
+        scene = made(lee())
+        curve, start = curve_of(scene, elements)
+        events = trace(curve, start, scene.analysis.span, 200).events
+        errors.append(abs(events[0].standing.factor - P_LEE[0]))
+    # Order 2 p = 8 promises a factor of 256.
+    assert errors[1] < errors[0] / 100.0
+    assert errors[1] > 1e-13
+
+
+def test_error_estimates_are_above_the_errors_but_not_by_far(lee_path):
+    rough = solve(made(lee(accuracy=1e-4)))
+    for entry, reference in zip(rough.limit_points, P_LEE, strict=True):
+        error = abs(entry.factor / reference - 1.0)
+        assert 1e-12 < error < entry.certificate.error_estimate < 1e-4
+    assert max(abs(e.factor / r - 1.0) for e, r in zip(lee_path.limit_points, P_LEE, strict=True)) < 1e-8
+
+
+@pytest.mark.parametrize("assembly", ["closing", "nodal"])
+def test_assemblies_agree(assembly, lee_path):
+    path = solve(made(lee(accuracy=1e-8)), assembly=assembly)
+    assert path.model.assembly == assembly
+    # The same mesh and equations, other unknowns: rounding.
+    for one, other in zip(path.limit_points, lee_path.limit_points, strict=True):
+        assert one.factor == pytest.approx(other.factor, rel=1e-9)
+
+
+def test_space_finds_what_the_plane_finds():
+    found = lee(accuracy=1e-4)
+    found["sections"]["strip"] |= {"EI2": 20000.0, "GJ": 20000.0}
+    plane, space = solve(made(found)), solve(made(found, dimension="space"))
+    assert space.model.space
+    for one, other in zip(plane.limit_points, space.limit_points, strict=True):
+        assert one.factor == pytest.approx(other.factor, rel=1e-7)
+    assert space.positions("load")[-1] == pytest.approx(plane.positions("load")[-1], abs=1e-4)
+    # Stiff against leaving the plane, so there is no other bifurcation.
+    assert not space.bifurcations
+
+
+# -- bifurcations ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ends", EULER, ids=str)
+def test_columns_lose_one_stability_at_each_critical_load(ends):
+    criticals = EULER[ends]
+    path = solve(made(column(*ends, range=[0, 1.05 * criticals[-1]], accuracy=1e-8)))
+    assert [entry.factor for entry in path.bifurcations] == pytest.approx(criticals, rel=1e-8)
+    for point in path.points:
+        if not point.kind:
+            assert point.negative == int((criticals < point.factor).sum())
+            assert point.stable == (point.negative == 0)
+    assert not path.limit_points
+    # Inextensible and straight: nothing moves.
+    assert np.ptp(path.positions("head"), axis=0).max() < 1e-12
+
+
+def test_bifurcation_and_limit_point_are_told_apart():
+    path = solve(made(table("arch_180_degrees_crown_load", range=[0, 20], accuracy=1e-6)))
+    (swaying,), (snapping,) = path.bifurcations, path.limit_points
+    # Two collocation orders agree to 2e-10 on it; 1e-6 was asked for.
+    assert swaying.factor == pytest.approx(5.86053763487863, rel=1e-6)
+    assert swaying.factor < snapping.factor
+    assert swaying.position("crown")[0] == pytest.approx(0.0, abs=1e-8)
+    kinds = [point.kind for point in path.points if point.kind]
+    assert kinds == ["bifurcation", "limit point"]
+    assert [stable for stable, _, _ in path.main.stretches()] == [True, False]
+
+
+def test_several_eigenvalues_that_vanish_at_once_are_one_bifurcation():
+    path = solve(made(column(space=True, range=[0, 30])))
+    assert [entry.factor for entry in path.bifurcations] == pytest.approx(EULER["clamped", None][:2], rel=1e-6)
+    assert all("2 eigenvalues vanish at once" in entry.notes[0] for entry in path.bifurcations)
+    assert [point.negative for point in path.points if not point.kind][-1] == 4
+
+
+def test_eigenvalues_that_are_near_are_two_bifurcations():
+    found = column(space=True, range=[0, 3])
+    found["sections"]["strip"]["EI2"] = 1.001
+    path = solve(made(found))
+    expected = EULER["clamped", None][0] * np.array([1.0, 1.001])
+    assert [entry.factor for entry in path.bifurcations] == pytest.approx(expected, rel=1e-6)
+    assert not any(entry.notes for entry in path.bifurcations)
+
+
+def test_large_models_find_the_same_bifurcations():
+    # Beyond 120 unknowns eigenvalues come from inverse iteration, not from LAPACK.
+    path = solve(made(column("hinge", "hinge", range=[0, 95])), elements=40, element="SFET5")
+    assert path.model.unknowns > 120
+    assert [e.factor for e in path.bifurcations] == pytest.approx(EULER["hinge", "hinge"], rel=1e-8)
+    assert [e.certificate.negative for e in path.bifurcations] == [0, 1, 2]
+
+
+# -- branches -------------------------------------------------------------------------------------
+
+
+def test_branches_lead_off_to_both_sides():
+    path = solve(made(column(range=[0, 5], branches=1, steps=[4.0])))
+    straight, one, other = path.branches
+    assert (straight.bifurcation, one.bifurcation, one.side, other.side) == (0, 1, 1, -1)
+    assert [step.certificate.stable for step in path.steps] == [False, True, True]
+    _, up, down = (step.position("head") for step in path.steps)
+    assert up[1] > 0.5
+    # Mirror images, each to the accuracy of 1e-4 and far better.
+    assert up == pytest.approx(down * [1.0, -1.0, 1.0], abs=1e-9)
+    assert one.factors[0] == pytest.approx(np.pi**2 / 4.0, rel=1e-3)
+
+
+def test_branch_is_what_statics_leads_to():
+    path = solve(made(column(range=[0, 5], branches=1, steps=[4.0], accuracy=1e-7)))
+    found = column()
+    found["analysis"] = {"steps": [4.0], "accuracy": 1e-7}
+    still = solve(made(found)).last
+    gaps = [np.abs(step.position("head") - still.position("head")).max() for step in path.steps[1:]]
+    assert min(gaps) < 2e-7
+
+
+def test_toggle_snaps_back_along_unstable_branches():
+    path = solve(made(table("toggle_inextensible", range=[0, 10], branches=1, steps=[3.0])))
+    assert len(path.branches) == 3
+    for branch in path.branches[1:]:
+        assert branch.factors[0] < path.bifurcations[0].factor
+        assert branch.steps[0].certificate.negative == 1
+    left, right = (branch.steps[0].position("apex") for branch in path.branches[1:])
+    middle = path.scene.nodes["apex"].position[0]
+    assert left[0] - middle == pytest.approx(middle - right[0], abs=1e-9)
+    assert abs(left[0] - middle) > 1e-3
+
+
+def test_switch_follows_the_branch_on_request():
+    scene = made(column(range=[0, 5], branches=1))
+    path = solve(scene)
+    for branch in path.branches[1:]:
+        again = switch(path, 1, branch.side)
+        # The same mesh and the same steps, from the same point to rounding.
+        assert again.factors[-1] == branch.factors[-1]
+        ends = [path.fields(b.points[-1]).position("head") for b in (again, branch)]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    with pytest.raises(SceneError, match="found 2, accepted: 1 to 1"):
+        switch(path, 2)
+    with pytest.raises(SceneError, match="found 0, accepted: 1 or -1"):
+        switch(path, 1, 0)
+    with pytest.raises(SceneError, match="found 2, accepted: 1 to 1, those that vanish there"):
+        switch(path, 1, 1, shape=2)
+
+
+def test_branches_in_space_are_neutral_where_they_may_turn_about_the_column():
+    path = solve(made(column(space=True, range=[0, 4], branches=1, steps=[3.0])))
+    straight, *sides = path.steps
+    assert straight.certificate.negative == 2
+    assert [step.certificate.stable for step in sides] == ["neutral", "neutral"]
+    plane = solve(made(column(range=[0, 4], branches=1, steps=[3.0])))
+    # Both to 1e-4 of accuracy and far better.
+    assert sides[0].position("head")[:2] == pytest.approx(plane.steps[1].position("head")[:2], abs=1e-6)
+
+
+# -- motions and histories ------------------------------------------------------------------------
+
+
+def test_shortened_straight_beam_starts_where_it_has_bent():
+    found = column("clamped")
+    found["nodes"]["head"] = {"position": [1, 0], "support": "clamped"}
+    del found["loads"]
+    found["motions"] = {"push": {"node": "head", "displacement": [-1, 0]}}
+    found["analysis"] = {"type": "path", "range": [0, 0.6], "steps": [0.5], "accuracy": 1e-6}
+    path = solve(made(found))
+    assert path.main.factors[0] == pytest.approx(6e-4)
+    assert "no slack" in path.notes[0]
+    assert all(point.stable is True for point in path.points)
+    # Close to the beginning the reaction is that of the first Euler load.
+    force = path.fields(path.points[0]).reaction("head")[0]
+    assert force[0] == pytest.approx(-4.0 * np.pi**2, rel=1e-3)
+
+
+def test_end_twist_buckles_where_greenhill_says():
+    path = solve(made(table("twisted_rod_clamped", range=[0, 13], accuracy=1e-6)))
+    (bend,) = path.bifurcations
+    # 2 x 4.493.. / (GJ/EI): closed form.
+    assert bend.factor == pytest.approx(11.9824252210908, rel=1e-6)
+
+
+def test_derivative_by_the_factor_is_that_of_the_equations():
+    for found in (table("twisted_rod_clamped", range=[0, 13]), lee(), with_history()):
+        scene = made(found)
+        curve, start = curve_of(scene)
+        rng = np.random.default_rng(1)
+        state = curve.equations.moved(start.state, 0.1 * rng.standard_normal(curve.equations.total))
+        state = State(state.q, state.y, rng.standard_normal(len(state.lam)))
+        factor, h = 0.4, 1e-4
+
+        def residual(at, state=state, curve=curve):
+            loading = curve.model.loading(at)
+            return curve.equations.at(curve.equations.holding(state, loading), loading).residual
+
+        point = curve.equations.at(curve.equations.holding(state, curve.loading(factor)), curve.loading(factor))
+        numeric = (residual(factor + h) - residual(factor - h)) / (2.0 * h)
+        exact = curve.slope(state, factor, point)
+        assert np.abs(exact).max() > 0.1
+        # Central differences: h^2 and rounding over h.
+        assert exact == pytest.approx(numeric, abs=2e-7 * np.abs(exact).max())
+
+
+def with_history():
+    found = column(range=[0, 3], steps=[0.5, 1.0, 2.5])
+    found["loads"] = {
+        "side": {"type": "force", "node": "head", "value": [0, 1], "history": "roof"},
+        "push": {"type": "force", "node": "head", "value": [-0.5, 0]},
+    }
+    found["histories"] = {"roof": {"t": [0, 1, 2], "value": [1, 4, 0]}}
+    return found
+
+
+def test_histories_are_followed_over_their_knots():
+    found = with_history()
+    path = solve(made(found))
+    found["analysis"] = {"steps": [0.5, 1.0, 2.5]}
+    still = solve(made(found))
+    assert path.main.factors[[0, -1]].tolist() == [0.0, 3.0]
+    assert {1.0, 2.0} <= set(path.main.factors)
+    # At factor 0 the history already bends the column.
+    assert path.positions("head")[0][1] == pytest.approx(1.0 / 3.0, abs=0.05)
+    for step, other in zip(path.steps, still.steps, strict=True):
+        # Each to 1e-4 of accuracy, and superconvergent.
+        assert step.position("head") == pytest.approx(other.position("head"), abs=2e-5)
+
+
+def test_stretched_chain_ends_the_path():
+    found = column("hinge", range=[0, 1])
+    found["nodes"]["head"] = {"position": [1, 0], "support": "hinge"}
+    found["members"]["column"]["shape"] = {"type": "arc", "angle": 2.0}
+    del found["loads"]
+    found["motions"] = {"pull": {"node": "head", "displacement": [1, 0]}}
+    path = solve(made(found))
+    assert path.status is Status.CUT
+    # The arc is 1 / sin(1) long.
+    assert path.main.factors[-1] == pytest.approx(1.0 / np.sin(1.0) - 1.0, abs=2e-4)
+    assert "could not be followed beyond" in path.main.end
+
+
+def test_straight_beam_between_walls_has_no_path():
+    found = column("hinge", range=[0, 1])
+    found["nodes"] |= {"head": {"position": [1, 0], "support": "hinge"}}
+    found["loads"] = {"side": {"type": "force", "member": "column", "at": 0.5, "value": [0, 1]}}
+    with pytest.raises(SolveError, match="fully stretched between held points"):
+        solve(made(found))
+
+
+# -- accuracy and effort --------------------------------------------------------------------------
+
+
+def test_short_of_the_accuracy_on_a_mesh_that_was_asked_for():
+    path = solve(made(lee(accuracy=1e-8)), elements=1, element="SFET5")
+    assert path.status is Status.SHORT
+    assert path.model.mesh.elements == 3
+    assert path.error_estimate > 1e-8
+
+
+@pytest.mark.parametrize("element", ["SFET3", "SFET9"])
+def test_other_elements_reach_the_same_limit_load(element):
+    path = solve(made(lee(range=[-1.2, 2.0], accuracy=1e-5)), element=element)
+    assert path.status is Status.SOLVED
+    assert [e.factor for e in path.limit_points] == pytest.approx(P_LEE, rel=1e-5)
+
+
+def test_hundred_points_cost_less_than_25_cold_solves():
+    along, alone = made(lee(range=[-1.5, 2.5], steps=[1.0])), lee()
+    alone["analysis"] = {"steps": [1.0], "unstable": "stay"}
+    alone = made(alone)
+
+    def timed(scene):
+        times = []
+        for _ in range(5):
+            begin = time.perf_counter()
+            done = solve(scene)
+            times.append(time.perf_counter() - begin)
+        return min(times), done
+
+    (cold, _), (path, done) = timed(alone), timed(along)
+    # Whole runs to the same accuracy, errors estimated: measured 18.
+    assert path / len(done.points) * 100.0 < 25.0 * cold
+
+
+# -- roots ----------------------------------------------------------------------------------------
+
+
+def test_root_is_found_in_few_evaluations():
+    calls = []
+
+    def function(x):
+        calls.append(x)
+        return x**3 - 2.0
+
+    found = root(function, 0.0, -2.0, 2.0, 6.0)
+    assert found == pytest.approx(2.0 ** (1.0 / 3.0), abs=1e-10)
+    # Halving alone would take 36.
+    assert len(calls) < 15
+
+
+def test_root_without_bracket_is_the_better_end():
+    assert root(lambda x: x + 1.0, 0.0, 1.0, 1.0, 2.0) == 0.0
+    assert root(lambda x: np.nan, 0.0, -1.0, 1.0, 3.0) == 0.0
+
+
+def test_events_are_found_in_order_within_one_step():
+    scene = made(column(range=[0, 70]))
+    curve, start = curve_of(scene, 6)
+    end = curve.corrected(*curve.predicted(start, 70.0 / curve.unit), start.tangent, 70.0 / curve.unit)
+    assert end.inertia.negative == 3
+    events = events_between(curve, start, end)
+    # Six elements of order 4: the third load to 2e-7.
+    assert [event.standing.factor for event in events] == pytest.approx(EULER["clamped", None], rel=1e-6)
+
+
+# -- files, checks, pictures ----------------------------------------------------------------------
+
+
+def test_json_has_arrays_over_the_points(lee_path):
+    answer = json.loads(json.dumps(lee_path.to_dict(), allow_nan=False))
+    path, count = answer["path"], len(lee_path.points)
+    assert {len(path[key]) for key in ("factor", "stable", "negative", "arc", "kind")} == {count}
+    assert np.shape(path["nodes"]["load"]["position"]) == (count, 3)
+    assert len(path["nodes"]["corner"]["angle"]) == count
+    assert np.all(np.diff(path["arc"]) > 0.0)
+    assert [entry["factor"] for entry in answer["limit_points"]] == pytest.approx(P_LEE, rel=1e-8)
+    assert answer["bifurcations"] == []
+    assert {"nodes", "reactions", "members", "certificate", "branch"} <= set(answer["limit_points"][0])
+    assert [entry["factor"] for entry in answer["steps"]] == [0.5, 0.5, 0.5]
+
+
+def test_json_of_branches_and_space():
+    path = solve(made(column(space=True, range=[0, 4], branches=1, steps=[3.0])))
+    answer = path.to_dict()
+    assert [entry["branch"] for entry in answer["steps"]] == [0, 1, 2]
+    assert [(branch["bifurcation"], branch["side"]) for branch in answer["branches"]] == [(1, 1), (1, -1)]
+    assert len(answer["branches"][0]["path"]["nodes"]["head"]["quaternion"][0]) == 4
+
+
+def test_expectations_by_crossing_limit_point_and_bifurcation():
+    found = lee(steps=[0.5])
+    found["expect"] = [
+        {"quantity": "factor", "limit_point": 2, "value": P_LEE[1], "tolerance": 1e-4},
+        {"quantity": "certificate.stable", "step": 0.5, "crossing": 2, "value": False},
+        {"quantity": "certificate.stable", "step": 0.5, "value": True},
+        {"quantity": "factor", "limit_point": 1, "value": 1.8, "tolerance": 1e-4},
+    ]
+    scene = made(found)
+    path = solve(scene)
+    assert [c.passed for c in check(scene, path)] == [True, True, True, False]
+    found["expect"] = [{"quantity": "factor", "bifurcation": 1, "value": 1.0, "tolerance": 1.0}]
+    with pytest.raises(SceneError, match=r"expect\.0\.bifurcation: found 1, but the path has 0"):
+        check(made(found), path)
+
+
+def test_command_line_tells_of_the_path(tmp_path, capsys):
+    source, answer, picture = PROBLEMS / "cantilever_post_buckling.toml", tmp_path / "a.json", tmp_path / "a.png"
+    assert main(["run", str(source), "--json", str(answer), "--plot", str(picture), "--accuracy", "1e-8"]) == 0
+    said = capsys.readouterr().out
+    assert "path: " in said
+    assert "stable from factor 0 to 2.4674011" in said
+    assert "bifurcation 1: factor 2.467401100" in said
+    assert "branch at bifurcation 1, side -1" in said
+    assert "the factor leaves the range at 23" in said
+    assert "FAILED" not in said
+    assert json.loads(answer.read_text())["bifurcations"][0]["factor"] == pytest.approx(np.pi**2 / 4.0)
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_chart_marks_what_is_unstable_and_where(lee_path):
+    figure = chart(lee_path)
+    course, shapes = figure.axes
+    assert "displacement of load in y" in course.get_xlabel()
+    lines = {line.get_gid(): line for line in course.get_lines()}
+    assert lines["unstable"].get_linestyle() == "--"
+    assert lines["stable"].get_linestyle() == "-"
+    assert lines["limit point"].get_ydata() == pytest.approx(P_LEE, rel=1e-8)
+    unstable = np.asarray(lines["unstable"].get_ydata())
+    # The unstable stretch lies between the two limit points.
+    assert [unstable.max(), unstable.min()] == pytest.approx(P_LEE, rel=1e-8)
+    drawn = [line for line in shapes.get_lines() if line.get_gid() == "shape"]
+    assert len(drawn) >= 3 * len(lee_path.model.members)
+
+
+def test_chart_of_motions_shows_a_reaction():
+    found = table("twisted_rod_clamped", range=[0, 5])
+    course, _ = chart(solve(made(found))).axes
+    assert course.get_xlabel() == "factor"
+    assert course.get_ylabel() == "moment at last about x, N m"
+    line = course.get_lines()[0]
+    # GJ / L times the twist, on a mesh for 1e-4.
+    assert np.asarray(line.get_ydata())[-1] == pytest.approx(0.75 * 5.0, rel=1e-6)
+
+
+# -- bad input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("analysis", "sentence"),
+    [
+        ({"type": "path"}, "analysis: the key 'range' is missing: a path is followed between two factors"),
+        ({"type": "path", "range": [2, 1]}, "analysis.range: found [2.0, 1.0], accepted: two rising numbers"),
+        ({"type": "path", "range": [1, 2]}, "analysis.range: found [1.0, 2.0], accepted: two rising numbers with zero"),
+        ({"type": "path", "range": [0, 0]}, "analysis.range: found [0.0, 0.0], accepted: two rising numbers"),
+        ({"type": "path", "range": [0, 1, 2]}, "analysis.range: found [0.0, 1.0, 2.0], accepted: two rising"),
+        ({"type": "path", "range": [0, 1], "points": 1}, "analysis.points: found 1, accepted: a whole number from 2"),
+        ({"type": "path", "range": [0, 1], "points": 9.5}, "analysis.points: found 9.5, accepted: a whole number"),
+        ({"type": "path", "range": [0, 1], "branches": -1}, "analysis.branches: found -1, accepted: a whole number"),
+        ({"range": [0, 1]}, "analysis.range: found type 'static', accepted: type 'path' with this key"),
+        ({"points": 9}, "analysis.points: found type 'static', accepted: type 'path' with this key"),
+    ],
+)
+def test_bad_analyses_are_refused_with_one_sentence(analysis, sentence):
+    found = lee()
+    found["analysis"] = analysis
+    with pytest.raises(SceneError) as error:
+        made(found)
+    assert str(error.value).startswith(sentence)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("expect", "sentence"),
+    [
+        ({"crossing": 1}, "expect.0.crossing: the key 'step' is missing"),
+        ({"limit_point": 0}, "expect.0.limit_point: found 0, accepted: a whole number from 1"),
+        ({"limit_point": 1, "bifurcation": 1}, "expect.0: accepted: one of the keys step, limit_point, bifurcation"),
+        ({"step": 1.0, "limit_point": 1}, "expect.0: accepted: one of the keys step, limit_point, bifurcation"),
+    ],
+)
+def test_bad_expectations_are_refused_with_one_sentence(expect, sentence):
+    found = lee()
+    found["expect"] = [{"quantity": "factor", "value": 1.0, "tolerance": 1.0, **expect}]
+    with pytest.raises(SceneError) as error:
+        made(found)
+    assert str(error.value).startswith(sentence)
+
+
+def test_expectations_of_paths_need_a_path():
+    found = lee()
+    found["analysis"] = {}
+    found["expect"] = [{"quantity": "factor", "value": 1.0, "tolerance": 1.0, "limit_point": 1}]
+    with pytest.raises(SceneError, match=r"expect\.0\.limit_point: found the analysis 'static', accepted: 'path'"):
+        made(found)
+
+
+def test_motions_that_cannot_be_made_have_no_path():
+    found = column("hinge", range=[0, 1])
+    found["nodes"]["head"] = {"position": [1, 0], "support": "hinge"}
+    del found["loads"]
+    found["motions"] = {"pull": {"node": "head", "displacement": [1, 0]}}
+    with pytest.raises(SolveError, match="no shape of the members"):
+        solve(made(found))
