@@ -231,7 +231,7 @@ class Balance:
             if model.space:
                 angle = float(quaternion.angle_about(quaternion.multiply(quaternion.conjugate(a), b), data[:3]))
             else:
-                angle = float((b - a)[0])
+                angle = float(data[2] * (b - a)[0])
             return SpringState(True, angle, -data[3] * (angle - data[4]) * scales.moment)
         gap = [np.zeros(axes) if place == GROUND else self._places[place] for place in group.places[i]]
         moved = gap[1] - gap[0]
