@@ -89,7 +89,7 @@ def sliding_plane():
             "rod": {
                 "nodes": ["B", "C"],
                 "section": "s",
-                "release": ["cylindrical", "rigid"],
+                "release": ["slider", "rigid"],
                 "shape": {"type": "arc", "angle": 0.4},
             },
             "stay": {"nodes": ["C", "D"], "section": "s", "release": ["hinge", "rigid"]},
