@@ -16,7 +16,7 @@ from . import quaternion
 from .arrays import Array
 from .connections import GROUND, Group
 from .equations import Equations, State
-from .joints import Body, LineSpring, TurnSpring, Universal
+from .joints import Body, DrivenSlide, LineSpring, Slide, TurnSpring, Universal
 from .joints import Spring as Tension
 from .loading import Loading
 from .rotations import STIFF, end_joints
@@ -184,13 +184,16 @@ class Balance:
         return row, -self._connected(node, turn) - i * self._gain(member)
 
     def _connected(self, node: str, turn: int | None = None) -> Array:
-        """Moments that joints and springs at a node take from one rotation, or springs to the ground from all."""
+        """Moments that joints and springs at a node take from one rotation, or springs and slides from all.
+
+        A hinge takes from one side what it gives to the other; a slide has a lever, a spring may go to the ground.
+        """
         moment = np.zeros(3)
         for group, links in zip(self.model.connections, self._links, strict=True):
             if isinstance(group.kind, Body):
                 continue
             for number, side in np.argwhere(group.turns != GROUND):
-                mine = group.turns[number, side] == turn if turn is not None else isinstance(group.kind, TurnSpring)
+                mine = isinstance(group.kind, ONE_SIDED) if turn is None else group.turns[number, side] == turn
                 if mine and group.nodes[number] == node:
                     moment = moment + self._moment_of(group, links, number, side)
         return moment
@@ -228,7 +231,7 @@ class Balance:
             if model.space:
                 angle = float(quaternion.angle_about(quaternion.multiply(quaternion.conjugate(a), b), data[:3]))
             else:
-                angle = float((b - a)[0])
+                angle = float(data[2] * (b - a)[0])
             return SpringState(True, angle, -data[3] * (angle - data[4]) * scales.moment)
         gap = [np.zeros(axes) if place == GROUND else self._places[place] for place in group.places[i]]
         moved = gap[1] - gap[0]
@@ -251,6 +254,10 @@ class Balance:
                 sides = range(group.kind.nodes)
                 return [(self._force_of(group, links, i, k), self._moment_of(group, links, i, k)) for k in sides]
         raise KeyError(member)
+
+
+ONE_SIDED = (TurnSpring, Slide, DrivenSlide)
+"""Kinds whose moments on the rotations of a node do not add up to nothing."""
 
 
 def _is_spring(group: Group) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from .loads import Load, Motion
 from .shapes import CenterLine
 from .springs import Spring
-from .structure import Node
+from .structure import Member, Node
 
 __all__ = ["out_of_plane"]
 
@@ -26,6 +26,7 @@ def out_of_plane(
     motions: Mapping[str, Motion],
     springs: Mapping[str, Spring],
     gravity: Triple | None,
+    members: Mapping[str, Member],
 ) -> Finding | None:
     """The place of the first thing out of x-y with what it does there; None where all lies in it."""
     if gravity is not None and _leaves(gravity):
@@ -36,6 +37,7 @@ def out_of_plane(
         _loads(loads),
         _motions(motions),
         _springs(springs),
+        _cylindrical(nodes, members),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -66,6 +68,15 @@ def _members(lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
             yield ("members", name, "shape"), "twists"
         else:
             yield ("members", name, "b2"), "is neither along z nor in x-y"
+
+
+def _cylindrical(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator[Finding]:
+    for name, node in nodes.items():
+        if node.support == "cylindrical":
+            yield ("nodes", name, "support"), "turns about a line that is not along z"
+    for name, member in members.items():
+        if "cylindrical" in member.release:
+            yield ("members", name, "release"), "turns about a line that is not along z"
 
 
 def _loads(loads: Mapping[str, Load]) -> Iterator[Finding]:

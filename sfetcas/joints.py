@@ -99,7 +99,7 @@ class Connection(abc.ABC):
     def angle(self, a: Side, b: Side, axis: ca.SX) -> ca.SX:
         """Angle of side b against side a about an axis: all turns in the plane, up to one either way in space."""
         r = self.relative(a, b)
-        return 2.0 * ca.atan2(ca.dot(axis, ca.vertcat(*r[1:])), r[0]) if self.space else r[0]
+        return 2.0 * ca.atan2(ca.dot(axis, ca.vertcat(*r[1:])), r[0]) if self.space else axis[2] * r[0]
 
 
 def _dot(a: Side, b: Side) -> ca.SX:

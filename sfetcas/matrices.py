@@ -13,17 +13,28 @@ from pydantic import BeforeValidator
 from .errors import SceneError
 from .records import say
 
-__all__ = ["Matrix", "check_mass", "check_rigid_motion", "check_stiffness", "read_matrix", "rigid_motions"]
+__all__ = [
+    "Mass",
+    "Stiffness",
+    "check_mass",
+    "check_rigid_motion",
+    "check_stiffness",
+    "read_matrix",
+    "rigid_motions",
+]
 
 Floats = NDArray[np.float64]
 
 SAME = 1e-7
 """Relative difference below which entries of a matrix are the same: files hold 8 digits and more."""
 
+LARGEST = 6000
+"""Rows of a matrix that are read: a thousand nodes of one small member."""
 
-def _matrix(value: Any) -> tuple[tuple[float, ...], ...]:
+
+def _matrix(value: Any, name: str) -> tuple[tuple[float, ...], ...]:
     if isinstance(value, (str, Path)):
-        value = read_matrix(Path(value))
+        value = read_matrix(Path(value), name)
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -33,12 +44,17 @@ def _matrix(value: Any) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in array.tolist())
 
 
-Matrix = Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_matrix)]
+Rows = tuple[tuple[float, ...], ...]
+
+Stiffness = Annotated[Rows, BeforeValidator(lambda value: _matrix(value, "stiffness"))]
 """A square matrix: rows of numbers, an array, or the name of a file (.npz, or Matrix Market .mtx)."""
 
+Mass = Annotated[Rows, BeforeValidator(lambda value: _matrix(value, "mass"))]
+"""The same for a mass."""
 
-def read_matrix(path: Path) -> Floats:
-    """The matrix in a file: ``stiffness``, ``mass`` or the only array of an .npz; Matrix Market otherwise.
+
+def read_matrix(path: Path, name: str = "stiffness") -> Floats:
+    """The matrix in a file: the array of that name or the only one of an .npz, .npy, or Matrix Market.
 
     Raises
     ------
@@ -46,22 +62,33 @@ def read_matrix(path: Path) -> Floats:
         The file is absent or holds no such matrix; the sentence says which.
     """
     try:
-        return _from_npz(path) if path.suffix.lower() in (".npz", ".npy") else _from_market(path)
+        return _from_npz(path, name) if path.suffix.lower() in (".npz", ".npy") else _from_market(path)
     except FileNotFoundError:
         raise ValueError(f"there is no file {path}") from None
     except (OSError, zipfile.BadZipFile) as error:
-        raise ValueError(f"the file {path} cannot be read: {error}") from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ValueError(f"the file {path} cannot be read: {reason}") from None
 
 
-def _from_npz(path: Path) -> Floats:
-    loaded: Any = np.load(path, allow_pickle=False)
+def _from_npz(path: Path, name: str) -> Floats:
+    try:
+        loaded: Any = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError):
+        raise ValueError(f"the file {path} holds no arrays of numbers of numpy") from None
     if isinstance(loaded, np.ndarray):
-        return np.asarray(loaded, dtype=float)
+        return _numbers_of(loaded, path)
     with loaded:
         names = list(loaded.files)
-        if len(names) != 1:
-            raise ValueError(f"the file {path} holds {', '.join(names)}, accepted: one array")
-        return np.asarray(loaded[names[0]], dtype=float)
+        if name not in names and len(names) != 1:
+            message = f"the file {path} holds {', '.join(names) or 'nothing'}, accepted: {name}, or one array alone"
+            raise ValueError(message)
+        return _numbers_of(loaded[name if name in names else names[0]], path)
+
+
+def _numbers_of(array: Any, path: Path) -> Floats:
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"the file {path} holds {array.dtype.name}, accepted: real numbers")
+    return np.asarray(array, dtype=float)
 
 
 def _from_market(path: Path) -> Floats:
@@ -71,8 +98,12 @@ def _from_market(path: Path) -> Floats:
     except UnicodeDecodeError:
         raise ValueError(f"the file {path} is no text, accepted: Matrix Market, or .npz") from None
     head = lines[0].lower().split() if lines else []
-    if len(head) != 5 or head[0] != "%%matrixmarket" or head[3] not in ("real", "integer"):
-        raise ValueError(f"the file {path} does not begin as a real Matrix Market file does, '%%MatrixMarket matrix'")
+    if head[:2] != ["%%matrixmarket", "matrix"] or len(head) != 5:
+        raise ValueError(f"the file {path} does not begin as Matrix Market does, '%%MatrixMarket matrix'")
+    kinds = ("array", "coordinate"), ("real", "double", "integer"), ("general", "symmetric")
+    for found, accepted in zip(head[2:], kinds, strict=True):
+        if found not in accepted:
+            raise ValueError(f"the file {path} is {found}, accepted: {', '.join(accepted)}")
     numbers = " ".join(line for line in lines[1:] if not line.startswith("%")).split()
     try:
         return _market_entries(np.array(numbers, dtype=float), head[2], head[4])
@@ -82,6 +113,8 @@ def _from_market(path: Path) -> Floats:
 
 def _market_entries(numbers: Floats, layout: str, symmetry: str) -> Floats:
     n, m = int(numbers[0]), int(numbers[1])
+    if not (0 < n <= LARGEST and 0 < m <= LARGEST):
+        raise ValueError
     matrix = np.zeros((n, m))
     if layout == "array":
         column, row = np.indices((m, n)).reshape(2, -1)
@@ -92,11 +125,11 @@ def _market_entries(numbers: Floats, layout: str, symmetry: str) -> Floats:
     else:
         entries = numbers[3:].reshape(int(numbers[2]), 3)
         row, column = entries[:, 0].astype(int) - 1, entries[:, 1].astype(int) - 1
+        if min(row.min(initial=0), column.min(initial=0)) < 0:
+            raise ValueError
         np.add.at(matrix, (row, column), entries[:, 2])
     if symmetry == "symmetric":
         matrix[column, row] = matrix[row, column]
-    elif symmetry != "general":
-        raise ValueError
     return matrix
 
 

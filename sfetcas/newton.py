@@ -125,6 +125,8 @@ def correct(
         try:
             here = replace(point, entries=tangent) if tangent is not None and count == 0 else point
             step = newton_step(equations, here, weight)
+            if here is not point and _unresisted(equations, step, point, weight):
+                step = newton_step(equations, point, weight)
         except np.linalg.LinAlgError:
             break
         length = float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
@@ -149,6 +151,12 @@ def correct(
             break
     second = 0.0 if second == np.inf else second
     return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+
+
+def _unresisted(equations: Equations, step: Array, point: Point, weight: Array) -> bool:
+    """Whether little but the proximal term resists a step: an unloaded mechanism of rigid members has no stiffness."""
+    turned = step[: equations.turning_unknowns]
+    return bool(PROXIMAL * float(weight @ turned**2) > 0.1 * abs(float(step @ point.residual)))
 
 
 def descend(

@@ -242,7 +242,7 @@ class Scene(Staged):
 
     @cached_property
     def _out_of_plane(self) -> tuple[tuple[str, ...], str] | None:
-        parts = self.nodes, self.center_lines, self.loads, self.motions, self.springs, self.gravity
+        parts = self.nodes, self.center_lines, self.loads, self.motions, self.springs, self.gravity, self.members
         return out_of_plane(*parts)
 
 

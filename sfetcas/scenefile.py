@@ -37,18 +37,19 @@ def load(path: str | os.PathLike[str]) -> Scene:
         sentence starts with the path.
     """
     try:
-        return parse(_read(Path(path)), _format(Path(path)))
+        return parse(_read(Path(path)), _format(Path(path)), Path(path).parent)
     except SceneError as error:
         raise SceneError(str(error), (os.fspath(path),)) from None
 
 
-def parse(text: str, format: str) -> Scene:
+def parse(text: str, format: str, folder: Path | None = None) -> Scene:
     """The scene in a text.
 
     Parameters
     ----------
     text : the content of a scene file
     format : toml or json
+    folder : where files that the scene names are, unless they are named from the root; left out: where one is
 
     Raises
     ------
@@ -61,7 +62,7 @@ def parse(text: str, format: str) -> Scene:
         raise SceneError("the file is empty, accepted: a scene with sections, nodes and members")
     try:
         values = tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
-        return Scene.from_dict(values)
+        return Scene.from_dict(values if folder is None else _within(values, folder))
     except SceneError:
         raise
     except RecursionError:
@@ -102,6 +103,16 @@ def _read(path: Path) -> str:
         raise SceneError(f"found a byte that is not UTF-8 at position {error.start}, accepted: UTF-8") from None
     except (OSError, ValueError) as error:
         raise SceneError(f"the file cannot be read: {_reason(error)}") from None
+
+
+def _within(values: Any, folder: Path) -> Any:
+    """The values with the files of matrices named from the folder of the scene."""
+    members = values.get("members") if isinstance(values, dict) else None
+    for member in members.values() if isinstance(members, dict) else ():
+        for key in ("stiffness", "mass"):
+            if isinstance(member, dict) and isinstance(member.get(key), str):
+                member[key] = str(folder / member[key])
+    return values
 
 
 def _reason(error: Exception) -> str:

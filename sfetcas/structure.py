@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, model_validator
 
 from .errors import SceneError
 from .later import Staged
-from .matrices import Matrix, check_mass, check_stiffness
+from .matrices import Mass, Stiffness, check_mass, check_stiffness
 from .records import Direction, NotNegative, Vector, listed, say
 from .shapes import Shape, Straight
 
@@ -148,7 +148,8 @@ class Member(Staged):
         slider (along the node's direction) or cylindrical (along and about it)
     stiffness : (6 n, 6 n), N/m, N, N m - of a small member: forces and moments at its n nodes by displacements
         and rotations (x, y, z, about x, y, z at the first node, then at the next), along the section's axes b1,
-        b2, b3 at its start; or the name of a file, .npz (array ``stiffness``, or the only one) or Matrix Market
+        b2, b3 at its start; or the name of a file, .npz (array ``stiffness``, or the only one) or Matrix Market;
+        in a scene file relative to its folder
     mass : (6 n, 6 n), kg, kg m, kg m2 - of a small member, in the same way; for its weight and for dynamics
     """
 
@@ -160,8 +161,8 @@ class Member(Staged):
     element: Literal["SFET2", "SFET3", "SFET4", "SFET5", "SFET6", "SFET7", "SFET8", "SFET9"] | None = None
     elements: Count | None = None
     release: Annotated[tuple[Release, ...], BeforeValidator(_welds)] = ("rigid", "rigid")
-    stiffness: Matrix | None = None
-    mass: Matrix | None = None
+    stiffness: Stiffness | None = None
+    mass: Mass | None = None
 
     @model_validator(mode="before")
     @classmethod

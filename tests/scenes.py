@@ -247,6 +247,8 @@ def transformed(table, turn=None, shift=(0, 0, 0), length=1.0, force=1.0):
     for section in table["sections"].values():
         for key, unit in (("EI2", force * length**2), ("EI3", force * length**2), ("GJ", force * length**2),
                           ("rhoA", force / length)):  # fmt: skip
+            if key not in section:
+                continue
             value = section[key]
             section[key] = (
                 {"at": value["at"], "value": [unit * v for v in value["value"]]}
@@ -261,8 +263,9 @@ def transformed(table, turn=None, shift=(0, 0, 0), length=1.0, force=1.0):
                 node[key] = (length * (turn @ three(node[key]) + shift)).tolist()
         if "direction" in node:
             node["direction"] = vector(node["direction"])
-        if "axis" in node:
-            node["axis"] = vector(node["axis"], hand)
+        for key in ("axis", "axis2"):
+            if key in node:
+                node[key] = vector(node[key], hand)
     for name, member in table["members"].items():
         frame = quat.matrix(old.center_lines[name].quaternions([0.0]))[0]
         member["b2"] = vector(frame[:, 1])
@@ -278,7 +281,8 @@ def transformed(table, turn=None, shift=(0, 0, 0), length=1.0, force=1.0):
             assert not shape, "only straight members, arcs and helices are transformed"
     for load in table.get("loads", {}).values():
         if load["type"] == "moment":
-            load["value"] *= hand * force * length
+            size = hand * force * length
+            load["value"] = size * load["value"] if np.isscalar(load["value"]) else vector(load["value"], size)
         else:
             load["value"] = vector(load["value"], force / length if load["type"] == "distributed" else force)
     for motion in table.get("motions", {}).values():
@@ -286,8 +290,21 @@ def transformed(table, turn=None, shift=(0, 0, 0), length=1.0, force=1.0):
             motion["displacement"] = vector(motion["displacement"], length)
         if "rotation" in motion and not np.isscalar(motion["rotation"]):
             motion["rotation"] = vector(motion["rotation"], hand)
-        elif "rotation" in motion and old.resolved_dimension == "plane":
+        elif "rotation" in motion and (
+            old.resolved_dimension == "plane" or "direction" in table["nodes"][motion["node"]]
+        ):
             motion["rotation"] *= hand
+    for spring in table.get("springs", {}).values():
+        if spring.get("type") != "translational":
+            spring["stiffness"] *= force * length
+            spring["axis"] = vector(spring.get("axis", [0, 0, 1]), hand)
+            continue
+        spring["stiffness"] *= force / length
+        spring |= {key: length * spring[key] for key in ("length", "rest") if key in spring}
+        if "direction" in spring:
+            spring["direction"] = vector(spring["direction"])
+        if "anchor" in spring:
+            spring["anchor"] = (length * (turn @ three(spring["anchor"]) + shift)).tolist()
     if "gravity" in table:
         table["gravity"] = vector(table["gravity"])
     return table
@@ -315,7 +332,7 @@ def density(scene, name, x):
             if load.profile is not None and not isinstance(load.profile, float):
                 profile = np.polynomial.polynomial.polyval(x, load.profile.polynomial)
             total += profile[:, None] * np.asarray(load.vector)
-    if scene.gravity is not None:
+    if scene.gravity is not None and scene.members[name].section is not None:
         total += scene.sections[scene.members[name].section].mass(x)[:, None] * np.asarray(scene.gravity)
     return total
 

@@ -3,7 +3,8 @@
 import casadi as ca
 import numpy as np
 import pytest
-from scenes import ZOO, arch, bend_45, cantilever, model_of
+from scenes import arch, bend_45, cantilever, model_of
+from systems import EVERY
 
 from sfetcas import quaternion as quat
 from sfetcas.equations import Equations, State
@@ -15,13 +16,13 @@ from sfetcas.problem import EquilibriumProblem
 from sfetcas.stability import StabilityTest
 from sfetcas.statics import solve_model
 
-CASES = [(name, assembly, False) for name in ZOO for assembly in ("closing", "nodal")]
+CASES = [(name, assembly, False) for name in EVERY for assembly in ("closing", "nodal")]
 CASES += [("guided", "nodal", True), ("hinged_space", "closing", True)]
 cases = pytest.mark.parametrize(("name", "assembly", "gauss"), CASES)
 
 
 def posed(name, assembly, gauss):
-    model = model_of(ZOO[name](), 2, 2, assembly=assembly, gauss=gauss)
+    model = model_of(EVERY[name](), 2, 2, assembly=assembly, gauss=gauss)
     equations, loading = Equations(model), model.loading(0.7)
     return equations, loading, EquilibriumProblem(model, loading, equations.start(loading))
 
@@ -136,9 +137,9 @@ def by_minimisation(model):
     return prepared.equations, problem.state(result.x, result.lam, loading)
 
 
-@pytest.mark.parametrize("name", ZOO)
+@pytest.mark.parametrize("name", EVERY)
 def test_minimum_is_the_root(name):
-    model = model_of(ZOO[name](), 3, 4)
+    model = model_of(EVERY[name](), 3, 4)
     answers = []
     for route in (by_newton, by_minimisation):
         equations, state = route(model)
