@@ -27,7 +27,8 @@ ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
 """Endings of the files that :func:`save_chart` writes."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
-STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-."}
+STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-.", "not defined": ":"}
+KINDS = ((True, "stable"), (False, "unstable"), ("neutral", "neutral"), ("not defined", "stability not defined"))
 MARKS = {"limit point": "o", "bifurcation": "s"}
 LOADED = 5.0
 """A loaded node is told of unless another one moves by more than this many times as far."""
@@ -135,7 +136,7 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity) -> None:
             across, up = up, across
         for stable, first, last in branch.stretches():
             part = slice(first, last + 1)
-            label = f"{'unstable' if stable is False else 'stable' if stable is True else 'neutral'}"
+            label = dict(KINDS)[stable]
             axes.plot(across[part], up[part], STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
         for kind, mark in MARKS.items():
             here = [i for i, point in enumerate(branch.points) if point.kind == kind]
@@ -149,7 +150,7 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity) -> None:
 
 def _legend(path: Path) -> Iterator[Line2D]:
     seen = {stable for branch in path.branches for stable, _, _ in branch.stretches()}
-    for stable, name in ((True, "stable"), (False, "unstable"), ("neutral", "neutral")):
+    for stable, name in KINDS:
         if stable in seen:
             yield Line2D([], [], color="#333333", linestyle=STYLES[str(stable)], label=name)
     kinds = {point.kind for branch in path.branches for point in branch.points}

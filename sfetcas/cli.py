@@ -182,7 +182,9 @@ def _report_path(path: Course) -> None:
         print(f"{name}: {len(branch.points)} points, factors {low:.6g} to {high:.6g}; {branch.end}")
         for stable, first, last in branch.stretches():
             ends = " to ".join(f"{branch.points[i].factor:.9g}" for i in (first, last))
-            kind = {"True": "stable", "False": "unstable"}.get(str(stable), "neutral")
+            kind = {"True": "stable", "False": "unstable", "not defined": "stability not defined"}.get(
+                str(stable), "neutral"
+            )
             print(f"  {kind} from factor {ends}")
         _report_events(branch)
     if path.error_estimate is not None:
@@ -223,12 +225,23 @@ def _report_step(step: Equilibrium, place: str) -> None:
             force, moment = step.reaction(name)
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
     proof = step.certificate
-    kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
+    for name in step.model.scene.springs:
+        print(
+            f"  spring {name}: " + ", ".join(f"{key} {value:.9g}" for key, value in step.spring(name).to_dict().items())
+        )
     error = proof.error_estimate
     said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
-    print(f"  {kind}, smallest eigenvalue {proof.smallest:.4g} N, residual {proof.residual:.1e}, {said}")
+    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {said}")
     for note in step.notes:
         print(f"  note: {note}")
+
+
+def _kind(step: Equilibrium) -> str:
+    proof = step.certificate
+    if proof.stable == "not defined":
+        return "stability not defined, as loads have no potential"
+    kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
+    return f"{kind}, smallest eigenvalue {proof.smallest:.4g} N" if np.isfinite(proof.smallest) else kind
 
 
 def _vector(values: Any) -> str:

@@ -30,7 +30,7 @@ class PathPoint:
         Factor of the loads and motions.
     negative : int
         Negative eigenvalues of the energy on the closings.
-    stable : bool or "neutral"
+    stable : bool, "neutral", or "not defined" for loads without potential
         What they say.
     arc : float
         Arc length from the start, see :class:`Path`.

@@ -372,7 +372,7 @@ class _Run:
         """The answer of one stretch."""
         traced = stretch.traced
         kinds = {id(event.standing): event for event in traced.events}
-        points = tuple(_point(p, kinds.get(id(p))) for p in traced.points)
+        points = tuple(_point(p, kinds.get(id(p)), curve.model.has_potential) for p in traced.points)
 
         def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
             numbered = zip(standings, notes, strict=True)
@@ -431,9 +431,9 @@ def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:
     return largest_difference(Fields(one.equations, a.state, a.loading), Fields(other.equations, b.state, b.loading))
 
 
-def _point(standing: Standing, event: Event | None) -> PathPoint:
+def _point(standing: Standing, event: Event | None, has_potential: bool) -> PathPoint:
     negative, zero = standing.inertia.negative, standing.inertia.zero
-    stable: bool | str = False if negative else "neutral" if zero else True
+    stable: bool | str = (False if negative else "neutral" if zero else True) if has_potential else "not defined"
     kind = "" if event is None else {"limit": "limit point"}.get(event.kind, event.kind)
     return PathPoint(float(standing.factor), standing.state, standing.loading, negative, stable, standing.arc, kind)
 
