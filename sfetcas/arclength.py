@@ -28,6 +28,9 @@ __all__ = ["Curve", "Standing", "Tangent"]
 TOLERANCE = 1e-12
 """Relative residual that counts as converged; one more iteration is made while it gains."""
 
+PASSING = 1e-10
+"""The same for points in passing, which nobody asked for by name."""
+
 ITERATIONS = 10
 """Newton iterations of a step at most."""
 
@@ -97,6 +100,7 @@ class Curve:
         self.weight[:turning] = equations.mass / equations.model.beams.weight.sum()
         self._turning, self._proximal = turning, PROXIMAL * prepared.weight
         self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
+        self._driven = any(np.any(group.turn) for group in self.model.groups.values())
         self._linear = set(self.model.groups) == {None}
 
     def within(self, piece: tuple[float, float]) -> Curve:
@@ -117,6 +121,10 @@ class Curve:
         return Tangent(direction.z / length, direction.factor / length)
 
     # -- derivative by the factor ---------------------------------------------------------------
+
+    def held(self, state: State, loading: Loading) -> State:
+        """The state with held rotations where the motions want them."""
+        return self.equations.holding(state, loading) if self._driven else state
 
     def loading(self, factor: float) -> Loading:
         """Loads and motions at a factor; beyond the piece as they would go on without the knot at its end."""
@@ -139,13 +147,15 @@ class Curve:
 
         Exact but for the turns of held nodes, which enter by fourth order differences.
         """
-        loading, rate = self.loading(factor), self.rate(factor)
+        rate = self.rate(factor)
 
         def residual(w: float) -> Array:
-            there = loading.plus(rate.scaled(w))
+            there = self.loading(factor).plus(rate.scaled(w))
             return self.equations.at(self.equations.holding(state, there), there).residual
 
         turning = float(np.abs(rate.turn).max(initial=0.0))
+        if turning == 0.0 and not np.any(rate.pull):
+            return self.equations.slope(point, rate)
         if turning == 0.0:
             return np.asarray((residual(self.unit) - point.residual) / self.unit)
         h = min(self.unit, HELD / turning)
@@ -187,7 +197,7 @@ class Curve:
         z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
         if bend is not None:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
-        return self.equations.holding(self.equations.moved(start.state, z), self.loading(factor)), factor
+        return self.held(self.equations.moved(start.state, z), self.loading(factor)), factor
 
     def corrected(
         self,
@@ -207,11 +217,11 @@ class Curve:
         equations, n = self.equations, self._turning
         row = self.weight * across.z
         loading = self.loading(factor)
-        state = equations.holding(state, loading)
+        state = self.held(state, loading)
         point = equations.at(state, loading)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
         for count in range(ITERATIONS):
-            if count and residual <= (ROUNDING if sharp else TOLERANCE):
+            if count and residual <= (ROUNDING if sharp else PASSING):
                 break
             try:
                 right = np.column_stack([-point.residual, -self.slope(state, factor, point)])
@@ -227,7 +237,7 @@ class Curve:
                 return None
             last = length
             loading = self.loading(factor + change)
-            trial = equations.holding(equations.moved(state, step), loading)
+            trial = self.held(equations.moved(state, step), loading)
             there = equations.at(trial, loading)
             gained = relative_residual(equations, there)
             if residual <= TOLERANCE and gained > 0.25 * residual and count:
@@ -235,7 +245,7 @@ class Curve:
             state, factor, point, residual = trial, factor + change, there, gained
             if not np.isfinite(residual):
                 return None
-        if residual > TOLERANCE:
+        if residual > (TOLERANCE if sharp else PASSING):
             return None
         tangent = self.tangent(state, factor, point, across)
         loading = self.loading(factor)

@@ -68,21 +68,26 @@ class _Quantity:
     name: str
     values: list[Array]
     node: str | None = None
+    axis: int = 0
     upright: bool = False
 
 
 def _telling(path: Path) -> _Quantity:
     """The component that changes most: of a reaction where only motions are prescribed, else of a displacement.
 
-    A loaded node comes before others that do not move by far more.
+    A loaded node comes before others that do not move by far more, and there the direction of the load.
     """
     scene = path.scene
     driven = not scene.loads and scene.gravity is None
     found = list(_reactions(path) if driven else _displacements(path))
-    loaded = {load.node for load in scene.loads.values()}
+    loaded = {load.node: np.abs(load.vector) for load in scene.loads.values() if load.type == "force"}
 
     def change(quantity: _Quantity) -> float:
-        return float(np.ptp(np.concatenate(quantity.values))) * (LOADED if quantity.node in loaded else 1.0)
+        change = float(np.ptp(np.concatenate(quantity.values)))
+        if quantity.node is None or quantity.node not in loaded:
+            return change
+        along = loaded[quantity.node]
+        return LOADED * change * (0.2 + 0.8 * float(along[quantity.axis] / max(along.max(), 1e-300)))
 
     return max(found, key=change)
 
@@ -107,7 +112,7 @@ def _middles(path: Path, branch: Branch, member: str) -> Array:
 
 def _components(name: str, tables: list[Array]) -> Iterator[_Quantity]:
     for i, letter in enumerate("xyz"):
-        yield _Quantity(f"displacement of {name} in {letter}, m", [table[:, i] for table in tables])
+        yield _Quantity(f"displacement of {name} in {letter}, m", [table[:, i] for table in tables], axis=i)
 
 
 def _reactions(path: Path) -> Iterator[_Quantity]:

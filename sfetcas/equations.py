@@ -68,6 +68,7 @@ class Point:
     residual: Array
     scale: Array
     entries: Array
+    spin: Array
 
 
 class Equations:
@@ -256,7 +257,19 @@ class Equations:
             parts += self._hinge_parts(state, residual)
         values = np.concatenate([*parts, self._zeros])[self._valid]
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
-        return Point(potential, float(strain.sum()), residual, scale, entries)
+        return Point(potential, float(strain.sum()), residual, scale, entries, np.array(spin))
+
+    def slope(self, point: Point, rate: Loading) -> Array:
+        """Derivative of the residual along a change of nodal loads and displacements at a point."""
+        positions = self.model.positions
+        slope = np.zeros(self.total)
+        constant = self.member_pulls(np.zeros(self.rows), rate)[self.model.beams.owner]
+        moments = np.einsum("eca,ea->ec", point.spin, constant).ravel()
+        slope += np.bincount(self._used_numbers, weights=moments[self._used], minlength=self.total)
+        slope[self.number[self._free, 0]] -= rate.couple[self._free]
+        slope[self.turning_unknowns : self.unknowns] = -positions.Y.T @ rate.force.ravel()
+        slope[self.unknowns : self.unknowns + len(positions.rows)] = positions.BZ @ rate.shift
+        return slope
 
     def end_moments(self, state: State, loading: Loading) -> dict[str, Array]:
         """Moment (3,) about the fixed axes that the surroundings exert on the first end of each member."""

@@ -92,8 +92,8 @@ def test_points_are_what_repeated_solves_find(lee_path):
 def test_every_point_is_an_equilibrium(lee_path):
     for point in lee_path.points:
         found = lee_path.prepared.equations.at(point.state, point.loading)
-        # 1e-12 is what the steps converge to; a point between would miss by 1e-3.
-        assert (np.abs(found.residual) / found.scale).max() < 2e-12
+        # 1e-10 is what the steps converge to; a point between would miss by 1e-3.
+        assert (np.abs(found.residual) / found.scale).max() < 2e-10
 
 
 def test_energy_grows_by_the_work_of_the_load(lee_path):
@@ -453,11 +453,11 @@ def test_hundred_points_cost_less_than_25_cold_solves():
             begin = time.perf_counter()
             done = what()
             times.append(time.perf_counter() - begin)
-        return min(times), done
+        return np.median(times), done
 
-    cold, _ = timed(lambda: solve_model(prepared, 0.5), 7)
-    path, traced = timed(lambda: trace(curve, start, (-1.5, 50.0), 101), 3)
-    # Measured about 15 with its limit points located.
+    cold, _ = timed(lambda: solve_model(prepared, 0.5), 9)
+    path, traced = timed(lambda: trace(curve, start, (-1.5, 50.0), 101), 5)
+    # Limit points are located on the way; cold solves are of a prepared model, from the undeformed state.
     assert path / len(traced.points) * 100.0 < 25.0 * cold
 
 
@@ -567,8 +567,8 @@ def test_chart_of_motions_shows_a_reaction():
     assert course.get_xlabel() == "factor"
     assert course.get_ylabel() == "moment at last about x, N m"
     line = course.get_lines()[0]
-    # GJ / L times the twist.
-    assert np.asarray(line.get_ydata())[-1] == pytest.approx(0.75 * 5.0, rel=1e-9)
+    # GJ / L times the twist, on a mesh for 1e-4.
+    assert np.asarray(line.get_ydata())[-1] == pytest.approx(0.75 * 5.0, rel=1e-6)
 
 
 # -- bad input ------------------------------------------------------------------------------------
