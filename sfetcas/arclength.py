@@ -221,7 +221,7 @@ class Curve:
         point = equations.at(state, loading)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
         for count in range(ITERATIONS):
-            if count and residual <= (ROUNDING if sharp else PASSING):
+            if count and (residual <= ROUNDING if sharp else self._passes(point, residual)):
                 break
             try:
                 right = np.column_stack([-point.residual, -self.slope(state, factor, point)])
@@ -245,16 +245,24 @@ class Curve:
             state, factor, point, residual = trial, factor + change, there, gained
             if not np.isfinite(residual):
                 return None
-        if residual > (TOLERANCE if sharp else PASSING):
+        if not (residual <= TOLERANCE or (not sharp and self._passes(point, residual))):
             return None
         tangent = self.tangent(state, factor, point, across)
         loading = self.loading(factor)
         return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, count)
 
-    def at_factor(self, near: Standing, factor: float) -> Standing | None:
-        """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there."""
-        found = self.prepared.correct(near.state, self.loading(factor), most=TURN)
-        if not found.converged or self.prepared.distance(found.state, near.state) > TURN:
+    def _passes(self, point: Point, residual: float) -> bool:
+        """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
+        gaps = float(np.abs(point.residual[self.equations.unknowns :]).max(initial=0.0))
+        return residual <= PASSING and gaps <= TOLERANCE
+
+    def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
+        """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there.
+
+        ``most``: largest turn of a node (rad) from there.
+        """
+        found = self.prepared.correct(near.state, self.loading(factor), most=most)
+        if not found.converged or self.prepared.distance(found.state, near.state) > most:
             return None
         return self.standing(found.state, factor, near.tangent, arc=near.arc)
 

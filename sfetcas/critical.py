@@ -18,7 +18,7 @@ from .arrays import Array
 
 __all__ = ["Event", "at_factors", "events_between", "root", "shapes_at"]
 
-SHARP = 1e-11
+SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
 
 APART = 1e-6
@@ -29,6 +29,9 @@ ASIDE = 0.01
 
 FIRM = 1e6
 """Times the weight of the proximal term that holds the open direction at a bifurcation point."""
+
+NEAR = 0.02
+"""An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
 
 BESIDE = 1e-3
 """Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
@@ -157,7 +160,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
     if a == b or fa * fb >= 0.0 or not np.isfinite(fa * fb):
         return a if abs(fa) < abs(fb) else b
     # b is the latest place, a the other end of the bracket.
-    tolerance, share = SHARP * abs(b - a), 0.5
+    tolerance, share = SHARP * abs(b - a), min(max(fa / (fa - fb), 0.05), 0.95)
     for _ in range(60):
         x = a + share * (b - a)
         fx = function(x)
@@ -192,6 +195,19 @@ def at_factors(curve: Curve, points: list[Standing], factors: tuple[float, ...])
 
 
 def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standing | None:
+    """The point between two others at a factor: Newton's method from an interpolated one, or a root along the arc."""
+    arc = b.arc - a.arc
+    # The factor as the cubic over the arc that both points and tangents give.
+    rise, left, right = b.factor - a.factor, arc * a.tangent.factor, arc * b.tangent.factor
+
+    def missing(x: float) -> float:
+        return a.factor - factor + x * (left + x * (3.0 * rise - 2.0 * left - right + x * (left + right - 2.0 * rise)))
+
+    place = arc * root(missing, 0.0, missing(0.0), 1.0, missing(1.0))
+    state, _ = curve.predicted(a, place, curve.bend(a, b))
+    found = curve.at_factor(replace(a, state=state, arc=a.arc + place), factor, most=NEAR)
+    if found is not None:
+        return found
     near = _sought(curve, a, b, lambda standing: standing.factor - factor)
     return None if near is None else curve.at_factor(near, factor)
 

@@ -11,6 +11,9 @@ from .equations import Equations, Point, State
 from .loading import Loading
 
 __all__ = [
+    "DUAL",
+    "PROXIMAL",
+    "ROUNDING",
     "TURN",
     "Corrected",
     "correct",

@@ -24,7 +24,7 @@ from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .mesh import Mesh
 from .model import assemble
-from .newton import Corrected, redundant_rows, relative_residual
+from .newton import Corrected, loose_rows, redundant_rows, relative_residual, rows_in
 from .path import Branch, Path, PathPoint
 from .prepared import Prepared
 from .scene import Scene
@@ -38,6 +38,9 @@ __all__ = ["follow_path", "switch"]
 LEVELS = 10
 """Most halvings of the first mesh."""
 
+MARGIN = 16.0
+"""A halving gains this many times less than its order promises, as far as estimates go."""
+
 PATIENCE = 5
 """After so many halvings one that does not halve the error is the last."""
 
@@ -49,6 +52,9 @@ SAMPLES = 8
 
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
+
+TAUT = 1e3
+"""Multipliers above this many times the loads, in members without slack, are those of a taut string."""
 
 STEADY = 0.3
 """Share of the factor in the tangent from which on a point may be compared at its factor."""
@@ -165,18 +171,30 @@ class _Run:
     def path(self) -> Path:
         """The answer."""
         begin = time.perf_counter()
-        coarse, last = self._level(self._first_mesh()), np.inf
+        mesh, last = self._first_mesh(), np.inf
+        coarse = self._level(mesh)
+        if self.fixed == set(self.scene.members):
+            errors = self._errors(coarse, self._level(self._halved(mesh)))
+            return self._answer(coarse, errors, begin)
+        # The error falls by 4^p a halving; less is taken for granted.
+        gain = max(1.0, 4.0**mesh.order / MARGIN)
         for count in range(LEVELS):
             fine = self._level(self._halved(coarse.curve.model.mesh))
-            errors = self._errors(coarse, fine)
+            errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
             largest = max(errors.values(), default=0.0)
-            if self.fixed == set(self.scene.members):
-                return self._answer(coarse, errors, largest, begin)
             hopeless = count >= PATIENCE and largest > 0.5 * last
             if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
                 break
-            coarse, last = fine, largest
-        return self._answer(fine, errors, largest, begin)
+            coarse, last = self._next(fine, largest, gain), largest
+        return self._answer(fine, errors, begin)
+
+    def _next(self, fine: _Level, error: float, gain: float) -> _Level:
+        """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks."""
+        halvings = int(np.log(error / self.accuracy) / np.log(max(gain, 2.0))) if np.isfinite(error) else 0
+        mesh = fine.curve.model.mesh
+        for _ in range(min(halvings, 3)):
+            mesh = self._halved(mesh) if 4 * mesh.elements <= MOST_ELEMENTS else mesh
+        return fine if mesh is fine.curve.model.mesh else self._level(mesh)
 
     def _first_mesh(self) -> Mesh:
         """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
@@ -214,6 +232,7 @@ class _Run:
         if main.traced.end == "lost" and way < BEGINNING * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
+        _check_slack(curve, main.traced)
         level = _Level(curve, [main], notes)
         bends = [event for event in main.traced.events if event.kind == "bifurcation"]
         for number, event in enumerate(bends[: self.analysis.branches], start=1):
@@ -320,8 +339,8 @@ class _Run:
 
     # -- answers --------------------------------------------------------------------------------
 
-    def _answer(self, level: _Level, errors: dict[tuple[int, str, int], float], largest: float, begin: float) -> Path:
-        curve = level.curve
+    def _answer(self, level: _Level, errors: dict[tuple[int, str, int], float], begin: float) -> Path:
+        curve, largest = level.curve, max(errors.values(), default=0.0)
         branches = []
         for i, stretch in enumerate(level.stretches):
             own = {(kind, j): error for (k, kind, j), error in errors.items() if k == i}
@@ -391,6 +410,17 @@ class _Run:
             error_estimate=finite,
             notes=notes,
         )
+
+
+def _check_slack(curve: Curve, traced: Traced) -> None:
+    """Refuse members that are straight between held points from the start and carry the loads like a taut string."""
+    equations, (first, *_, last) = curve.equations, traced.points
+    loose = loose_rows(equations, first.point)
+    loads = max(float(np.abs(part).max(initial=0.0)) for part in (last.loading.force, last.loading.pull))
+    if loose.size and loads > 0.0 and np.abs(last.state.lam).max() > TAUT * loads:
+        names = ", ".join(equations.row_names[row] for row in rows_in(loose))
+        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
+        raise SolveError(Status.INFEASIBLE, detail, last.state)
 
 
 def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:
