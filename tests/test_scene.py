@@ -220,7 +220,7 @@ def test_unknown_keys(place, sentence):
         (
             "analysis/type",
             "statics",
-            "analysis.type: found 'statics', accepted: static, path; did you mean 'static'?",
+            "analysis.type: found 'statics', accepted: path, static; did you mean 'static'?",
         ),
         ("analysis/accuracy", 0, "analysis.accuracy: found 0, accepted: a number above 0 and up to 0.1"),
         ("analysis/accuracy", 0.2, "analysis.accuracy: found 0.2, accepted: a number above 0 and up to 0.1"),
