@@ -4,7 +4,8 @@ The flow, in the order of the names below:
 
 1. a :class:`Scene` says what there is: sections, nodes, members, loads, motions (or :func:`load` a file);
 2. :func:`solve` finds its equilibria, to the accuracy asked for, each with a certificate;
-3. a :class:`Solution` answers by the names of the scene.
+3. a :class:`Solution` answers by the names of the scene; a :class:`Path` does so along a path, and :func:`switch`
+   follows other branches from its bifurcations.
 
 Underneath: :func:`assemble` makes the :class:`Model` of a scene on a :class:`Mesh`; :class:`Prepared` keeps its
 solvers for repeated solves by :func:`solve_model`; :func:`equilibrium_nlp` opens the problem as a CasADi program
