@@ -7,8 +7,9 @@ from pathlib import Path as File
 
 import numpy as np
 import pytest
+from scenes import ZOO
 
-from sfetcas import Scene, SceneError, SolveError, Status, check, load, solve, solve_model, switch
+from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, solve, solve_model, switch
 from sfetcas.arclength import Curve, Tangent
 from sfetcas.charts import chart
 from sfetcas.cli import main
@@ -133,6 +134,11 @@ def test_crossings_stand_in_the_order_met(lee_path):
     assert [step.factor for step in path.steps] == [0.5, 1.0, 1.0, 0.5, -0.5, -0.5, 0.5, 1.0]
     assert [step.certificate.stable for step in path.steps] == [True, True, False, False, False, True, True, True]
     assert path.last is path.steps[-1]
+
+
+def test_crossings_within_one_step_are_in_order_on_the_way_down_too():
+    path = solve(made(lee(steps=[0.5, 0.5001, 0.4999], range=[-1.5, 1.9])))
+    assert [step.factor for step in path.steps] == [0.4999, 0.5, 0.5001, 0.5001, 0.5, 0.4999, 0.4999, 0.5, 0.5001]
 
 
 def test_a_factor_that_is_not_met_has_no_crossing():
@@ -283,6 +289,16 @@ def test_branches_lead_off_to_both_sides():
     # Mirror images, each to the accuracy of 1e-4 and far better.
     assert up == pytest.approx(down * [1.0, -1.0, 1.0], abs=1e-9)
     assert one.factors[0] == pytest.approx(np.pi**2 / 4.0, rel=1e-3)
+
+
+def test_branches_of_a_bent_path_are_mirror_images_from_the_start():
+    path = solve(made(table("arch_180_degrees_crown_load", range=[0, 8], branches=1)))
+    one, other = path.branches[1:]
+    # The point that they leave from is symmetric to rounding, though the equations leave it open there.
+    assert one.factors[0] == pytest.approx(other.factors[0], rel=1e-10)
+    places = [path.positions("crown", i)[0] for i in (1, 2)]
+    assert places[0] == pytest.approx(places[1] * [-1.0, 1.0, 1.0], abs=1e-9)
+    assert abs(places[0][0]) > 1e-3
 
 
 def test_branch_is_what_statics_leads_to():
@@ -628,3 +644,29 @@ def test_motions_that_cannot_be_made_have_no_path():
     found["motions"] = {"pull": {"node": "head", "displacement": [1, 0]}}
     with pytest.raises(SolveError, match="no shape of the members"):
         solve(made(found))
+
+
+# -- every kind of scene --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("assembly", ["closing", "nodal"])
+@pytest.mark.parametrize("name", ZOO)
+def test_path_leads_where_statics_does(name, assembly):
+    found = {**ZOO[name](), "analysis": {"steps": [0.5, 1.0], "accuracy": 1e-5, "unstable": "stay"}}
+    still = solve(Scene.from_dict(found), assembly=assembly)
+    found["analysis"] = {"type": "path", "range": [0, 1.0], "steps": [0.5, 1.0], "accuracy": 1e-5}
+    path = solve(Scene.from_dict(found), assembly=assembly)
+    assert path.main.factors[-1] == 1.0
+    assert [step.factor for step in path.steps] == [0.5, 1.0]
+    for along, alone in zip(path.steps, still.steps, strict=True):
+        assert along.certificate.stable == alone.certificate.stable
+        for node in path.model.nodes:
+            # Both to 1e-5 of the size.
+            assert along.position(node) == pytest.approx(alone.position(node), abs=2e-5 * path.scene.size)
+
+
+def test_path_scenes_survive_their_files(tmp_path):
+    scene = load(PROBLEMS / "cantilever_post_buckling.toml")
+    dump(scene, tmp_path / "again.json")
+    assert load(tmp_path / "again.json") == scene
+    assert scene.analysis.span == (0.0, 23.0)
