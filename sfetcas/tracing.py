@@ -86,18 +86,19 @@ def trace(
         if here is not curve:
             along = Tangent(np.zeros_like(now.tangent.z), now.tangent.factor)
             now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
-        part = _piece(here, now, ahead[0], count - len(traced.points) + len(traced.events))
+        stride = (span[1] - span[0]) / SHARE
+        part = _piece(here, now, ahead[0], stride, count - len(traced.points) + len(traced.events))
         traced = Traced(traced.points + part.points[1:], traced.events + part.events, part.end)
     return traced
 
 
-def _piece(curve: Curve, start: Standing, span: tuple[float, float], more: int) -> Traced:
-    """The same within one piece."""
+def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: float, more: int) -> Traced:
+    """The same within one piece, with steps that change the factor by a stride at most."""
     points: list[Standing] = [start]
     events: list[Event] = []
     now, before, length = start, None, FIRST
     for _ in range(more):
-        length = min(length, _longest(curve, now, span))
+        length = min(length, _longest(curve, now, stride))
         step = _step(curve, now, before, length, span)
         if step is None:
             return Traced(points, events, "lost")
@@ -112,9 +113,9 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], more: int) 
     return Traced(points, events, "points")
 
 
-def _longest(curve: Curve, now: Standing, span: tuple[float, float]) -> float:
+def _longest(curve: Curve, now: Standing, stride: float) -> float:
     turning = float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
-    return min(STRIDE / max(turning, 1e-300), (span[1] - span[0]) / SHARE / max(abs(now.tangent.factor), 1e-300))
+    return min(STRIDE / max(turning, 1e-300), stride / max(abs(now.tangent.factor), 1e-300))
 
 
 def _step(
