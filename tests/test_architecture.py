@@ -48,6 +48,7 @@ ORDER = [
     "critical",
     "tracing",
     "continuation",
+    "beginning",
     "open_problem",
     "fields",
     "solution",

@@ -332,6 +332,8 @@ def test_switch_follows_the_branch_on_request():
         assert again.factors[-1] == branch.factors[-1]
         ends = [path.fields(b.points[-1]).position("head") for b in (again, branch)]
         assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    with pytest.raises(SceneError, match="the path has none"):
+        switch(solve(made(column(range=[0, 2]))))
     with pytest.raises(SceneError, match="found 2, accepted: 1 to 1"):
         switch(path, 2)
     with pytest.raises(SceneError, match="found 0, accepted: 1 or -1"):
