@@ -39,6 +39,9 @@ NARROW = 0.02
 MOST = 400
 """Steps tried before giving up."""
 
+MOST_WITHOUT_POTENTIAL = 6000
+"""The same where there is no other way: a follower of 1e4 EI/L^2 swings a cantilever through 4,000 steps."""
+
 
 @dataclass(frozen=True)
 class Followed:
@@ -70,7 +73,7 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
     done, step = 0.0, 0.5
     left: list[float] = []
     now = prepared.correct(state, way(0.0))
-    for _ in range(MOST):
+    for _ in range(MOST if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL):
         if done >= 1.0:
             return Followed(now.state, True, tuple(left))
         step = min(step, longest)

@@ -281,7 +281,7 @@ class Equations:
         if not model.has_potential:
             parts.append(self._work.entries(state.q, applied, convex=convex))
         values = np.concatenate([*parts, self._zeros])[self._valid]
-        entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row))
+        entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row)).astype(float, copy=False)
         return Point(potential, stored, residual, scale, entries, np.array(spin))
 
     def slope(self, point: Point, rate: Loading) -> Array:
@@ -353,7 +353,8 @@ class Equations:
         values = np.zeros(self._size)
         values[: len(stiffness)] = stiffness
         self._add_links(values)
-        return np.bincount(self._to_entry, weights=values[self._valid], minlength=len(self.row))
+        found = np.bincount(self._to_entry, weights=values[self._valid], minlength=len(self.row))
+        return found.astype(float, copy=False)
 
     def _add_links(self, values: Array) -> None:
         """Put the stiffness of springs and small members at the undeformed state to the contributions."""

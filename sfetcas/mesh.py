@@ -123,7 +123,9 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
             continue
         softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
         expected = line.turning + max(rotations, default=0.0) + moments * line.length / softest
-        count = int(min(max(2.0, np.ceil(expected / turning)), 2000.0))
+        # What turns with its load may bend to and fro all along; waves are as long as the layers are thick.
+        waves = line.length * np.sqrt(most / softest) if any(load.follows for load in scene.loads.values()) else 0.0
+        count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
         cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
     return Mesh(order, cuts, rigid=rigid(scene))

@@ -16,15 +16,13 @@ import numpy as np
 
 from .accuracy import largest_difference
 from .arclength import Curve, Standing, Tangent
-from .arrays import Array
-from .continuation import follow
+from .beginning import begin_path, check_slack
 from .critical import Event, at_factors, shapes_at
-from .equations import State
 from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .mesh import Mesh
 from .model import assemble
-from .newton import Corrected, loose_rows, relative_residual, rows_in
+from .newton import Corrected, relative_residual
 from .path import Branch, Path, PathPoint
 from .prepared import Prepared
 from .scene import Scene
@@ -59,8 +57,8 @@ TAUT = 1e3
 STEADY = 0.3
 """Share of the factor in the tangent from which on a point may be compared at its factor."""
 
-BEGINNING = 1e-3
-"""Where straight members have no slack, the path starts at this share of its range."""
+LEAST_WAY = 1e-3
+"""A path that ends before this share of its range is none."""
 
 
 @single_threaded
@@ -108,6 +106,8 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         No branch was found there.
     """
     count = len(path.main.bifurcations)
+    if count == 0:
+        raise SceneError("bifurcation: the path has none, accepted: a path with bifurcations")
     if not 1 <= bifurcation <= count:
         raise SceneError(f"bifurcation: found {bifurcation}, accepted: 1 to {count}, those of the path")
     if side not in (1, -1):
@@ -115,11 +115,7 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
     run = _Run(path.scene, Settings())
     curve = Curve(path.prepared, path.unit)
     number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
-    flat = Tangent(np.zeros(curve.equations.total), path.points[number + 1].factor - path.points[number - 1].factor)
-    before, at, after = (curve.standing(p.state, p.factor, flat) for p in path.points[number - 1 : number + 2])
-    mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
-    here = replace(at, tangent=curve.normed(mean))
-    event = Event("bifurcation", here, max(1, here.inertia.zero))
+    event = _event_at(curve, path, number)
     if not 1 <= shape <= event.multiplicity:
         raise SceneError(f"shape: found {shape}, accepted: 1 to {event.multiplicity}, those that vanish there")
     traced = run.branch(curve, event, side, shape, points or path.scene.analysis.points)
@@ -127,6 +123,15 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
     stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
     return run.answered(curve, stretch, {})
+
+
+def _event_at(curve: Curve, path: Path, number: int) -> Event:
+    """The bifurcation at a point of a path, its tangent taken from both sides."""
+    points, along = path.points[number - 1 : number + 2], Tangent(np.zeros(curve.equations.total), 1.0)
+    before, at = (curve.standing(point.state, point.factor, along) for point in points[:2])
+    after = curve.standing(points[2].state, points[2].factor, before.tangent)
+    mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
+    return Event("bifurcation", replace(at, tangent=curve.normed(mean)), max(1, at.inertia.zero))
 
 
 @dataclass
@@ -201,7 +206,7 @@ class _Run:
         plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
         if graded.elements <= 2 * plain.elements:
             return graded
-        curve, start, _ = self._start(self._prepared(plain))
+        curve, start, _ = begin_path(self._prepared(plain), self.span)
         met = [point.factor for point in trace(curve, start, self.span, self.analysis.points, self.knots).points]
         return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
 
@@ -226,13 +231,13 @@ class _Run:
         return mesh.refined(marks)
 
     def _level(self, mesh: Mesh) -> _Level:
-        curve, start, notes = self._start(self._prepared(mesh))
+        curve, start, notes = begin_path(self._prepared(mesh), self.span)
         main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
-        if main.traced.end == "lost" and way < BEGINNING * self._widest:
+        if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
-        _check_slack(curve, main.traced)
+        check_slack(curve, main.traced)
         level = _Level(curve, [main], notes)
         bends = [event for event in main.traced.events if event.kind == "bifurcation"]
         for number, event in enumerate(bends[: self.analysis.branches], start=1):
@@ -253,56 +258,6 @@ class _Run:
     def stretch(self, part: _Stretch, curve: Curve) -> _Stretch:
         """The same with the crossings of the factors asked for."""
         return replace(part, crossings=at_factors(curve, part.traced.points, self.analysis.steps))
-
-    # -- start ----------------------------------------------------------------------------------
-
-    def _start(self, prepared: Prepared) -> tuple[Curve, Standing, tuple[str, ...]]:
-        """The curve with its unit, its first point, and what is to be said of it."""
-        up = 1.0 if self.span[1] > 0.0 else -1.0
-        state, factor, notes = self._first_state(prepared, up)
-        widest = max(map(abs, self.span))
-        curve = Curve(prepared, widest)
-        along = Tangent(np.zeros(prepared.equations.total), up)
-        tangent = curve.standing(state, factor, along).tangent
-        share = (tangent.factor / widest) ** 2
-        # The unit is the factor that would turn the structure by a radian were it linear, if that is in the range.
-        if share < 0.5:
-            curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), 1e-6 * widest)
-        return curve, curve.standing(state, factor, along), notes
-
-    def _first_state(self, prepared: Prepared, up: float) -> tuple[State, float, tuple[str, ...]]:
-        model, equations = prepared.model, prepared.equations
-        state = equations.start(model.loading(0.0, 0.0))
-        if prepared.lacks_slack and np.any(self._rate(model, up)):
-            factor = BEGINNING * (self.span[1] if up > 0 else self.span[0])
-            note = f"straight members have no slack: the path starts at factor {factor:g}, where they have bent"
-            return self._bent(prepared, factor), factor, (note,)
-        if prepared.diagnosis.mobility and model.minimisable:
-            factor = BEGINNING * (self.span[1] if up > 0 else self.span[0])
-            note = f"without loads it is a mechanism: the path starts at factor {factor:g}"
-            return self._bent(prepared, factor), factor, (note,)
-        if self.scene.histories:
-            grown = follow(prepared, lambda t: model.loading(0.0, t), state)
-            if not grown.reached:
-                raise SolveError(Status.FAILED, "no equilibrium to start from at factor 0", grown.state)
-            return grown.state, 0.0, ()
-        found = prepared.correct(state, model.loading(0.0))
-        return found.state, 0.0, ()
-
-    def _rate(self, model: Any, up: float) -> Array:
-        return np.asarray(model.loading(up * 1e-3).shift - model.loading(0.0).shift)
-
-    def _bent(self, prepared: Prepared, factor: float) -> State:
-        loading = prepared.model.loading(factor)
-        state, gap = prepared.guess(loading)
-        if gap > 0.2:
-            detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at factor {factor:g}"
-            raise SolveError(Status.INFEASIBLE, detail, state)
-        found, _ = prepared.minimise(loading, state)
-        stability = prepared.stability(found)
-        if stability.negative:
-            found, _ = prepared.leave(found.state, stability, loading)
-        return found.state
 
     # -- errors ---------------------------------------------------------------------------------
 
@@ -414,17 +369,6 @@ class _Run:
             error_estimate=finite,
             notes=notes,
         )
-
-
-def _check_slack(curve: Curve, traced: Traced) -> None:
-    """Refuse members that are straight between held points from the start and carry the loads like a taut string."""
-    equations, (first, *_, last) = curve.equations, traced.points
-    loose = loose_rows(equations, first.point)
-    loads = max(float(np.abs(part).max(initial=0.0)) for part in (last.loading.force, last.loading.pull))
-    if loose.size and loads > 0.0 and np.abs(last.state.lam).max() > TAUT * loads:
-        names = ", ".join(equations.row_names[row] for row in rows_in(loose))
-        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
-        raise SolveError(Status.INFEASIBLE, detail, last.state)
 
 
 def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:

@@ -82,7 +82,9 @@ class Analysis(Staged):
     range : (2,) - path: the factors between which it is followed, downwards where the range ends at 0
     points : path: it ends after so many points
     branches : path: from the first so many bifurcation points the branches that cross there are followed too, to
-        both sides, each for so many points; their answers stand after those of the path
+        both sides, each for so many points; their answers stand after those of the path, in the order of the
+        bifurcations and of the sides 1 and -1.  0, the default, stays on the path.  Where several eigenvalues
+        vanish at once the first shape is taken; ``switch`` takes others
 
     On a path each crossing of a factor of ``steps`` is an answer, in the order in which they are met.
     """

@@ -137,7 +137,11 @@ def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected
 def _cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
     state, gap = prepared.guess(loading)
     if gap > 0.2:
-        raise SolveError(Status.INFEASIBLE, f"the closings miss by {gap * prepared.model.scales.length:.3g} m", state)
+        equations = prepared.equations
+        rows = np.abs(equations.at(state, loading).residual[equations.unknowns :])
+        worst = ", ".join(equations.row_names[i] for i in np.flatnonzero(rows > 0.3 * rows.max())[:4])
+        detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at {worst}"
+        raise SolveError(Status.INFEASIBLE, detail, state)
     return prepared.minimise(loading, state)
 
 

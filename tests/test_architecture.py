@@ -56,6 +56,7 @@ ORDER = [
     "critical",
     "tracing",
     "continuation",
+    "beginning",
     "deflation",
     "open_problem",
     "balance",

@@ -270,10 +270,11 @@ def test_eigenvalues_that_are_near_are_two_bifurcations():
 
 def test_large_models_find_the_same_bifurcations():
     # Beyond 120 unknowns eigenvalues come from inverse iteration, not from LAPACK.
-    path = solve(made(column("hinge", "hinge", range=[0, 95])), elements=40, element="SFET5")
+    criticals = np.pi**2 * np.arange(1, 7) ** 2
+    path = solve(made(column("hinge", "hinge", range=[0, 400])), elements=40, element="SFET5")
     assert path.model.unknowns > 120
-    assert [e.factor for e in path.bifurcations] == pytest.approx(EULER["hinge", "hinge"], rel=1e-8)
-    assert [e.certificate.negative for e in path.bifurcations] == [0, 1, 2]
+    assert [e.factor for e in path.bifurcations] == pytest.approx(criticals, rel=1e-8)
+    assert [e.certificate.negative for e in path.bifurcations] == [0, 1, 2, 3, 4, 5]
 
 
 # -- branches -------------------------------------------------------------------------------------
@@ -331,6 +332,8 @@ def test_switch_follows_the_branch_on_request():
         assert again.factors[-1] == branch.factors[-1]
         ends = [path.fields(b.points[-1]).position("head") for b in (again, branch)]
         assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    with pytest.raises(SceneError, match="the path has none"):
+        switch(solve(made(column(range=[0, 2]))))
     with pytest.raises(SceneError, match="found 2, accepted: 1 to 1"):
         switch(path, 2)
     with pytest.raises(SceneError, match="found 0, accepted: 1 or -1"):
@@ -344,6 +347,10 @@ def test_branches_in_space_are_neutral_where_they_may_turn_about_the_column():
     straight, *sides = path.steps
     assert straight.certificate.negative == 2
     assert [step.certificate.stable for step in sides] == ["neutral", "neutral"]
+    assert {point.stable for point in path.branches[1].points} == {"neutral"}
+    other = switch(path, 1, 1, shape=2)
+    # The second shape is across the first: buckled to z instead of y.
+    assert abs(path.fields(other.points[-1]).position("head")[2]) > 0.3
     plane = solve(made(column(range=[0, 4], branches=1, steps=[3.0])))
     # Both to 1e-4 of accuracy and far better.
     assert sides[0].position("head")[:2] == pytest.approx(plane.steps[1].position("head")[:2], abs=1e-6)
