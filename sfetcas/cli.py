@@ -180,12 +180,16 @@ def _report_step(step: Equilibrium) -> None:
         if node.support != "free":
             force, moment = step.reaction(name)
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    for name in step.model.scene.springs:
+        state = step.spring(name)
+        units = ("rad", "N m") if state.rotational else ("m", "N")
+        (travel, at), (effort, how) = state.to_dict().items()
+        print(f"  spring {name}: {travel} {at:.9g} {units[0]}, {effort} {how:.9g} {units[1]}")
     proof = step.certificate
-    kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
-    print(
-        f"  {kind}, smallest eigenvalue {proof.smallest:.4g} N, residual {proof.residual:.1e}, "
-        f"estimated error {proof.error_estimate:.1e} of the size"
-    )
+    kinds = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}
+    kind = kinds.get(str(proof.stable), str(proof.stable))
+    kind = f"stability {kind}" if kind == "not defined" else f"{kind}, smallest eigenvalue {proof.smallest:.4g} N"
+    print(f"  {kind}, residual {proof.residual:.1e}, estimated error {proof.error_estimate:.1e} of the size")
     for note in step.notes:
         print(f"  note: {note}")
 
@@ -242,8 +246,8 @@ def _info(options: argparse.Namespace) -> int:
     for block in model.blocks:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")
-    for name in model.members:
-        line = scene.center_lines[name]
-        print(f"  member {name}: length {line.length:.9g} m, {len(mesh.cuts[name]) - 1} elements")
+    for name, member in scene.members.items():
+        made = f"{len(mesh.cuts[name]) - 1} elements" if member.type == "flexible" else member.type
+        print(f"  member {name}: {made}, length {scene.center_lines[name].length:.9g} m")
     print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")
     return SOLVED

