@@ -20,9 +20,10 @@ import numpy as np
 
 from . import quaternion
 from .arrays import Array
-from .interpolation import gauss
+from .interpolation import gauss, integration
 from .matrices import rigid_motions
 from .scene import Scene
+from .sections import breaks
 
 __all__ = ["BodyData", "Lever", "body_of", "lever_along", "own_axes", "quadrature"]
 
@@ -102,11 +103,34 @@ def _lever_of_mass(mass: Array, rest: Array) -> Lever:
     return Lever(float(np.trace(ends @ along)) / 3.0, -first, ends)
 
 
-def quadrature() -> tuple[Array, Array]:
-    """Places (fractions of the length) and weights along a member."""
-    x, w = gauss(POINTS)
-    begin = np.arange(PANELS)[:, None] / PANELS
-    return (begin + x / PANELS).ravel(), np.tile(w / PANELS, PANELS)
+def quadrature(scene: Scene, name: str) -> tuple[Array, Array]:
+    """Places (fractions of the length) and weights along a member, in panels without kinks."""
+    edges, (x, w) = _edges(scene, name), gauss(POINTS)
+    lengths = np.diff(edges)[:, None]
+    return (edges[:-1, None] + x * lengths).ravel(), (w * lengths).ravel()
+
+
+def _edges(scene: Scene, name: str) -> Array:
+    """Ends of the panels: equal ones, and wherever the shape, the section or a load profile has a kink."""
+    member = scene.members[name]
+    kinks = [*scene.center_lines[name].breaks]
+    kinks += [] if member.section is None else scene.sections[member.section].breaks
+    for load in scene.loads.values():
+        if load.member == name and load.profile is not None:
+            kinks += breaks(load.profile)
+    return np.unique(np.concatenate([np.linspace(0.0, 1.0, PANELS + 1), np.array(kinks, dtype=float)]))
+
+
+def _integrals(edges: Array, values: Array, x: Array) -> Array:
+    """Integrals from 0 to places x of what is given at the points of the quadrature, (len(x), ...)."""
+    points, w = gauss(POINTS)
+    panels = values.reshape(len(edges) - 1, POINTS, *values.shape[1:])
+    lengths = np.diff(edges)
+    whole = np.einsum("k,ek...->e...", w, panels) * lengths.reshape(-1, *[1] * (values.ndim - 1))
+    before = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(whole, axis=0)])
+    e = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(lengths) - 1)
+    rows = integration(points, (x - edges[e]) / lengths[e]) * lengths[e][:, None]
+    return np.asarray(before[e] + np.einsum("nk,nk...->n...", rows, panels[e]))
 
 
 def _moments_of_wrench(arm: Array) -> Array:
@@ -128,7 +152,7 @@ def compliance_along(scene: Scene, name: str, x: Array) -> Array:
 
 def _from_section(scene: Scene, name: str, rest: Array) -> BodyData:
     line = scene.center_lines[name]
-    x, w = quadrature()
+    x, w = quadrature(scene, name)
     flexible = compliance_along(scene, name, x) * (w * line.length)[:, None, None]
     b = _moments_of_wrench(line.positions(np.array([1.0]))[0] - line.positions(x))
     compliance = np.einsum("nji,njk,nkl->il", b, flexible, b)
@@ -155,6 +179,11 @@ def _carried(arm: Array) -> Array:
     return matrix
 
 
+def _cross_all(r: Array) -> Array:
+    """Columns ``r x e_i``, (n, 3, 3)."""
+    return np.asarray(np.cross(r[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1))
+
+
 def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> Lever:
     """Lever of a profile at places x with weights w (fractions of the length) along a member with a section."""
     line = scene.center_lines[name]
@@ -162,16 +191,15 @@ def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> 
     share = profile * w * line.length
     start = line.positions(np.array([0.0]))[0]
     total, first = float(share.sum()), share @ (places - start)
-    q, qw = quadrature()
-    here = line.positions(q)
-    flexible = compliance_along(scene, name, q) * (qw * line.length)[:, None, None]
+    q, qw = quadrature(scene, name)
+    here, edges = line.positions(q), _edges(scene, name)
+    softness = compliance_along(scene, name, q) * line.length
     b = _moments_of_wrench(end - here)
-    compliance = np.einsum("nji,njk,nkl->il", b, flexible, b)
-    beyond = (x[None, :] > q[:, None]) * share[None, :]
-    arms = beyond @ places - beyond.sum(axis=1)[:, None] * here
-    # Moment at s of the load beyond it, for a unit vector along each axis: arm x e_i.
-    bent = np.cross(arms[:, None, :], np.eye(3)[None, :, :])
-    free = np.einsum("nji,njk,nak->ai", b, flexible, bent)
+    compliance = np.einsum("nji,njk,nkl,n->il", b, softness, b, qw)
+    # A unit force at x bends what is before it by (r(x) - r(s)) x e_i; its work on that is linear in r(x).
+    bent = np.einsum("nji,njk->nik", b, softness)
+    by_place, by_origin = _integrals(edges, bent, x), _integrals(edges, bent @ _cross_all(here), x)
+    free = np.einsum("n,nia->ai", share, by_place @ _cross_all(places) - by_origin)
     size = float(np.abs(end - start).max())
     unit = np.array([size, size, size, 1.0, 1.0, 1.0])
     second = free / unit @ np.linalg.pinv(compliance / unit[:, None] / unit[None, :], rcond=RIGID) / unit

@@ -224,11 +224,12 @@ def _report_step(step: Equilibrium, place: str) -> None:
         if node.support != "free":
             force, moment = step.reaction(name)
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
-    proof = step.certificate
     for name in step.model.scene.springs:
-        print(
-            f"  spring {name}: " + ", ".join(f"{key} {value:.9g}" for key, value in step.spring(name).to_dict().items())
-        )
+        state = step.spring(name)
+        units = ("rad", "N m") if state.rotational else ("m", "N")
+        (travel, at), (effort, how) = state.to_dict().items()
+        print(f"  spring {name}: {travel} {at:.9g} {units[0]}, {effort} {how:.9g} {units[1]}")
+    proof = step.certificate
     error = proof.error_estimate
     said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
     print(f"  {_kind(step)}, residual {proof.residual:.1e}, {said}")
@@ -301,8 +302,8 @@ def _info(options: argparse.Namespace) -> int:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")
     for name, member in scene.members.items():
-        cut = f"{len(mesh.cuts[name]) - 1} elements" if member.type == "flexible" else member.type
-        print(f"  member {name}: length {scene.center_lines[name].length:.9g} m, {cut}")
+        made = f"{len(mesh.cuts[name]) - 1} elements" if member.type == "flexible" else member.type
+        print(f"  member {name}: {made}, length {scene.center_lines[name].length:.9g} m")
     print(f"  {Prepared(model).diagnosis.sentence}")
     print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")
     return SOLVED

@@ -19,7 +19,7 @@ import numpy as np
 from . import interpolation, quaternion
 from .arrays import Array, Index
 from .connections import Group
-from .joints import by_turning
+from .joints import Body, by_turning
 from .kernels import Batch, Kernels, chosen
 from .linear import SparseMap, SparseSolver
 from .loading import Loading
@@ -95,6 +95,8 @@ class Equations:
         self._pattern()
         # A hundredth of the stiffness against turning a node: 1e-14 of it is what rounding of rotations leaves.
         self._noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
+        for link in self._linked:
+            link.add_noise(self._noise)
         self._noise[self.unknowns :] = 1.0
 
     # -- numbering ------------------------------------------------------------------------------
@@ -281,6 +283,7 @@ class Equations:
         if not model.has_potential:
             parts.append(self._work.entries(state.q, applied, convex=convex))
         values = np.concatenate([*parts, self._zeros])[self._valid]
+        # Without any unknown the sum is of whole numbers.
         entries = np.bincount(self._to_entry, weights=values, minlength=len(self.row)).astype(float, copy=False)
         return Point(potential, stored, residual, scale, entries, np.array(spin))
 
@@ -436,7 +439,8 @@ class Equations:
     def moved(self, state: State, step: Array) -> State:
         """The state after a step of all unknowns and multipliers."""
         model = self.model
-        turn = np.where(self.number >= 0, step[self.number], 0.0)
+        # What is held, number -1, turns by the zero at the end.
+        turn = np.append(step, 0.0)[self.number]
         for i, basis in self._basis.items():
             turn[i] = basis @ turn[i]
         if model.space:
@@ -467,6 +471,15 @@ class _Linked:
         self._batch = Batch(by_turning(group.kind), n)
         self._batch.set(2, group.data)
         self._about = np.argwhere(np.isin(group.turns, list(equations._basis))).tolist()
+
+    def add_noise(self, noise: Array) -> None:
+        """Judge the sides of a body by its largest stiffness: rounding of a stiff direction has levers."""
+        kind = self.group.kind
+        if isinstance(kind, Body):
+            first = kind.nodes * kind.axes
+            largest = np.abs(self.group.data[:, first : first + kind.freedoms * (kind.freedoms + 1) // 2]).max(axis=1)
+            used = self.cells >= 0
+            np.maximum.at(noise, self.cells[used], (0.01 * largest[:, None] * used)[used])
 
     def at(
         self,

@@ -88,6 +88,15 @@ class Connection(abc.ABC):
         c, s = ca.cos(q[0]), ca.sin(q[0])
         return [c * v[0] + s * v[1], c * v[1] - s * v[0]]
 
+    def turned_back(self, q: Side, v: Side) -> Side:
+        """What turning back changes, ``R(q)^T v - v``, also of small rotations to full precision."""
+        if self.space:
+            spin = [-a for a in q[1:]]
+            once = ca.cross(ca.vertcat(*spin), ca.vertcat(*v))
+            return ca.vertsplit(2.0 * (q[0] * once + ca.cross(ca.vertcat(*spin), once)))
+        s, versine = ca.sin(q[0]), 2.0 * ca.sin(0.5 * q[0]) ** 2
+        return [s * v[1] - versine * v[0], -s * v[0] - versine * v[1]]
+
     def forth(self, q: Side, v: Side) -> Side:
         """The vector turned with the side, ``R(q) v``."""
         return self.back([-q[0]] if not self.space else [q[0], -q[1], -q[2], -q[3]], v)
@@ -294,8 +303,8 @@ class Body(Connection):
         frame, e = self.frame(q), []
         for i in range(self.nodes):
             d = ca.vertsplit(rest[self.axes * i : self.axes * (i + 1)])
-            actual = [d[k] + u[i][k] - u[0][k] for k in range(self.axes)]
-            e += [a - b for a, b in zip(self.back(frame, actual), d, strict=True)]
+            moved = self.back(frame, [u[i][k] - u[0][k] for k in range(self.axes)])
+            e += [a + b for a, b in zip(moved, self.turned_back(frame, d), strict=True)]
             r = self.relative(frame, q[i])
             if self.space:
                 sign = ca.if_else(r[0] < 0.0, -2.0, 2.0)

@@ -370,7 +370,7 @@ class _Writer:
             length = self.scene.center_lines[member].length
             lever = lever_along(self.scene, member, np.ones(1) / length, np.array([load.at or 0.0]), np.ones(1))
         else:
-            x, w = quadrature()
+            x, w = quadrature(self.scene, member)
             profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
             lever = lever_along(self.scene, member, profile, x, w)
         self._add_lever(group, member, lever, np.asarray(load.vector))

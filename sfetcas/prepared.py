@@ -136,8 +136,8 @@ class Prepared:
         """
         if not self.model.minimisable:
             raise SolveError(Status.FAILED, "loads without potential cannot be minimised, only followed", state)
-        if len(self.model.row_names) > self.model.unknowns - self._norms:
-            # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise.
+        if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
+            # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
             found = self.correct(state, loading, iterations=50)
             if not found.converged:
                 detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
