@@ -300,6 +300,15 @@ class Equations:
             n: m.copy() if turns == 3 else np.array([0.0, 0.0, m[0]]) for n, m in zip(model.members, first, strict=True)
         }
 
+    def starting_moments(self, state: State, loading: Loading) -> Array:
+        """Moments (elements, 3) about the fixed axes that the surroundings exert on the first node of each element."""
+        model, loading = self.model, self.effective(state, loading)
+        self._kernel.set(0, state.q[model.rotations.turns])
+        constant = self.segment_pulls(state.lam, loading)[self._owner]
+        self._kernel.set(3, loading.pull + constant[:, None, :])
+        first = self._kernel()[2][:, : model.element.turns]
+        return first.copy() if model.space else np.pad(first, ((0, 0), (2, 0)))
+
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
         model, positions = self.model, self.model.positions

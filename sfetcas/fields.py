@@ -16,6 +16,7 @@ from . import interpolation, quaternion
 from .arrays import Array
 from .equations import Equations, State
 from .loading import Loading
+from .mesh import Touch
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -98,6 +99,10 @@ class Fields:
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
         rotation = rotations_along(model, self._state.q, member, x)
+        if not model.space:
+            for touch in model.mesh.touches:
+                if touch.member == member and touch.to is not None:
+                    self._lay(touch, x, rotation, force, moment)
         frames = self._frames(member, x, rotation)
         result = {"position": position, "rotation": rotation, "force": force, "moment": moment}
         if dimensionless:
@@ -113,6 +118,97 @@ class Fields:
             strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
         return result
+
+    def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
+        """Force and moment along a stretch that lies on an obstacle, in place, dimensionless, in the plane.
+
+        Its shape is that of the obstacle, so that the moment is known, and its derivative is the force across.
+        The force along changes with what acts along, and on a circle with the force across.
+        """
+        inside = (x >= touch.at) & (x <= float(touch.to or 0.0))
+        if not inside.any():
+            return
+        model, here = self.model, x[inside]
+        tangents = self._tangents(touch.member, here, rotation[inside])
+        across = np.cross([0.0, 0.0, 1.0], tangents)
+        pressed = self.pressed_moments(touch, here)
+        step = 1e-5
+        low, high = np.clip(here - step, touch.at, None), np.clip(here + step, None, touch.to)
+        rise = self.pressed_moments(touch, high) - self.pressed_moments(touch, low)
+        length = model.scales.length / model.scene.center_lines[touch.member].length
+        shear = -rise / np.maximum(high - low, 1e-300) * length
+        along = np.einsum("ni,ni->n", force[inside], tangents)
+        if self._curvature(touch):
+            along = self._along_round(touch, here, pressed)
+        moment[inside] = np.outer(pressed, [0.0, 0.0, 1.0])
+        force[inside] = along[:, None] * tangents + shear[:, None] * across
+
+    def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
+        """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""
+        model = self.model
+        part, cuts = model.elements_of(touch.member), model.mesh.cuts[touch.member]
+        first = model.mesh.cut_at(touch.member, touch.at)
+        spread, turned = self._loading.spread[part], self.turned[part]
+        pushed = np.einsum("eka,eka->ek", spread, turned) / np.linalg.norm(turned, axis=2)
+        sums = np.concatenate([[0.0], np.cumsum(pushed.sum(axis=1))])
+        e, xi = _located(cuts, x)
+        element = model.element
+        to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
+        gained = sums[e] - sums[first] + np.einsum("nk,nk->n", to_x, pushed[e])
+        start = self.along(touch.member, np.array([np.nextafter(touch.at, 0.0)]), dimensionless=True)
+        if first == 0:
+            begin = float(_three(self._start_forces(touch.member)[0]) @ self._tangent_at(touch.member, 0.0))
+        else:
+            begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
+        bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0])
+        return np.asarray(begin - bent * model.scales.length - gained)
+
+    def load_before(self, member: str, x: Array) -> Array:
+        """Distributed load (n, 3) from the start of a member to fractions of its length, dimensionless."""
+        model, element = self.model, self.model.element
+        spread = self._loading.spread[model.elements_of(member)]
+        sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
+        e, xi = _located(model.mesh.cuts[member], x)
+        to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
+        return _three(sums[e] + np.einsum("nk,nka->na", to_x, spread[e]))
+
+    def _tangent_at(self, member: str, x: float) -> Array:
+        place = np.array([x])
+        return np.asarray(self._tangents(member, place, rotations_along(self.model, self._state.q, member, place))[0])
+
+    def _tangents(self, member: str, x: Array, rotation: Array) -> Array:
+        """Tangents (n, 3) at fractions of the length."""
+        return self._frames(member, x, rotation)[:, :, 0]
+
+    def tangents(self, member: str, x: Array) -> Array:
+        """Tangents (n, 3) at fractions of the length."""
+        return self._tangents(member, x, rotations_along(self.model, self._state.q, member, x))
+
+    def positions(self, member: str, x: Array) -> Array:
+        """Positions (n, 3) at fractions of the length, m."""
+        model, element = self.model, self.model.element
+        part = model.elements_of(member)
+        e, xi = _located(model.mesh.cuts[member], x)
+        to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
+        moved = np.einsum("nk,nka->na", to_x, (self.turned[part] - model.beams.tangent[part])[e])
+        start = self._element_starts(member)[0]
+        return model.scene.center_lines[member].positions(x) + _three(start[e] + moved) * model.scales.length
+
+    def _curvature(self, touch: Touch) -> float:
+        """Signed curvature that an obstacle gives to a stretch, 1/m."""
+        contact = self.model.scene.contacts[touch.contact]
+        if contact.radius is None:
+            return 0.0
+        return touch.way / (contact.radius - (-1.0 if contact.side == "inside" else 1.0) * touch.offset)
+
+    def pressed_moments(self, touch: Touch, x: Array) -> Array:
+        """Moments (n,) about z that bend a member to the shape of an obstacle, dimensionless, in the plane."""
+        scene = self.model.scene
+        line = scene.center_lines[touch.member]
+        stiffness = scene.sections[str(scene.members[touch.member].section)].stiffness(x)
+        column, sign = (1, _z_of(line, x)[:, 1]) if line.bending_axis == 2 else (2, _z_of(line, x)[:, 2])
+        bent = self._curvature(touch) - sign * line.curvatures(x)[:, column]
+        return np.asarray(stiffness[:, column] * bent / self.model.scales.moment)
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
@@ -146,7 +242,15 @@ class Fields:
         gains[:-1] -= self._loading.moment[chain[1:, 0]]
         moment = -self._start_moments[member]
         moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
+        if any(touch.to is not None for touch in model.mesh.touches):
+            # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
+            moments[:-1] = -self._equations.starting_moments(self._state, self._applied)[part]
         return starts, moments
+
+
+def _z_of(line: Any, x: Array) -> Array:
+    """z in the section's axes, (n, 3): 1 or -1 about that which bending is about."""
+    return np.rint(quaternion.matrix(line.quaternions(x))[:, 2, :])
 
 
 def _located(cuts: Array, x: Array) -> tuple[Any, Array]:

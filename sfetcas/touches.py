@@ -1,0 +1,238 @@
+"""What touches what at a state: forces of obstacles, conditions of the places of contact, gaps along members.
+
+A place of contact within a member is an unknown of its own beside the equilibrium with that place held:
+
+* on a plane or a round obstacle the member is tangential to it there;
+* a point or an edge pushes across the member: the force has no part along it;
+* where a stretch begins or ends, the bending moment is the one that the obstacle's shape takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array
+from .equations import Equations, State
+from .fields import Fields
+from .loading import Loading
+from .mesh import Touch
+from .obstacles import Obstacle, free_end, members_of, nearest, obstacle
+
+__all__ = ["Gap", "Touched", "obstacles_of"]
+
+SAMPLES = 12
+"""Places in each element at which gaps are looked at."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A run of places of a member that are inside an obstacle, and the deepest of them.
+
+    Attributes
+    ----------
+    contact, member : str
+    begin, end, at : float
+        Fractions of the length.
+    depth : float
+        m, negative.
+    way : float
+        As in :class:`~sfetcas.mesh.Touch`.
+    """
+
+    contact: str
+    member: str
+    begin: float
+    end: float
+    at: float
+    depth: float
+    way: float = 1.0
+
+
+def obstacles_of(model: object) -> Mapping[str, Obstacle]:
+    """The obstacles of a model's scene by name."""
+    scene = model.scene  # type: ignore[attr-defined]
+    return {name: obstacle(contact, model.space) for name, contact in scene.contacts.items()}  # type: ignore[attr-defined]
+
+
+class Touched:
+    """Contact at one state of a model."""
+
+    def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
+        self.model = equations.model
+        self.fields = Fields(equations, state, loading)
+        self.obstacles = obstacles_of(self.model)
+        self._state, self._loading = state, loading
+        names = self.model.row_names
+        self._row = {name: i for i, name in reversed(list(enumerate(names)))}
+
+    # -- forces ---------------------------------------------------------------------------------
+
+    def force(self, touch: Touch) -> Array:
+        """Force (3,) of an obstacle on a member at a place or over a stretch, N."""
+        kind, model = self.obstacles[touch.contact].kind, self.model
+        if touch.to is not None and not self._has_row(touch):
+            return self._resultant(touch)
+        if kind == "sharp":
+            first = self._row[f"{touch.name}, 1 of 2"]
+            group = next(g for g in model.connections if touch.name in g.names and type(g.kind).__name__ == "OnEdge")
+            axes = model.element.axes
+            directions = group.data[group.names.index(touch.name), : 2 * axes].reshape(2, axes)
+            force = -self._state.lam[first : first + 2] @ directions
+        else:
+            normal = self.normal(touch, touch.at)[: model.element.axes]
+            force = -self._state.lam[self._row[touch.name]] * normal
+            if touch.to is not None and kind == "round":
+                along = self._row[f"{touch.name} along"]
+                out = self._out(touch)
+                force = force - self._state.lam[along] * self._tangent(touch, touch.at)[: model.element.axes] / out
+        return np.pad(force, (0, 3 - len(force))) * model.scales.force
+
+    def _has_row(self, touch: Touch) -> bool:
+        return touch.name in self._row
+
+    def _out(self, touch: Touch) -> float:
+        place = self.fields.positions(touch.member, np.array([touch.at]))[0]
+        stop = self.obstacles[touch.contact]
+        return float(np.linalg.norm((place - stop.place) @ stop.across)) / self.model.scales.length
+
+    def _resultant(self, touch: Touch) -> Array:
+        """Force over a stretch by the balance of its forces, N."""
+        before, after = self._beside(touch, touch.at, -1.0), self._beside(touch, float(touch.to or 0.0), 1.0)
+        return before - after - self._load_between(touch.member, touch.at, float(touch.to or 0.0))
+
+    def _beside(self, touch: Touch, at: float, way: float) -> Array:
+        """Internal force just outside a stretch, N; at the end of a member the one just inside."""
+        x = np.nextafter(at, at + way) if 0.0 < at < 1.0 else at
+        return np.asarray(self.fields.along(touch.member, np.array([x]))["force"][0])
+
+    def _load_between(self, member: str, begin: float, end: float) -> Array:
+        """Distributed load between two places, N."""
+        before = self.fields.load_before(member, np.array([begin, end]))
+        return np.asarray((before[1] - before[0]) * self.model.scales.force)
+
+    def push(self, touch: Touch) -> float:
+        """Force of a touch along the normal, N: below zero the obstacle would have to pull."""
+        return float(self.force(touch) @ self.normal(touch, touch.at))
+
+    def end_pushes(self, touch: Touch) -> list[float]:
+        """Concentrated forces at the inner ends of a stretch along the normals there, N."""
+        found = []
+        for at, way in ((touch.at, -1.0), (float(touch.to or 0.0), 1.0)):
+            if 0.0 < at < 1.0:
+                inside = self.fields.along(touch.member, np.array([at]))["force"][0]
+                jump = way * (inside - self._beside(touch, at, way))
+                found.append(float(jump @ self.normal(touch, at)))
+        return found
+
+    def pressures(self, touch: Touch, x: Array) -> Array:
+        """Forces (n - 1,) of an obstacle between places of a stretch along the normals in their middles, N."""
+        forces = self.fields.along(touch.member, x)["force"]
+        loads = self.fields.load_before(touch.member, x) * self.model.scales.force
+        pushed = -np.diff(forces, axis=0) - np.diff(loads, axis=0)
+        middles = 0.5 * (x[1:] + x[:-1])
+        return np.array([push @ self.normal(touch, at) for push, at in zip(pushed, middles, strict=True)])
+
+    def normal(self, touch: Touch, at: float) -> Array:
+        """Normal (3,) of an obstacle at a place of a member."""
+        x = np.array([at])
+        place, tangent = self.fields.positions(touch.member, x), self.fields.tangents(touch.member, x)
+        return np.asarray(self.obstacles[touch.contact].normals(place, tangent, touch.way)[0])
+
+    def _tangent(self, touch: Touch, at: float) -> Array:
+        return np.asarray(self.fields.tangents(touch.member, np.array([at]))[0])
+
+    # -- conditions -----------------------------------------------------------------------------
+
+    def conditions(self) -> Array:
+        """What has to be zero at each place of contact within a member, dimensionless, in their order."""
+        found = []
+        for touch in self.model.mesh.touches:
+            if touch.to is not None:
+                found += [self._moment_jump(touch, at, way) for at, way in zip(touch.places, (-1.0, 1.0), strict=True)]
+            elif 0.0 < touch.at < 1.0:
+                sharp = self.obstacles[touch.contact].kind == "sharp"
+                push = self.force(touch) / self.model.scales.force if sharp else self.normal(touch, touch.at)
+                found.append(float(push @ self._tangent(touch, touch.at)))
+        return np.array([value for value in found if value is not None])
+
+    def _moment_jump(self, touch: Touch, at: float, way: float) -> float | None:
+        """Moment just outside a stretch less the one that the obstacle's shape takes; None at a member's end."""
+        if not 0.0 < at < 1.0:
+            return None
+        x = np.array([np.nextafter(at, at + way)])
+        outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0, 2]
+        return float(outside - self.fields.pressed_moments(touch, np.array([at]))[0])
+
+    # -- gaps -----------------------------------------------------------------------------------
+
+    def samples(self, member: str) -> Array:
+        """Fractions at which gaps are looked at: finely between the cuts."""
+        cuts = self.model.mesh.cuts[member]
+        # Towards the ends of an element, where contact begins, the samples are dense.
+        inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / SAMPLES)
+        return np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * inner).ravel(), 1.0)
+
+    def gaps(self, contact: str, member: str, x: Array, offset: float, way: float = 1.0) -> Array:
+        """Gaps (n,) of places of a member, m."""
+        place, tangent = self.fields.positions(member, x), self.fields.tangents(member, x)
+        return self.obstacles[contact].gaps(place, tangent, offset, way)
+
+    def inside(self, offsets: Mapping[str, float], ways: Mapping[tuple[str, str], float], limit: float) -> list[Gap]:
+        """All runs of places that are deeper inside an obstacle than the limit (m), where members are free of it."""
+        found: list[Gap] = []
+        for contact, stop in self.obstacles.items():
+            for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
+                offset = offsets.get(contact, 0.0)
+                if stop.kind == "sharp":
+                    found += self._over_edge(contact, member, offset, ways[contact, member], limit)
+                else:
+                    found += self._runs(contact, member, offset, limit)
+        return found
+
+    def _runs(self, contact: str, member: str, offset: float, limit: float) -> list[Gap]:
+        x = self.samples(member)
+        keep = np.ones(len(x), bool)
+        nodes = [self.model.scene.nodes[node] for node in self.model.scene.members[member].nodes]
+        keep[0], keep[-1] = (free_end(node) for node in nodes)
+        for touch in self.model.mesh.touches:
+            if touch.contact == contact and touch.member == member and touch.to is not None:
+                keep &= (x < touch.at) | (x > touch.to)
+        gaps = self.gaps(contact, member, x, offset)
+        deep = (gaps < -limit) & keep
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], deep, [False]]).astype(int)))
+        runs = []
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            i = a + int(np.argmin(gaps[a:b]))
+            runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
+        return runs
+
+    def _over_edge(self, contact: str, member: str, offset: float, way: float, limit: float) -> list[Gap]:
+        if any(t.contact == contact and t.member == member for t in self.model.mesh.touches):
+            return []
+        found = []
+        for x in self.passing(contact, member):
+            gap = float(self.gaps(contact, member, np.array([x]), offset, way)[0])
+            near = abs(gap) < 0.2 * self.model.scene.size
+            if gap < -limit and near:
+                found.append(Gap(contact, member, x, x, x, gap, way))
+        return found
+
+    def passing(self, contact: str, member: str) -> list[float]:
+        """Fractions at which a member comes nearest to an edge."""
+        fields = self.fields
+        positions, tangents = (lambda x: fields.positions(member, x)), (lambda x: fields.tangents(member, x))
+        return nearest(self.obstacles[contact], positions, tangents, self.samples(member))
+
+    def smallest_gap(self, contact: str, way: Mapping[tuple[str, str], float]) -> float:
+        """Smallest gap of all members that an obstacle stops, m; infinite where none passes an edge."""
+        found = [np.inf]
+        for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
+            sharp = self.obstacles[contact].kind == "sharp"
+            x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
+            if len(x):
+                gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
+                found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
+        return min(found)

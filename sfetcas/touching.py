@@ -1,0 +1,412 @@
+"""Equilibria in contact: which places of members touch which obstacles, and where exactly.
+
+1. *Settling*: with a given set of touches the equilibrium is solved with each place held, and the places follow from
+   their conditions by Newton's method (differences once, then Broyden's updates).
+2. *Which touches*: what gets inside an obstacle begins to touch it, what would be pulled leaves it, a place that the
+   member penetrates beside becomes a stretch, a stretch without length a place, until nothing is wrong.
+3. *Following*: both along a way of loads or of obstacles that come to their places, from a state whose touches are
+   known, so that the answer is the one that this way leads to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .arrays import Array
+from .equations import Equations, State
+from .fields import transferred
+from .loading import Loading
+from .mesh import Mesh, Touch, breaks_of
+from .model import Model
+from .newton import Corrected
+from .obstacles import free_end
+from .prepared import Prepared
+from .scene import Scene
+from .touches import Gap, Touched
+
+__all__ = ["Held", "Toucher", "Way", "placed"]
+
+NEAR = 0.35
+"""Cuts nearer to a place of contact than this share of their element make way for it."""
+
+APART = 1e-7
+"""Places nearer to each other, or to the end of a member, are the same: fractions of the length."""
+
+SETTLED = 1e-11
+"""Steps of places shorter than this have arrived: fractions of the length."""
+
+MOST_TURN = 0.8
+"""A step along the way is too long when its corrections turn a node by more, rad."""
+
+CHANGES = 24
+"""Changes of what touches at one point of the way before the step is taken to be too long."""
+
+SHORTEST = 2e-5
+"""Steps below this part of the way end the search."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """An equilibrium in contact; ``slopes`` is the derivative of the conditions by the places."""
+
+    prepared: Prepared
+    corrected: Corrected
+    loading: Loading
+    touched: Touched
+    slopes: Array | None = None
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh with its touches."""
+        return self.prepared.model.mesh
+
+
+@dataclass(frozen=True)
+class Way:
+    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m."""
+
+    loading: Callable[[Model], Loading]
+    offsets: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Change:
+    """Another set of touches to try."""
+
+    touches: tuple[Touch, ...]
+
+
+def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
+    """A mesh with an element border at each place of contact; cuts that are too near make way."""
+    cuts = dict(base.cuts)
+    for name in {touch.member for touch in touches}:
+        places = sorted({x for touch in touches if touch.member == name for x in touch.places if 0.0 < x < 1.0})
+        old, breaks = cuts[name], breaks_of(scene, name)
+        keep = np.ones(len(old), bool)
+        for x in places:
+            e = int(np.clip(np.searchsorted(old, x) - 1, 0, len(old) - 2))
+            keep &= np.abs(old - x) > NEAR * (old[e + 1] - old[e])
+        keep |= np.isin(old, breaks)
+        far = [x for x in places if np.abs(breaks - x).min() > APART]
+        cuts[name] = np.unique(np.concatenate([old[keep], far]))
+    return replace(base, cuts=cuts, touches=touches)
+
+
+def _free_places(touches: tuple[Touch, ...]) -> list[tuple[int, int]]:
+    """(touch, 0 or 1 for the begin or end) of each place within a member."""
+    return [(i, k) for i, touch in enumerate(touches) for k, x in enumerate(touch.places) if 0.0 < x < 1.0]
+
+
+def _moved(touch: Touch, k: int, x: float) -> Touch:
+    return replace(touch, at=x) if k == 0 else replace(touch, to=x)
+
+
+def _stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
+    """The mesh with its places of contact moved and the cuts between them in proportion; None where they cross."""
+    cuts = dict(mesh.cuts)
+    for name in {touch.member for touch in touches}:
+        pairs = {x: x for x in breaks_of(scene, name)}
+        for old, new in zip(mesh.touches, touches, strict=True):
+            if old.member == name:
+                pairs |= dict(zip(old.places, new.places, strict=True))
+        before = np.array(sorted(pairs))
+        after = np.array([pairs[x] for x in before])
+        if (np.diff(after) < 0.2 * APART).any():
+            return None
+        cuts[name] = np.interp(cuts[name], before, after)
+    return replace(mesh, cuts=cuts, touches=touches)
+
+
+def balanced(equations: Equations, state: State, loading: Loading) -> State:
+    """The state with the multipliers that leave the least out of balance."""
+    n = equations.unknowns
+    if not equations.rows or equations.rows * n > 4_000_000:
+        return state
+    nothing = replace(state, lam=np.zeros(equations.rows))
+    point = equations.at(nothing, loading)
+    chosen = (equations.row >= n) & (equations.column < n)
+    rows = np.zeros((equations.rows, n))
+    rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
+    return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
+
+
+class Toucher:
+    """Contact of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    limit : float
+        How deep a place may be inside an obstacle, over the size of the scene.
+    """
+
+    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], limit: float) -> None:
+        self.scene, self.prepare, self.limit = scene, prepare, limit
+        self.ways: dict[tuple[str, str], float] = {}
+
+    # -- settling -------------------------------------------------------------------------------
+
+    def solved(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way, *, same: bool = False) -> Held | None:
+        """The equilibrium with places held; None where Newton's method does not get there."""
+        touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in mesh.touches)
+        prepared = self.prepare(replace(mesh, touches=touches))
+        loading = way.loading(prepared.model)
+        if source is None:
+            state = prepared.equations.start(loading)
+        elif same:
+            state = source[1]
+        else:
+            state = transferred(source[0], source[1], prepared.model)
+            state = balanced(prepared.equations, prepared.equations.holding(state, loading), loading)
+        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
+        if not corrected.converged and corrected.residual > 1e-9:
+            return None
+        return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+
+    def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | _Change | None:
+        """The equilibrium with the places of contact where their conditions hold."""
+        held = self.solved(mesh, source, way)
+        if held is None:
+            return None
+        slopes: Array | None = None
+        last = np.inf
+        for _ in range(30):
+            free = _free_places(held.mesh.touches)
+            if not free:
+                return held
+            here = held.touched.conditions()
+            if slopes is None:
+                slopes = self.slopes(held, way)
+                if slopes is None:
+                    return None
+            step = -np.linalg.lstsq(slopes, here, rcond=1e-14)[0]
+            if not np.isfinite(step).all():
+                return None
+            step, blocked = _shortened(held.mesh.touches, free, step)
+            if blocked is not None:
+                return self._ended(held.mesh.touches, *blocked)
+            if np.abs(step).max() < SETTLED:
+                return replace(held, slopes=slopes)
+            there = self._stepped(held, free, step, way)
+            if there is None:
+                return None
+            change = there.touched.conditions() - here
+            taken = _places(there.mesh.touches, free) - _places(held.mesh.touches, free)
+            slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), 1e-300)
+            now = float(np.abs(there.touched.conditions()).max())
+            if now > 0.5 * last:
+                slopes = None
+            held, last = there, now
+        return None
+
+    def _stepped(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
+        for share in (1.0, 0.3, 0.1, 0.03):
+            there = self._at_places(held, free, share * step, way)
+            if there is not None:
+                return there
+        return None
+
+    def _at_places(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
+        touches = list(held.mesh.touches)
+        for (i, k), change in zip(free, step, strict=True):
+            touches[i] = _moved(touches[i], k, touches[i].places[k] + float(change))
+        mesh = _stretched(self.scene, held.mesh, tuple(touches))
+        source = held.prepared.model, held.corrected.state
+        if mesh is None:
+            mesh = placed(self.scene, replace(held.mesh, touches=()), tuple(touches))
+            return self.solved(mesh, source, way)
+        return self.solved(mesh, source, way, same=True)
+
+    def slopes(self, held: Held, way: Way) -> Array | None:
+        """Derivative of the conditions by the places, by differences."""
+        free, here = _free_places(held.mesh.touches), held.touched.conditions()
+        columns = []
+        for j, (i, k) in enumerate(free):
+            touch = held.mesh.touches[i]
+            size = 1e-6 if touch.to is None else min(1e-6, 0.1 * (touch.to - touch.at))
+            for sign in (1.0, -1.0):
+                step = np.zeros(len(free))
+                step[j] = sign * size
+                there = self._at_places(held, free, step, way)
+                if there is not None:
+                    break
+            if there is None:
+                return None
+            columns.append((there.touched.conditions() - here) / step[j])
+        return np.column_stack(columns) if columns else np.zeros((0, 0))
+
+    def _ended(self, touches: tuple[Touch, ...], i: int, k: int, where: str) -> _Change:
+        """What becomes of a touch one of whose places ran to the end of its member or met the other one."""
+        touch = touches[i]
+        rest = touches[:i] + touches[i + 1 :]
+        if where == "collapsed":
+            middle = 0.5 * sum(touch.places)
+            at = middle if 0.0 < min(touch.places) and max(touch.places) < 1.0 else float(round(middle))
+            return _Change(_numbered((*rest, replace(touch, at=at, to=None))))
+        end = float(round(touch.places[k]))
+        member = self.scene.members[touch.member]
+        node = member.nodes[int(end)]
+        if touch.to is not None:
+            return _Change(_numbered((*rest, _moved(touch, k, end))))
+        others = [n for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
+        sharp = self.scene.contacts[touch.contact].type in ("point", "line")
+        if not free_end(self.scene.nodes[node]) or (sharp and not others):
+            return _Change(_numbered(rest))
+        for other in others:
+            if self.scene.nodes[node].joint == "rigid" and self.scene.members[other].type == "flexible":
+                at = 1e-3 if self.scene.members[other].nodes[0] == node else 1.0 - 1e-3
+                return _Change(_numbered((*rest, replace(touch, member=other, at=at))))
+        return _Change(_numbered((*rest, replace(touch, at=end))))
+
+    # -- which touches --------------------------------------------------------------------------
+
+    def resolved(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> Held | None:
+        """The equilibrium at a point of the way with nothing wrong about its touches."""
+        source = None if now is None else (now.prepared.model, now.corrected.state)
+        seen: list[tuple[Touch, ...]] = []
+        for _ in range(CHANGES):
+            if sum(_alike(touches, other) for other in seen) > 1:
+                return None
+            seen.append(touches)
+            found = self.settle(placed(self.scene, base, touches), source, way)
+            if found is None:
+                return None
+            if isinstance(found, _Change):
+                touches = found.touches
+                continue
+            wrong = self.wrong(found, way)
+            if wrong is None:
+                return found
+            touches = wrong.touches
+            source = found.prepared.model, found.corrected.state
+        return None
+
+    def wrong(self, held: Held, way: Way) -> _Change | None:
+        """What has to touch otherwise at this state; None where all is right."""
+        touched, touches = held.touched, held.mesh.touches
+        smallest = 1e-9 * held.prepared.model.scales.force
+        pulls = [(touched.push(touch), i) for i, touch in enumerate(touches) if touch.to is None]
+        if pulls and min(pulls)[0] < -smallest:
+            i = min(pulls)[1]
+            return _Change(_numbered(touches[:i] + touches[i + 1 :]))
+        gaps = touched.inside(way.offsets, self.ways, self.limit * self.scene.size)
+        if not gaps:
+            return self._lifted(held)
+        return _Change(_numbered(self._with(held, min(gaps, key=lambda gap: gap.depth))))
+
+    def _lifted(self, held: Held) -> _Change | None:
+        """A stretch between whose ends the obstacle would have to pull becomes two."""
+        for i, touch in enumerate(held.mesh.touches):
+            if touch.to is None:
+                continue
+            x = np.linspace(touch.at, touch.to, 9)
+            pressed = held.touched.pressures(touch, x)
+            if pressed.min() < -1e-6 * max(np.abs(pressed).max(), held.prepared.model.scales.force):
+                j = int(np.argmin(pressed))
+                rest = held.mesh.touches[:i] + held.mesh.touches[i + 1 :]
+                parts = [replace(touch, to=float(x[j])), replace(touch, at=float(x[j + 1]))]
+                return _Change(_numbered((*rest, *(p if p.to - p.at > 0.05 * (touch.to - touch.at) else
+                                                   replace(p, at=p.places[0 if p is parts[0] else 1], to=None) for p in parts))))  # type: ignore[operator]
+        return None
+
+    def _with(self, held: Held, gap: Gap) -> tuple[Touch, ...]:
+        """The touches with one that keeps a run of places out of an obstacle."""
+        touches = held.mesh.touches
+        width = max(gap.end - gap.begin, 1e-4)
+        for i, touch in enumerate(touches):
+            if (touch.contact, touch.member) != (gap.contact, gap.member):
+                continue
+            beside = [x for x in touch.places if gap.begin - width <= x <= gap.end + width]
+            if not beside:
+                continue
+            rest = touches[:i] + touches[i + 1 :]
+            if touch.to is None:
+                low, high = max(0.0, touch.at - 0.5 * width), min(1.0, touch.at + 0.5 * width)
+                low, high = (low, 1.0) if touch.at == 1.0 else (0.0, high) if touch.at == 0.0 else (low, high)
+                return (*rest, replace(touch, at=low, to=high, way=self._bend(held, touch)))
+            low, high = min(touch.at, gap.begin), max(touch.to, gap.end)
+            return (*rest, replace(touch, at=low, to=high))
+        at = gap.at
+        if 0.0 < at < 1.0:
+            at = float(np.clip(at, 2.0 * APART, 1.0 - 2.0 * APART))
+        return (*touches, Touch(gap.contact, gap.member, at, way=gap.way))
+
+    @staticmethod
+    def _bend(held: Held, touch: Touch) -> float:
+        """To which side a round obstacle bends a member that lies on it."""
+        x = np.array([touch.at])
+        fields, stop = held.touched.fields, held.touched.obstacles[touch.contact]
+        point, tangent = fields.positions(touch.member, x)[0], fields.tangents(touch.member, x)[0]
+        return float(np.sign(stop.curvature(point, tangent))) or 1.0
+
+    # -- following ------------------------------------------------------------------------------
+
+    def follow(self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...]) -> Held | None:
+        """Follow from the begin of a way to its end; from a state there, or from the undeformed scene."""
+        now = start if isinstance(start, Held) else None
+        touches = start.mesh.touches if isinstance(start, Held) else start
+        done, step = 0.0, 0.5
+        while done < 1.0:
+            trial = min(1.0, done + step)
+            there = self.resolved(base, now, touches, way(trial))
+            if there is None:
+                step *= 0.3
+                if step < SHORTEST:
+                    return None
+                continue
+            now, touches, done = there, there.mesh.touches, trial
+            step *= 2.0
+        return now
+
+
+def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
+    return np.array([touches[i].places[k] for i, k in free])
+
+
+def _shortened(
+    touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array
+) -> tuple[Array, tuple[int, int, str] | None]:
+    """The step, shortened so that places keep their order; or the place that has nowhere to go, and why."""
+    factor, blocked = 1.0, None
+    for (i, k), change in zip(free, step, strict=True):
+        touch, x = touches[i], touches[i].places[k]
+        beside = [1.0 if change > 0.0 else 0.0]
+        if touch.to is not None:
+            other = touch.places[1 - k]
+            beside += [other] if (other > x) == (change > 0.0) else []
+        room = min(abs(y - x) for y in beside)
+        if abs(change) < SETTLED:
+            continue
+        if room < 10.0 * APART:
+            met = touch.to is not None and room == abs(touch.places[1 - k] - x) and touch.places[1 - k] not in (
+                (1.0,) if change > 0.0 and touch.places[1 - k] == x else ()
+            )
+            return step, (i, k, "collapsed" if met and len(beside) > 1 else "end")
+        # Two places of a stretch may both move towards each other.
+        factor = min(factor, 0.45 * room / abs(change)) if abs(change) > 0.45 * room else factor
+    return factor * step, blocked
+
+
+def _numbered(touches: tuple[Touch, ...]) -> tuple[Touch, ...]:
+    """Touches of the same two told apart by numbers, in the order of their places."""
+    count: dict[tuple[str, str], int] = {}
+    found = []
+    for touch in sorted(touches, key=lambda t: (t.contact, t.member, t.at)):
+        key = (touch.contact, touch.member)
+        found.append(replace(touch, number=count.get(key, 0)))
+        count[key] = count.get(key, 0) + 1
+    return tuple(found)
+
+
+def _alike(a: tuple[Touch, ...], b: tuple[Touch, ...]) -> bool:
+    """Whether two sets of touches are the same but for rounding of the places."""
+    def key(touches: tuple[Touch, ...]) -> Any:
+        return [(t.contact, t.member, *(round(x, 6) for x in t.places)) for t in touches]
+
+    return bool(key(a) == key(b))
