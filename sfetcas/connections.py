@@ -261,9 +261,11 @@ class _Toucher:
             radius = stop.radius - stop.sign * touch.offset
             data = np.concatenate([across, start[:axes] / unit, [radius / unit, stop.sign]])
             return _One(OnRound(axes == 3), touch.name, data, (), places, touch.name)
-        directions = np.eye(2) if axes == 2 else normals(stop.normal, 3)
-        data = np.concatenate([directions.ravel(), start[:axes] / unit])
-        return _One(OnEdge(axes == 3), touch.name, data, (), places, touch.name)
+        turns, _ = self._chain(touch)
+        tangent = self.scene.center_lines[touch.member].tangents(np.array([touch.at]))[0]
+        start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
+        data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
+        return _One(OnEdge(axes == 3), touch.name, data, (int(turns[0]),), places, touch.name)
 
     def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[_One]:
         """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""
@@ -297,7 +299,11 @@ class _Toucher:
                 break
             first += 0 if cuts is None else len(cuts) - 1
         cuts = self.mesh.cuts[touch.member]
-        a, b = (self.mesh.cut_at(touch.member, at) for at in touch.places)
+        a, b = (self.mesh.cut_at(touch.member, at) for at in (touch.at, touch.places[-1]))
+        if a == b:
+            last = a == len(cuts) - 1
+            number = self.rotations.turns[first + a - last, -1 if last else 0]
+            return np.array([number], dtype=np.intp), cuts[a : a + 1]
         inner = cuts[a:b, None] + np.diff(cuts[a : b + 1])[:, None] * self.element.nodes[:-1]
         return self.rotations.chain(slice(first + a, first + b)), np.append(inner.ravel(), cuts[b])
 

@@ -373,18 +373,24 @@ class OnRound(Connection):
 @final
 @dataclass(frozen=True)
 class OnEdge(Connection):
-    """A place on a point of the plane or a line in space; data: two directions across it, edge to place."""
+    """A place whose section passes an edge at no distance; data: edge, undeformed tangent, edge to place, side.
+
+    The distance counts across the edge and the tangent of the section.  It is the gap where the place is the one
+    nearest to the edge, and then the force goes through the place.
+    """
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """Two rows."""
-        return 0, 1, 2, 3 * self.axes, 0
+        """One row."""
+        return 1, 1, 1, 6 + self.axes + 1, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Components of the distance across the edge."""
-        n = self.axes
-        gap = ca.vertcat(*u[0]) + data[2 * n :]
-        return [ca.dot(data[:n], gap), ca.dot(data[n : 2 * n], gap)]
+        """The gap."""
+        tangent = ca.vertcat(*self.forth(q[0], ca.vertsplit(data[3 : 3 + self.axes])))
+        tangent = tangent if self.space else ca.vertcat(tangent, 0.0)
+        across = ca.cross(data[:3], tangent)
+        across = data[6 + self.axes] * across / ca.norm_2(across)
+        return [ca.dot(across[: self.axes], ca.vertcat(*u[0]) + data[6 : 6 + self.axes])]
 
 
 @final

@@ -54,6 +54,9 @@ class Obstacle:
         if self.kind == "round":
             return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius) + offset
         normals = self.normals(points, tangents, way)
+        if self.side is not None:
+            points = points + offset * self.side / np.linalg.norm(self.side)
+            return np.einsum("ni,ni->n", points - self.place, normals)
         return np.einsum("ni,ni->n", points - self.place, normals) + offset
 
     def normals(self, points: Array, tangents: Array, way: float = 1.0) -> Array:

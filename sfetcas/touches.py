@@ -3,7 +3,7 @@
 A place of contact within a member is an unknown of its own beside the equilibrium with that place held:
 
 * on a plane or a round obstacle the member is tangential to it there;
-* a point or an edge pushes across the member: the force has no part along it;
+* to a point or an edge it is the nearest one;
 * where a stretch begins or ends, the bending moment is the one that the obstacle's shape takes.
 """
 
@@ -75,20 +75,12 @@ class Touched:
         kind, model = self.obstacles[touch.contact].kind, self.model
         if touch.to is not None and not self._has_row(touch):
             return self._resultant(touch)
-        if kind == "sharp":
-            first = self._row[f"{touch.name}, 1 of 2"]
-            group = next(g for g in model.connections if touch.name in g.names and type(g.kind).__name__ == "OnEdge")
-            axes = model.element.axes
-            directions = group.data[group.names.index(touch.name), : 2 * axes].reshape(2, axes)
-            force = -self._state.lam[first : first + 2] @ directions
-        else:
-            normal = self.normal(touch, touch.at)[: model.element.axes]
-            force = -self._state.lam[self._row[touch.name]] * normal
-            if touch.to is not None and kind == "round":
-                along = self._row[f"{touch.name} along"]
-                out = self._out(touch)
-                force = force - self._state.lam[along] * self._tangent(touch, touch.at)[: model.element.axes] / out
-        return np.pad(force, (0, 3 - len(force))) * model.scales.force
+        normal = self.normal(touch, touch.at)
+        force = -self._state.lam[self._row[touch.name]] * normal
+        if touch.to is not None and kind == "round":
+            along = self._row[f"{touch.name} along"]
+            force = force - self._state.lam[along] * self._tangent(touch, touch.at) / self._out(touch)
+        return np.asarray(force * model.scales.force)
 
     def _has_row(self, touch: Touch) -> bool:
         return touch.name in self._row
@@ -154,9 +146,17 @@ class Touched:
                 found += [self._moment_jump(touch, at, way) for at, way in zip(touch.places, (-1.0, 1.0), strict=True)]
             elif 0.0 < touch.at < 1.0:
                 sharp = self.obstacles[touch.contact].kind == "sharp"
-                push = self.force(touch) / self.model.scales.force if sharp else self.normal(touch, touch.at)
-                found.append(float(push @ self._tangent(touch, touch.at)))
+                out = self._from_edge(touch) if sharp else self.normal(touch, touch.at)
+                found.append(float(out @ self._tangent(touch, touch.at)))
         return np.array([value for value in found if value is not None])
+
+    def _from_edge(self, touch: Touch) -> Array:
+        """Distance (3,) of a place from an edge, across it, dimensionless."""
+        stop = self.obstacles[touch.contact]
+        out = self.fields.positions(touch.member, np.array([touch.at]))[0] - stop.place
+        if stop.side is not None:
+            out = out + touch.offset * stop.side / np.linalg.norm(stop.side)
+        return np.asarray(out @ stop.across / self.model.scales.length)
 
     def _moment_jump(self, touch: Touch, at: float, way: float) -> float | None:
         """Moment just outside a stretch less the one that the obstacle's shape takes; None at a member's end."""
