@@ -90,13 +90,15 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
     if parts[0] == "reactions" and len(parts) == 3:
         force, moment = step.reaction(parts[1])
         return _entry({"force": force, "moment": moment}, parts[2])
+    if parts[0] == "contacts" and len(parts) == 3:
+        return _entry(step.contacts[parts[1]], parts[2])
     if parts[0] == "energy" and len(parts) == 2:
         return _entry(step.energy, parts[1])
     if parts[0] == "certificate" and len(parts) == 2:
         return _entry(step.certificate.to_dict(), parts[1])
     if quantity == "factor":
         return step.factor
-    known = "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, energy.KEY, certificate.KEY, factor"
+    known = "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, contacts.NAME.KEY, energy.KEY, certificate.KEY, factor"
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 
 

@@ -180,6 +180,8 @@ def _report_step(step: Equilibrium) -> None:
         if node.support != "free":
             force, moment = step.reaction(name)
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    for name, entry in step.contacts.items():
+        _report_contact(name, entry)
     proof = step.certificate
     kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
     print(
@@ -188,6 +190,16 @@ def _report_step(step: Equilibrium) -> None:
     )
     for note in step.notes:
         print(f"  note: {note}")
+
+
+def _report_contact(name: str, entry: dict[str, Any]) -> None:
+    if entry["at"] is None:
+        print(f"  contact {name}: none" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
+        return
+    several = isinstance(entry["member"], list)
+    for member, at, force in zip(*(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True):
+        where = f"from {at[0]:.9g} to {at[1]:.9g}" if isinstance(at, list) else f"at {at:.9g}"
+        print(f"  contact {name}: {member} {where}, force {_vector(force)} N")
 
 
 def _vector(values: Any) -> str:

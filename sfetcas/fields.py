@@ -25,7 +25,7 @@ class Fields:
     """Fields of one state of a model.  All results are in SI units and fixed axes, with three components."""
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
-        self.model, self._state, self._applied = equations.model, state, loading
+        self.model, self.state, self._applied = equations.model, state, loading
         self._loading = loading = equations.effective(state, loading)
         self._equations = equations
         self.q = state.q
@@ -47,7 +47,7 @@ class Fields:
     def rotation(self, node: str) -> Array | None:
         """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
         number = self.model.rotations.node_turn[node]
-        return None if number is None else self._state.q[number]
+        return None if number is None else self.state.q[number]
 
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
@@ -98,7 +98,7 @@ class Fields:
         # m' = -r' x n; the pull at the points is minus the force there.
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
-        rotation = rotations_along(model, self._state.q, member, x)
+        rotation = rotations_along(model, self.state.q, member, x)
         if not model.space:
             for touch in model.mesh.touches:
                 if touch.member == member and touch.to is not None:
@@ -172,9 +172,14 @@ class Fields:
         to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
         return _three(sums[e] + np.einsum("nk,nka->na", to_x, spread[e]))
 
+    def bend(self, member: str, x: Array, found: dict[str, Array]) -> Array:
+        """Derivative (n, 3) of the tangent along the member, 1/m, of what :meth:`along` found."""
+        frames = self._frames(member, x, found["rotation"])
+        return np.cross(np.einsum("nij,nj->ni", frames, found["curvature"]), frames[:, :, 0])
+
     def _tangent_at(self, member: str, x: float) -> Array:
         place = np.array([x])
-        return np.asarray(self._tangents(member, place, rotations_along(self.model, self._state.q, member, place))[0])
+        return np.asarray(self._tangents(member, place, rotations_along(self.model, self.state.q, member, place))[0])
 
     def _tangents(self, member: str, x: Array, rotation: Array) -> Array:
         """Tangents (n, 3) at fractions of the length."""
@@ -182,7 +187,7 @@ class Fields:
 
     def tangents(self, member: str, x: Array) -> Array:
         """Tangents (n, 3) at fractions of the length."""
-        return self._tangents(member, x, rotations_along(self.model, self._state.q, member, x))
+        return self._tangents(member, x, rotations_along(self.model, self.state.q, member, x))
 
     def positions(self, member: str, x: Array) -> Array:
         """Positions (n, 3) at fractions of the length, m."""
@@ -244,7 +249,7 @@ class Fields:
         moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
         if any(touch.to is not None for touch in model.mesh.touches):
             # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
-            moments[:-1] = -self._equations.starting_moments(self._state, self._applied)[part]
+            moments[:-1] = -self._equations.starting_moments(self.state, self._applied)[part]
         return starts, moments
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,11 @@ from .equations import Equations, State
 from .fields import Fields
 from .loading import Loading
 from .mesh import Touch
+from .model import Model
 from .obstacles import Obstacle, free_end, members_of, nearest, obstacle
+from .scene import Scene
 
-__all__ = ["Gap", "Touched", "obstacles_of"]
+__all__ = ["Gap", "Touched", "answers", "edge_sides", "obstacles_of"]
 
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
@@ -51,20 +54,42 @@ class Gap:
     way: float = 1.0
 
 
-def obstacles_of(model: object) -> Mapping[str, Obstacle]:
+def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
     """The obstacles of a model's scene by name."""
-    scene = model.scene  # type: ignore[attr-defined]
-    return {name: obstacle(contact, model.space) for name, contact in scene.contacts.items()}  # type: ignore[attr-defined]
+    return {name: obstacle(contact, model.space) for name, contact in model.scene.contacts.items()}
+
+
+def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
+    """Of each edge and member the sign that turns edge times tangent to the allowed side, in the undeformed scene."""
+    found = {}
+    for name, contact in scene.contacts.items():
+        stop = obstacle(contact, scene.resolved_dimension == "space")
+        if stop.side is None:
+            continue
+        for member in members_of(contact, scene.members):
+            line, x = scene.center_lines[member], np.linspace(0.0, 1.0, 257)
+            near = np.argmin(np.linalg.norm((line.positions(x) - stop.place) @ stop.across, axis=1))
+            normal = np.cross(stop.normal, line.tangents(x[near : near + 1])[0])
+            found[name, member] = 1.0 if normal @ stop.side >= 0.0 else -1.0
+    return found
 
 
 class Touched:
     """Contact at one state of a model."""
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
-        self.model = equations.model
-        self.fields = Fields(equations, state, loading)
+        self._take(Fields(equations, state, loading), state)
+
+    @classmethod
+    def of(cls, fields: Fields) -> Touched:
+        """Contact at the state that fields were made of."""
+        self = cls.__new__(cls)
+        self._take(fields, fields.state)
+        return self
+
+    def _take(self, fields: Fields, state: State) -> None:
+        self.fields, self.model, self._state = fields, fields.model, state
         self.obstacles = obstacles_of(self.model)
-        self._state, self._loading = state, loading
         names = self.model.row_names
         self._row = {name: i for i, name in reversed(list(enumerate(names)))}
 
@@ -166,6 +191,18 @@ class Touched:
         outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0, 2]
         return float(outside - self.fields.pressed_moments(touch, np.array([at]))[0])
 
+    def gap_curvature(self, touch: Touch) -> float:
+        """Second derivative of the gap along the member at a place of contact, 1/m."""
+        x = np.array([touch.at])
+        found = self.fields.along(touch.member, x)
+        normal, tangent = self.normal(touch, touch.at), self._tangent(touch, touch.at)
+        bent = self.fields.bend(touch.member, x, found)[0] @ normal
+        stop = self.obstacles[touch.contact]
+        if stop.kind != "round":
+            return float(bent)
+        along = tangent @ stop.across
+        return float(bent + stop.sign * (along @ along) / stop.radius)
+
     # -- gaps -----------------------------------------------------------------------------------
 
     def samples(self, member: str) -> Array:
@@ -236,3 +273,28 @@ class Touched:
                 gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
                 found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
         return min(found)
+
+
+def answers(fields: Fields) -> dict[str, dict[str, Any]]:
+    """Of each obstacle the force on what touches it, where, the gap and the member; lists where several touch."""
+    touched, sides = Touched.of(fields), edge_sides(fields.model.scene)
+    found: dict[str, dict[str, Any]] = {}
+    for contact in touched.obstacles:
+        touches = sorted((t for t in fields.model.mesh.touches if t.contact == contact), key=lambda t: t.at)
+        if not touches:
+            gap = touched.smallest_gap(contact, sides)
+            gap = gap if np.isfinite(gap) else None
+            found[contact] = {"force": np.zeros(3), "at": None, "gap": gap, "member": None}
+            continue
+        entries = [
+            {
+                "force": touched.force(touch),
+                "at": touch.at if touch.to is None else [touch.at, touch.to],
+                "gap": float(touched.gaps(contact, touch.member, np.array([touch.at]), 0.0, touch.way)[0]),
+                "member": touch.member,
+            }
+            for touch in touches
+        ]
+        several = {key: [entry[key] for entry in entries] for key in entries[0]}
+        found[contact] = entries[0] if len(entries) == 1 else several
+    return found
