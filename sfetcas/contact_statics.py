@@ -12,7 +12,6 @@ from .arrays import Array
 from .errors import SolveError, Status
 from .fields import Fields
 from .mesh import Mesh, Touch
-from .model import Model
 from .obstacles import free_end, members_of, nearest
 from .prepared import Prepared
 from .scene import Scene
@@ -122,11 +121,11 @@ class ContactRun:
                               if abs(gap) < INSIDE * self.scene.size]
                     continue
                 gaps = stop.gaps(line.positions(x), line.tangents(x))
-                found += self._lying(model, contact, member, x, gaps)
+                found += self._lying(contact, member, x, gaps)
         return tuple(found)
 
-    def _lying(self, model: Model, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
-        """Places and stretches of the undeformed member at no distance; ends that motions lift are left out."""
+    def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
+        """Places and stretches of the undeformed member at no distance."""
         near = np.abs(gaps) < INSIDE * self.scene.size
         edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
         nodes = self.scene.members[member].nodes
@@ -136,15 +135,6 @@ class ContactRun:
                 if 0.0 < low < 1.0 or free_end(self.scene.nodes[nodes[int(low)]]):
                     yield Touch(contact, member, low)
                 continue
-            moved = {motion.node for motion in self.scene.motions.values() if motion.displacement is not None}
-            stop = obstacles_of(model)[contact]
-            lifted = {
-                motion.node
-                for motion in self.scene.motions.values()
-                if motion.node in moved and abs(np.asarray(motion.displacement) @ stop.normal) > 0.0
-            }
-            low = 0.05 if low == 0.0 and nodes[0] in lifted else low
-            high = 0.95 if high == 1.0 and nodes[-1] in lifted else high
             yield Touch(contact, member, low, high)
 
     def at(self, factor: float) -> Way:

@@ -172,6 +172,11 @@ class Fields:
         to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
         return _three(sums[e] + np.einsum("nk,nka->na", to_x, spread[e]))
 
+    def stiffness(self, member: str, x: float) -> float:
+        """Smallest bending stiffness of the section at a place, dimensionless."""
+        values = self.model.scene.sections[str(self.model.scene.members[member].section)].stiffness(np.array([x]))
+        return float(np.nanmin(values[0, 1:])) / (self.model.scales.moment * self.model.scales.length)
+
     def bend(self, member: str, x: Array, found: dict[str, Array]) -> Array:
         """Derivative (n, 3) of the tangent along the member, 1/m, of what :meth:`along` found."""
         frames = self._frames(member, x, found["rotation"])

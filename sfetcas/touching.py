@@ -26,7 +26,7 @@ from .newton import Corrected
 from .obstacles import free_end
 from .prepared import Prepared
 from .scene import Scene
-from .touches import Gap, Touched
+from .touches import Gap, Touched, obstacles_of
 
 __all__ = ["Held", "Toucher", "Way", "placed"]
 
@@ -38,6 +38,9 @@ APART = 1e-7
 
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
+
+FLAT = 1e-7
+"""Curvature of a gap (times the length of the scene) below minus this gets inside: rounding of moments is less."""
 
 MOST_TURN = 0.8
 """A step along the way is too long when its corrections turn a node by more, rad."""
@@ -274,6 +277,7 @@ class Toucher:
             if sum(_alike(touches, other) for other in seen) > 1:
                 return None
             seen.append(touches)
+            touches = self._released(base, now, touches, way)
             found = self.settle(placed(self.scene, base, touches), source, way)
             if found is None:
                 return None
@@ -287,6 +291,27 @@ class Toucher:
             source = found.prepared.model, found.corrected.state
         return None
 
+    def _released(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> tuple[Touch, ...]:
+        """Stretches that reach a held end which is lifted off the obstacle end before it."""
+        if not any(touch.to is not None and {0.0, 1.0} & {*touch.places} for touch in touches):
+            return touches
+        model = (self.prepare(base) if now is None else now.prepared).model
+        shift = way.loading(model).shift.reshape(-1, model.element.axes) * model.scales.length
+        found, stops = [], obstacles_of(model)
+        for touch in touches:
+            for k, x in enumerate(touch.places if touch.to is not None else ()):
+                node = self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else ""
+                if not node or free_end(self.scene.nodes[node]):
+                    continue
+                place = np.asarray(self.scene.nodes[node].position, dtype=float)
+                place = place + np.pad(shift[model.nodes.index(node)], (0, 3 - model.element.axes))
+                tangent = np.array([[1.0, 0.0, 0.0]])
+                gap = stops[touch.contact].gaps(place[None, :], tangent, way.offsets.get(touch.contact, 0.0))[0]
+                if gap > self.limit * self.scene.size:
+                    touch = _moved(touch, k, x + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at))
+            found.append(touch)
+        return tuple(found)
+
     def wrong(self, held: Held, way: Way) -> _Change | None:
         """What has to touch otherwise at this state; None where all is right."""
         touched, touches = held.touched, held.mesh.touches
@@ -295,10 +320,31 @@ class Toucher:
         if pulls and min(pulls)[0] < -smallest:
             i = min(pulls)[1]
             return _Change(_numbered(touches[:i] + touches[i + 1 :]))
+        flatter = self._flattened(held)
+        if flatter is not None:
+            return flatter
         gaps = touched.inside(way.offsets, self.ways, self.limit * self.scene.size)
         if not gaps:
             return self._lifted(held)
         return _Change(_numbered(self._with(held, min(gaps, key=lambda gap: gap.depth))))
+
+    def _flattened(self, held: Held) -> _Change | None:
+        """A place beside which the member curves into a plane or a round obstacle becomes a stretch."""
+        scales, touches = held.prepared.model.scales, held.mesh.touches
+        for i, touch in enumerate(touches):
+            if touch.to is not None or not 0.0 < touch.at < 1.0 or held.touched.obstacles[touch.contact].kind == "sharp":
+                continue
+            bent = held.touched.gap_curvature(touch) * scales.length
+            if bent < -FLAT:
+                # The moment falls by half of the force to either side, down to what the obstacle's shape takes.
+                push = held.touched.push(touch) / scales.force
+                stiff = held.touched.fields.stiffness(touch.member, touch.at)
+                length = self.scene.center_lines[touch.member].length / scales.length
+                reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
+                low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
+                lying = replace(touch, at=low, to=high, way=self._bend(held, touch))
+                return _Change(_numbered((*touches[:i], lying, *touches[i + 1 :])))
+        return None
 
     def _lifted(self, held: Held) -> _Change | None:
         """A stretch between whose ends the obstacle would have to pull becomes two."""
