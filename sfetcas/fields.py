@@ -99,10 +99,9 @@ class Fields:
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
         rotation = rotations_along(model, self.state.q, member, x)
-        if not model.space:
-            for touch in model.mesh.touches:
-                if touch.member == member and touch.to is not None:
-                    self._lay(touch, x, rotation, force, moment)
+        for touch in model.mesh.touches:
+            if touch.member == member and touch.to is not None:
+                self._lay(touch, x, rotation, force, moment)
         frames = self._frames(member, x, rotation)
         result = {"position": position, "rotation": rotation, "force": force, "moment": moment}
         if dimensionless:
@@ -120,28 +119,33 @@ class Fields:
         return result
 
     def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
-        """Force and moment along a stretch that lies on an obstacle, in place, dimensionless, in the plane.
+        """Force and moment along a stretch that lies on an obstacle, in place, dimensionless.
 
-        Its shape is that of the obstacle, so that the moment is known, and its derivative is the force across.
-        The force along changes with what acts along, and on a circle with the force across.
+        Its shape across the obstacle is known, so that the moment about the axis across is, and the derivative of
+        that is the force towards the obstacle.  The force along changes with what acts along, and on a circle with
+        the force across.
         """
         inside = (x >= touch.at) & (x <= float(touch.to or 0.0))
         if not inside.any():
             return
         model, here = self.model, x[inside]
         tangents = self._tangents(touch.member, here, rotation[inside])
-        across = np.cross([0.0, 0.0, 1.0], tangents)
-        pressed = self.pressed_moments(touch, here)
+        pressed, axes = self.pressed_moments(touch, here)
+        across = np.cross(axes, tangents)
         step = 1e-5
         low, high = np.clip(here - step, touch.at, None), np.clip(here + step, None, touch.to)
-        rise = self.pressed_moments(touch, high) - self.pressed_moments(touch, low)
+        (before, first), (after, last) = self.pressed_moments(touch, low), self.pressed_moments(touch, high)
         length = model.scales.length / model.scene.center_lines[touch.member].length
-        shear = -rise / np.maximum(high - low, 1e-300) * length
-        along = np.einsum("ni,ni->n", force[inside], tangents)
+        spans = np.maximum(high - low, 1e-300)
+        moment[inside] += (pressed - np.einsum("ni,ni->n", moment[inside], axes))[:, None] * axes
+        # m' = -t x n, and the axis turns with the member on the obstacle.
+        turning = np.einsum("ni,ni->n", moment[inside], (last - first) / spans[:, None])
+        shear = -((after - before) / spans - turning) * length
         if self._curvature(touch):
             along = self._along_round(touch, here, pressed)
-        moment[inside] = np.outer(pressed, [0.0, 0.0, 1.0])
-        force[inside] = along[:, None] * tangents + shear[:, None] * across
+            force[inside] = along[:, None] * tangents + shear[:, None] * across
+        else:
+            force[inside] += (shear - np.einsum("ni,ni->n", force[inside], across))[:, None] * across
 
     def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
         """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""
@@ -160,7 +164,7 @@ class Fields:
             begin = float(_three(self._start_forces(touch.member)[0]) @ self._tangent_at(touch.member, 0.0))
         else:
             begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
-        bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0])
+        bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
         return np.asarray(begin - bent * model.scales.length - gained)
 
     def load_before(self, member: str, x: Array) -> Array:
@@ -211,14 +215,41 @@ class Fields:
             return 0.0
         return touch.way / (contact.radius - (-1.0 if contact.side == "inside" else 1.0) * touch.offset)
 
-    def pressed_moments(self, touch: Touch, x: Array) -> Array:
-        """Moments (n,) about z that bend a member to the shape of an obstacle, dimensionless, in the plane."""
+    def pressed_moments(self, touch: Touch, x: Array) -> tuple[Array, Array]:
+        """Moments (n,) that bend a member to the shape of an obstacle, dimensionless, and their axes (n, 3)."""
+        if self.model.space:
+            return self._pressed_in_space(touch, x)
         scene = self.model.scene
         line = scene.center_lines[touch.member]
         stiffness = scene.sections[str(scene.members[touch.member].section)].stiffness(x)
-        column, sign = (1, _z_of(line, x)[:, 1]) if line.bending_axis == 2 else (2, _z_of(line, x)[:, 2])
+        column = 1 if line.bending_axis == 2 else 2
+        sign = np.rint(quaternion.matrix(line.quaternions(x))[:, 2, column])
         bent = self._curvature(touch) - sign * line.curvatures(x)[:, column]
-        return np.asarray(stiffness[:, column] * bent / self.model.scales.moment)
+        axes = np.broadcast_to([0.0, 0.0, 1.0], (len(x), 3))
+        return np.asarray(stiffness[:, column] * bent / self.model.scales.moment), axes
+
+    def _pressed_in_space(self, touch: Touch, x: Array) -> tuple[Array, Array]:
+        """The same on a plane in space: what bends about the axis in the plane across the member."""
+        model, element = self.model, self.model.element
+        normal = np.asarray(model.scene.contacts[touch.contact].normal, dtype=float)
+        cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
+        # At the border of the stretch its own element says how it is bent.
+        middle = np.clip(x, np.nextafter(touch.at, 1.0), np.nextafter(float(touch.to or 1.0), 0.0))
+        e, xi = _located(cuts, middle)
+        nodal = self.q[model.rotations.turns[part]][e]
+        rows = _per_place(xi, lambda places: interpolation.differentiation(element.nodes, places))
+        rotation = rotations_along(model, self.state.q, touch.member, middle)
+        lengths = model.beams.weight[part].sum(axis=1)[e] * model.scales.length
+        slope = np.einsum("nj,njc->nc", rows, nodal) / lengths[:, None]
+        spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
+        line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
+        strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
+        stiffness = model.scene.sections[str(record.section)].stiffness(middle)
+        frames = self._frames(touch.member, middle, rotation)
+        moments = np.einsum("nij,nj->ni", frames, stiffness * strain) / model.scales.moment
+        axes = np.cross(normal / np.linalg.norm(normal), frames[:, :, 0])
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        return np.einsum("ni,ni->n", moments, axes), axes
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
@@ -256,11 +287,6 @@ class Fields:
             # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
             moments[:-1] = -self._equations.starting_moments(self.state, self._applied)[part]
         return starts, moments
-
-
-def _z_of(line: Any, x: Array) -> Array:
-    """z in the section's axes, (n, 3): 1 or -1 about that which bending is about."""
-    return np.rint(quaternion.matrix(line.quaternions(x))[:, 2, :])
 
 
 def _located(cuts: Array, x: Array) -> tuple[Any, Array]:

@@ -9,6 +9,7 @@ A place of contact within a member is an unknown of its own beside the equilibri
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -163,6 +164,7 @@ class Touched:
 
     # -- conditions -----------------------------------------------------------------------------
 
+    @functools.cached_property
     def conditions(self) -> Array:
         """What has to be zero at each place of contact within a member, dimensionless, in their order."""
         found = []
@@ -188,8 +190,9 @@ class Touched:
         if not 0.0 < at < 1.0:
             return None
         x = np.array([np.nextafter(at, at + way)])
-        outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0, 2]
-        return float(outside - self.fields.pressed_moments(touch, np.array([at]))[0])
+        outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0]
+        pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
+        return float(outside @ axes[0] - pressed[0])
 
     def gap_curvature(self, touch: Touch) -> float:
         """Second derivative of the gap along the member at a place of contact, 1/m."""

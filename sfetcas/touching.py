@@ -18,6 +18,7 @@ import numpy as np
 
 from .arrays import Array
 from .equations import Equations, State
+from .errors import SolveError, Status
 from .fields import transferred
 from .loading import Loading
 from .mesh import Mesh, Touch, breaks_of
@@ -183,7 +184,7 @@ class Toucher:
             free = _free_places(held.mesh.touches)
             if not free:
                 return held
-            here = held.touched.conditions()
+            here = held.touched.conditions
             if slopes is None:
                 slopes = self.slopes(held, way)
                 if slopes is None:
@@ -199,10 +200,10 @@ class Toucher:
             there = self._stepped(held, free, step, way)
             if there is None:
                 return None
-            change = there.touched.conditions() - here
+            change = there.touched.conditions - here
             taken = _places(there.mesh.touches, free) - _places(held.mesh.touches, free)
             slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), 1e-300)
-            now = float(np.abs(there.touched.conditions()).max())
+            now = float(np.abs(there.touched.conditions).max())
             if now > 0.5 * last:
                 slopes = None
             held, last = there, now
@@ -228,7 +229,7 @@ class Toucher:
 
     def slopes(self, held: Held, way: Way) -> Array | None:
         """Derivative of the conditions by the places, by differences."""
-        free, here = _free_places(held.mesh.touches), held.touched.conditions()
+        free, here = _free_places(held.mesh.touches), held.touched.conditions
         columns = []
         for j, (i, k) in enumerate(free):
             touch = held.mesh.touches[i]
@@ -241,7 +242,7 @@ class Toucher:
                     break
             if there is None:
                 return None
-            columns.append((there.touched.conditions() - here) / step[j])
+            columns.append((there.touched.conditions - here) / step[j])
         return np.column_stack(columns) if columns else np.zeros((0, 0))
 
     def _ended(self, touches: tuple[Touch, ...], i: int, k: int, where: str) -> _Change:
@@ -277,6 +278,7 @@ class Toucher:
             if sum(_alike(touches, other) for other in seen) > 1:
                 return None
             seen.append(touches)
+            self._accepted(touches)
             touches = self._released(base, now, touches, way)
             found = self.settle(placed(self.scene, base, touches), source, way)
             if found is None:
@@ -290,6 +292,21 @@ class Toucher:
             touches = wrong.touches
             source = found.prepared.model, found.corrected.state
         return None
+
+    def _accepted(self, touches: tuple[Touch, ...]) -> None:
+        """Refuse what cannot be modelled.
+
+        Raises
+        ------
+        SolveError
+            A stretch on a round obstacle in space.
+        """
+        space = self.scene.resolved_dimension == "space"
+        for touch in touches:
+            if touch.to is not None and space and self.scene.contacts[touch.contact].radius is not None:
+                detail = f"member {touch.member!r} comes to lie along contacts.{touch.contact}: found a stretch on a "
+                detail += f"{self.scene.contacts[touch.contact].type} in space, accepted: stretches on planes"
+                raise SolveError(Status.FAILED, detail)
 
     def _released(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> tuple[Touch, ...]:
         """Stretches that reach a held end which is lifted off the obstacle end before it."""
