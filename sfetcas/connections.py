@@ -30,7 +30,7 @@ from .joints import (
     Universal,
 )
 from .mesh import Mesh, Touch
-from .obstacles import Obstacle, free_end, obstacle
+from .obstacles import Obstacle, obstacle, takes_part
 from .positions import normals
 from .rotations import Pin, Rotations, Turn, end_joints
 from .scene import Scene
@@ -238,7 +238,7 @@ class _Toucher:
                 yield self._on(touch, stop)
                 continue
             ends = [(touch.contact, self.place(touch, at)) for at in touch.places if at in (0.0, 1.0)]
-            if anchored(self.scene, touch) and not covered & set(ends):
+            if anchored(self.scene, touch, stop) and not covered & set(ends):
                 yield self._on(touch, stop)
             yield from self._lying(touch, stop, covered)
             covered |= set(ends)
@@ -308,10 +308,11 @@ class _Toucher:
         return self.rotations.chain(slice(first + a, first + b)), np.append(inner.ravel(), cuts[b])
 
 
-def anchored(scene: Scene, touch: Touch) -> bool:
+def anchored(scene: Scene, touch: Touch, stop: Obstacle) -> bool:
     """Whether a place of a stretch has to be put on the obstacle: no support holds an end of it there."""
     nodes = scene.members[touch.member].nodes
-    return all(free_end(scene.nodes[nodes[int(at)]]) for at in touch.places if at in (0.0, 1.0))
+    ends = [nodes[int(at)] for at in touch.places if at in (0.0, 1.0)]
+    return all(takes_part(end, scene.nodes[end], scene.motions.values(), stop) for end in ends)
 
 
 def _unit(direction: object) -> Array:

@@ -12,7 +12,7 @@ from .arrays import Array
 from .errors import SolveError, Status
 from .fields import Fields
 from .mesh import Mesh, Touch
-from .obstacles import free_end, members_of, nearest
+from .obstacles import members_of, nearest, obstacle, takes_part
 from .prepared import Prepared
 from .scene import Scene
 from .stability import Stability
@@ -124,6 +124,10 @@ class ContactRun:
                 found += self._lying(contact, member, x, gaps)
         return tuple(found)
 
+    def _takes_part(self, contact: str, node: str) -> bool:
+        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
+
     def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
         """Places and stretches of the undeformed member at no distance."""
         near = np.abs(gaps) < INSIDE * self.scene.size
@@ -132,7 +136,7 @@ class ContactRun:
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             low, high = float(x[a]), float(x[b - 1])
             if b - a == 1:
-                if 0.0 < low < 1.0 or free_end(self.scene.nodes[nodes[int(low)]]):
+                if 0.0 < low < 1.0 or self._takes_part(contact, nodes[int(low)]):
                     yield Touch(contact, member, low)
                 continue
             yield Touch(contact, member, low, high)

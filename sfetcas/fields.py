@@ -167,6 +167,15 @@ class Fields:
         bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
         return np.asarray(begin - bent * model.scales.length - gained)
 
+    def own_force(self, node: str) -> Array:
+        """Load (3,) on a node itself, N."""
+        return _three(self._outer_force(node)) * self.model.scales.force
+
+    def own_moment(self, node: str) -> Array:
+        """Moment (3,) on a node itself about the fixed axes, dimensionless."""
+        number = self.model.rotations.node_turn[node]
+        return np.zeros(3) if number is None else self._loading.moment[number]
+
     def load_before(self, member: str, x: Array) -> Array:
         """Distributed load (n, 3) from the start of a member to fractions of its length, dimensionless."""
         model, element = self.model, self.model.element

@@ -15,9 +15,10 @@ import numpy as np
 from .arrays import Array
 from .contacts import Contact
 from .errors import SceneError
+from .loads import Motion
 from .structure import Node
 
-__all__ = ["Obstacle", "check_start", "edge_slopes", "free_end", "members_of", "nearest", "obstacle"]
+__all__ = ["Obstacle", "check_start", "edge_slopes", "members_of", "nearest", "obstacle", "takes_part"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +110,22 @@ def members_of(contact: Contact, members: Iterable[str]) -> list[str]:
     return list(members) if contact.members == "all" else list(contact.members or ())
 
 
-def free_end(node: Node) -> bool:
-    """Whether a node takes part in contact: no support holds it."""
-    return node.support == "free"
+def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle) -> bool:
+    """Whether a node can be pushed by an obstacle: no support holds it against it.
 
+    A slider takes part where its guide leads towards the obstacle and nothing drives it.
+    """
+    if node.support == "free":
+        return True
+    if not node.slides or any(m.node == name and m.displacement is not None for m in motions):
+        return False
+    guide = np.asarray(node.direction, dtype=float)
+    towards = stop.normal if stop.kind == "flat" else guide @ stop.across
+    return bool(abs(guide @ towards) > PARALLEL * np.linalg.norm(guide))
+
+
+PARALLEL = 1e-6
+"""Sine of the angle below which a guide leads along a plane."""
 
 ROUNDING = 1e-9
 """Share of the scene's size by which a start may be inside an obstacle: decimal fractions in a file."""

@@ -22,7 +22,7 @@ from .fields import Fields
 from .loading import Loading
 from .mesh import Touch
 from .model import Model
-from .obstacles import Obstacle, free_end, members_of, nearest, obstacle
+from .obstacles import Obstacle, members_of, nearest, obstacle, takes_part
 from .scene import Scene
 
 __all__ = ["Gap", "Touched", "answers", "edge_sides", "obstacles_of"]
@@ -98,33 +98,45 @@ class Touched:
 
     def force(self, touch: Touch) -> Array:
         """Force (3,) of an obstacle on a member at a place or over a stretch, N."""
-        kind, model = self.obstacles[touch.contact].kind, self.model
-        if touch.to is not None and not self._has_row(touch):
+        model = self.model
+        if touch.to is not None:
             return self._resultant(touch)
         normal = self.normal(touch, touch.at)
         force = -self._state.lam[self._row[touch.name]] * normal
-        if touch.to is not None and kind == "round":
-            along = self._row[f"{touch.name} along"]
-            force = force - self._state.lam[along] * self._tangent(touch, touch.at) / self._out(touch)
         return np.asarray(force * model.scales.force)
-
-    def _has_row(self, touch: Touch) -> bool:
-        return touch.name in self._row
-
-    def _out(self, touch: Touch) -> float:
-        place = self.fields.positions(touch.member, np.array([touch.at]))[0]
-        stop = self.obstacles[touch.contact]
-        return float(np.linalg.norm((place - stop.place) @ stop.across)) / self.model.scales.length
 
     def _resultant(self, touch: Touch) -> Array:
         """Force over a stretch by the balance of its forces, N."""
         before, after = self._beside(touch, touch.at, -1.0), self._beside(touch, float(touch.to or 0.0), 1.0)
-        return before - after - self._load_between(touch.member, touch.at, float(touch.to or 0.0))
+        total = before - after - self._load_between(touch.member, touch.at, float(touch.to or 0.0))
+        stop = self.obstacles[touch.contact]
+        # What holds an end along a plane is not of the plane.
+        return np.asarray(stop.across @ total if stop.kind == "flat" else total)
 
     def _beside(self, touch: Touch, at: float, way: float) -> Array:
-        """Internal force just outside a stretch, N; at the end of a member the one just inside."""
-        x = np.nextafter(at, at + way) if 0.0 < at < 1.0 else at
-        return np.asarray(self.fields.along(touch.member, np.array([x]))["force"][0])
+        """Internal force just outside a stretch, N; inside it where a support or another stretch continues it."""
+        model, record = self.model, self.model.scene.members[touch.member]
+        if 0.0 < at < 1.0:
+            x = np.nextafter(at, at + way)
+            return np.asarray(self.fields.along(touch.member, np.array([x]))["force"][0])
+        node = record.nodes[int(at)]
+        if not self.takes_part(touch.contact, node) or self._goes_on(touch, node):
+            return np.asarray(self.fields.along(touch.member, np.array([at]))["force"][0])
+        beyond = np.array(self.fields.own_force(node))
+        for name, member in model.scene.members.items():
+            if name != touch.member and node in member.nodes and name in model.members:
+                ends = self.fields.along(name, np.array([0.0, 1.0]))["force"]
+                beyond = beyond + ends[0] if member.nodes[0] == node else beyond - ends[1]
+        return way * beyond
+
+    def _goes_on(self, touch: Touch, node: str) -> bool:
+        """Whether another stretch of the same obstacle begins or ends at a node."""
+        for other in self.model.mesh.touches:
+            if other is not touch and other.contact == touch.contact and other.to is not None:
+                nodes = self.model.scene.members[other.member].nodes
+                if any(x in (0.0, 1.0) and nodes[int(x)] == node for x in other.places):
+                    return True
+        return False
 
     def _load_between(self, member: str, begin: float, end: float) -> Array:
         """Distributed load between two places, N."""
@@ -152,6 +164,25 @@ class Touched:
         pushed = -np.diff(forces, axis=0) - np.diff(loads, axis=0)
         middles = 0.5 * (x[1:] + x[:-1])
         return np.array([push @ self.normal(touch, at) for push, at in zip(pushed, middles, strict=True)])
+
+    def loose_end(self, touch: Touch) -> int | None:
+        """The end (0 or 1) of a stretch at a member's free end that the obstacle would have to pull or to clamp."""
+        model = self.model
+        for k, at in enumerate(touch.places if touch.to is not None else ()):
+            member = model.scene.members[touch.member]
+            node = member.nodes[int(at)] if at in (0.0, 1.0) else ""
+            alone = sum(node in other.nodes for other in model.scene.members.values()) == 1
+            if not node or not alone or not self.takes_part(touch.contact, node):
+                continue
+            way = 1.0 if k else -1.0
+            pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
+            couple = way * self.fields.own_moment(node) @ axes[0] - pressed[0]
+            inside = self.fields.along(touch.member, np.array([at]))["force"][0]
+            push = (way * inside - self.fields.own_force(node)) @ self.normal(touch, at)
+            held = model.scene.nodes[node].support != "free"
+            if push < -1e-9 * model.scales.force or (abs(couple) > 1e-8 and not held):
+                return k
+        return None
 
     def normal(self, touch: Touch, at: float) -> Array:
         """Normal (3,) of an obstacle at a place of a member."""
@@ -232,11 +263,15 @@ class Touched:
                     found += self._runs(contact, member, offset, limit)
         return found
 
+    def takes_part(self, contact: str, node: str) -> bool:
+        """Whether an obstacle can push a node."""
+        scene = self.model.scene
+        return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
+
     def _runs(self, contact: str, member: str, offset: float, limit: float) -> list[Gap]:
         x = self.samples(member)
         keep = np.ones(len(x), bool)
-        nodes = [self.model.scene.nodes[node] for node in self.model.scene.members[member].nodes]
-        keep[0], keep[-1] = (free_end(node) for node in nodes)
+        keep[0], keep[-1] = (self.takes_part(contact, node) for node in self.model.scene.members[member].nodes)
         for touch in self.model.mesh.touches:
             if touch.contact == contact and touch.member == member and touch.to is not None:
                 keep &= (x < touch.at) | (x > touch.to)

@@ -24,7 +24,7 @@ from .loading import Loading
 from .mesh import Mesh, Touch, breaks_of
 from .model import Model
 from .newton import Corrected
-from .obstacles import free_end
+from .obstacles import obstacle, takes_part
 from .prepared import Prepared
 from .scene import Scene
 from .touches import Gap, Touched, obstacles_of
@@ -49,8 +49,11 @@ MOST_TURN = 0.8
 CHANGES = 24
 """Changes of what touches at one point of the way before the step is taken to be too long."""
 
-SHORTEST = 2e-5
-"""Steps below this part of the way end the search."""
+SHORTEST = 2e-5, 5e-4
+"""First and later steps below this part of the way end the search."""
+
+TRIES = 60
+"""Steps tried before giving up."""
 
 
 @dataclass(frozen=True)
@@ -223,6 +226,10 @@ class Toucher:
         mesh = _stretched(self.scene, held.mesh, tuple(touches))
         source = held.prepared.model, held.corrected.state
         if mesh is None:
+            if any(min(x, 1.0 - x) < APART for i, k in free for x in [touches[i].places[k]]):
+                return None
+            if any(touch.to is not None and touch.to - touch.at < APART for touch in touches):
+                return None
             mesh = placed(self.scene, replace(held.mesh, touches=()), tuple(touches))
             return self.solved(mesh, source, way)
         return self.solved(mesh, source, way, same=True)
@@ -233,7 +240,8 @@ class Toucher:
         columns = []
         for j, (i, k) in enumerate(free):
             touch = held.mesh.touches[i]
-            size = 1e-6 if touch.to is None else min(1e-6, 0.1 * (touch.to - touch.at))
+            x = touch.places[k]
+            size = min(1e-6, 0.1 * min(x, 1.0 - x), 1.0 if touch.to is None else 0.1 * (touch.to - touch.at))
             for sign in (1.0, -1.0):
                 step = np.zeros(len(free))
                 step[j] = sign * size
@@ -260,7 +268,7 @@ class Toucher:
             return _Change(_numbered((*rest, _moved(touch, k, end))))
         others = [n for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
         sharp = self.scene.contacts[touch.contact].type in ("point", "line")
-        if not free_end(self.scene.nodes[node]) or (sharp and not others):
+        if not self._takes_part(touch.contact, node) or (sharp and not others):
             return _Change(_numbered(rest))
         for other in others:
             if self.scene.nodes[node].joint == "rigid" and self.scene.members[other].type == "flexible":
@@ -308,6 +316,10 @@ class Toucher:
                 detail += f"{self.scene.contacts[touch.contact].type} in space, accepted: stretches on planes"
                 raise SolveError(Status.FAILED, detail)
 
+    def _takes_part(self, contact: str, node: str) -> bool:
+        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
+
     def _released(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> tuple[Touch, ...]:
         """Stretches that reach a held end which is lifted off the obstacle end before it."""
         if not any(touch.to is not None and {0.0, 1.0} & {*touch.places} for touch in touches):
@@ -318,7 +330,7 @@ class Toucher:
         for touch in touches:
             for k, x in enumerate(touch.places if touch.to is not None else ()):
                 node = self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else ""
-                if not node or free_end(self.scene.nodes[node]):
+                if not node or self._takes_part(touch.contact, node):
                     continue
                 place = np.asarray(self.scene.nodes[node].position, dtype=float)
                 place = place + np.pad(shift[model.nodes.index(node)], (0, 3 - model.element.axes))
@@ -337,7 +349,12 @@ class Toucher:
         if pulls and min(pulls)[0] < -smallest:
             i = min(pulls)[1]
             return _Change(_numbered(touches[:i] + touches[i + 1 :]))
-        flatter = self._flattened(held)
+        for i, touch in enumerate(touches):
+            k = touched.loose_end(touch)
+            if k is not None:
+                inner = touch.places[k] + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at)
+                return _Change(_numbered((*touches[:i], _moved(touch, k, inner), *touches[i + 1 :])))
+        flatter = self._flattened(held) or self._joined(held, way)
         if flatter is not None:
             return flatter
         gaps = touched.inside(way.offsets, self.ways, self.limit * self.scene.size)
@@ -361,6 +378,32 @@ class Toucher:
                 low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
                 lying = replace(touch, at=low, to=high, way=self._bend(held, touch))
                 return _Change(_numbered((*touches[:i], lying, *touches[i + 1 :])))
+        return None
+
+    def _joined(self, held: Held, way: Way) -> _Change | None:
+        """Between two places of one obstacle without any gap between them the member lies on it."""
+        touches, limit = held.mesh.touches, self.limit * self.scene.size
+        for i, touch in enumerate(touches):
+            if held.touched.obstacles[touch.contact].kind == "sharp":
+                continue
+            others = [(t, x) for t in touches if t.contact == touch.contact and t.member == touch.member
+                      and t is not touch for x in t.places]
+            for k, sign in ((-1, 1.0), (0, -1.0)):
+                here = touch.places[k]
+                beside = sorted((x for _, x in others if (x - here) * sign > 0.0), key=lambda x: abs(x - here))
+                there = beside[0] if beside else 0.5 + 0.5 * sign
+                if abs(there - here) < 1e-5:
+                    continue
+                x = np.linspace(here, there, 12)[1:]
+                gaps = held.touched.gaps(touch.contact, touch.member, x, way.offsets.get(touch.contact, 0.0))
+                if np.abs(gaps).max() > limit:
+                    continue
+                gone = next((t for t, x in others if x == there), None)
+                low, high = min(*touch.places, there), max(*touch.places, there)
+                low, high = (low, high) if gone is None else (min(low, *gone.places), max(high, *gone.places))
+                lying = replace(touch, at=low, to=high, way=self._bend(held, touch))
+                rest = tuple(t for t in touches if t is not touch and t is not gone)
+                return _Change(_numbered((*rest, lying)))
         return None
 
     def _lifted(self, held: Held) -> _Change | None:
@@ -389,9 +432,12 @@ class Toucher:
             if not beside:
                 continue
             rest = touches[:i] + touches[i + 1 :]
+            if touch.at in (0.0, 1.0):
+                # It rolls off its end; where the end does not stay off, it comes back as a stretch.
+                return (*rest, replace(touch, at=float(np.clip(gap.at, 1e-4, 1.0 - 1e-4))))
             if touch.to is None:
                 low, high = max(0.0, touch.at - 0.5 * width), min(1.0, touch.at + 0.5 * width)
-                low, high = (low, 1.0) if touch.at == 1.0 else (0.0, high) if touch.at == 0.0 else (low, high)
+                low, high = min(low, gap.begin) if gap.begin == 0.0 else low, max(high, gap.end) if gap.end == 1.0 else high
                 return (*rest, replace(touch, at=low, to=high, way=self._bend(held, touch)))
             low, high = min(touch.at, gap.begin), max(touch.to, gap.end)
             return (*rest, replace(touch, at=low, to=high))
@@ -415,17 +461,19 @@ class Toucher:
         now = start if isinstance(start, Held) else None
         touches = start.mesh.touches if isinstance(start, Held) else start
         done, step = 0.0, 0.5
-        while done < 1.0:
+        for _ in range(TRIES):
+            if done >= 1.0:
+                return now
             trial = min(1.0, done + step)
             there = self.resolved(base, now, touches, way(trial))
             if there is None:
-                step *= 0.3
-                if step < SHORTEST:
+                step *= 0.25
+                if step < SHORTEST[done > 0.0]:
                     return None
                 continue
             now, touches, done = there, there.mesh.touches, trial
             step *= 2.0
-        return now
+        return None
 
 
 def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
