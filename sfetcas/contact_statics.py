@@ -27,6 +27,9 @@ INSIDE = 1e-9
 WEAK = 1e-9
 """Forces of obstacles below this share of the largest force hardly touch."""
 
+IDLE = 1e-7
+"""Share of the force on a stretch below which it is without pressure between its ends."""
+
 LEVELS, MOST_ELEMENTS = 40, 20_000
 """Most refinements of a mesh, and most elements."""
 
@@ -170,8 +173,10 @@ class ContactRun:
         SolveError
             What touches on a coarse mesh is not found again on a fine one.
         """
+        way = self.at(factor)
+        held, left = self._left(held, way)
+        notes += left
         self.last = (factor, held)
-        way = Way(lambda model: model.loading(factor), {})
         now = held
         if held.mesh.order != target.order or self.fixed:
             now = self._onto(target, held, way, anew=True)
@@ -216,16 +221,11 @@ class ContactRun:
 
     def _stability(self, held: Held, way: Way) -> tuple[Stability, list[str]]:
         """Stability with what touches held on its obstacles, free to slide along them."""
-        stability, notes = held.prepared.stability(held.corrected), []
+        notes: list[str] = []
         touched, touches = held.touched, held.mesh.touches
+        stability = self._judged(held, way)
         if touches:
             notes.append(f"in contact: {_told(held)}; stability is that with these places held on their obstacles")
-        if stability.negative > 0:
-            freed = stability.negative - self._freed(held, way)
-            if freed == 0:
-                stability = replace(stability, stable=True, negative=0)
-            elif touches:
-                notes.append("unstable: equilibria in contact are not left for others")
         pushes = {touch.name: float(np.linalg.norm(touched.force(touch))) for touch in touches}
         largest = max([held.prepared.model.scales.force, *pushes.values()])
         weak = [name for name, push in pushes.items() if push < WEAK * largest]
@@ -233,8 +233,57 @@ class ContactRun:
             notes.append(f"touches without force: {', '.join(weak)}")
         return stability, notes
 
+    def _judged(self, held: Held, way: Way) -> Stability:
+        """Stability on what touches with a force, at places that slide.
+
+        A stretch without pressure may leave its obstacle between its ends: only these hold it.
+        """
+        held = self._pressing(held, way)
+        stability = held.prepared.stability(held.corrected)
+        if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
+            stability = replace(stability, stable=True, negative=0)
+        return stability
+
+    def _pressing(self, held: Held, way: Way) -> Held:
+        """The state with the ends of stretches without pressure in their place; itself where there is none."""
+        touches: list[Touch] = []
+        for touch in held.mesh.touches:
+            if touch.to is None:
+                touches.append(touch)
+                continue
+            pressed = held.touched.pressures(touch, np.linspace(touch.at, touch.to, 9))
+            idle = np.abs(pressed).max() < IDLE * float(np.linalg.norm(held.touched.force(touch)))
+            if idle and all(0.0 < x < 1.0 or held.touched.goes_on(touch, x) for x in touch.places):
+                inner = [x for x in touch.places if 0.0 < x < 1.0]
+                touches += [replace(touch, at=x, to=None, number=touch.number + 50 * i) for i, x in enumerate(inner)]
+            else:
+                touches.append(touch)
+        if [t.to for t in touches] == [t.to for t in held.mesh.touches]:
+            return held
+        source = held.prepared.model, held.corrected.state
+        return self.toucher.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
+
+    def _left(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
+        """An equilibrium in contact left for a stable one along its escape shape, as far as that is found."""
+        model = held.prepared.model
+        if self.scene.analysis.unstable != "leave" or not model.minimisable or self._judged(held, way).negative <= 0:
+            return held, ()
+        pressing = self._pressing(held, way)
+        prepared, loading = pressing.prepared, pressing.loading
+        touches = pressing.mesh.touches
+        try:
+            stability = prepared.stability(pressing.corrected)
+            corrected, _ = prepared.leave(pressing.corrected.state, stability, loading)
+            there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+            found = self.toucher.resolved(replace(pressing.mesh, touches=()), there, touches, way)
+        except SolveError:
+            found = None
+        if found is None or self._judged(found, way).negative > 0:
+            return held, ("unstable, and no stable equilibrium was found along its escape shape",)
+        return found, ("left an unstable equilibrium in contact along its escape shape",)
+
     def _freed(self, held: Held, way: Way) -> int:
-        """How many ways out there are only while places of contact may not slide along their members.
+        """How many more ways out there are when places of contact may slide along their members.
 
         With f the force and g the gap, the Lagrangian ``Pi - f g(x, s)`` has the places s among its unknowns;
         its inertia counted with s eliminated last and first gives the two numbers of ways out.
@@ -253,7 +302,7 @@ class ContactRun:
         weight = np.where(sharp, push * own, -push)
         last = weight[:, None] * slopes[np.ix_(single, single)]
         first = np.where(sharp, push * own, -push * own)
-        return int((first < 0.0).sum()) - int((np.linalg.eigvalsh(0.5 * (last + last.T)) < 0.0).sum())
+        return int((np.linalg.eigvalsh(0.5 * (last + last.T)) < 0.0).sum()) - int((first < 0.0).sum())
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:

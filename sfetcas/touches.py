@@ -120,7 +120,7 @@ class Touched:
             x = np.nextafter(at, at + way)
             return np.asarray(self.fields.along(touch.member, np.array([x]))["force"][0])
         node = record.nodes[int(at)]
-        if not self.takes_part(touch.contact, node) or self._goes_on(touch, node):
+        if not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
             return np.asarray(self.fields.along(touch.member, np.array([at]))["force"][0])
         beyond = np.array(self.fields.own_force(node))
         for name, member in model.scene.members.items():
@@ -129,8 +129,9 @@ class Touched:
                 beyond = beyond + ends[0] if member.nodes[0] == node else beyond - ends[1]
         return way * beyond
 
-    def _goes_on(self, touch: Touch, node: str) -> bool:
-        """Whether another stretch of the same obstacle begins or ends at a node."""
+    def goes_on(self, touch: Touch, at: float) -> bool:
+        """Whether another stretch of the same obstacle begins where a stretch reaches the end of its member."""
+        node = self.model.scene.members[touch.member].nodes[int(at)]
         for other in self.model.mesh.touches:
             if other is not touch and other.contact == touch.contact and other.to is not None:
                 nodes = self.model.scene.members[other.member].nodes
