@@ -24,6 +24,9 @@ __all__ = ["ContactRun", "Pressed"]
 INSIDE = 1e-9
 """How deep a place may be inside an obstacle over the size of the scene: rounding, and what curves between nodes."""
 
+COARSE = 1e-6
+"""The same on the coarse meshes of the way: beside a stretch they waver about the obstacle by some 1e-7."""
+
 WEAK = 1e-9
 """Forces of obstacles below this share of the largest force hardly touch."""
 
@@ -60,7 +63,8 @@ class ContactRun:
 
     def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: set[str]) -> None:
         self.scene, self.accuracy, self.fixed = scene, accuracy, fixed
-        self.toucher = Toucher(scene, prepare, max(INSIDE, 1e-3 * accuracy))
+        self.toucher = Toucher(scene, prepare, COARSE)
+        self.fine = max(INSIDE, 0.1 * accuracy)
         self.toucher.ways = edge_sides(scene)
         self.prepare = prepare
         self.last: tuple[float, Held] | None = None
@@ -150,7 +154,7 @@ class ContactRun:
 
     def clear(self, fields: Fields) -> bool:
         """Whether no obstacle is in the way of a state."""
-        return not Touched.of(fields).inside({}, self.toucher.ways, self.toucher.limit * self.scene.size)
+        return not Touched.of(fields).inside({}, self.toucher.ways, self.fine * self.scene.size)
 
     def reached(self, base: Mesh, factor: float, free: Held | None, *, nearer: bool) -> Held | None:
         """A state in contact: by the loads growing from zero, or near the state without obstacles."""
@@ -194,8 +198,19 @@ class ContactRun:
                 break
             else:
                 now = self._onto(now.mesh.refined(marks), now, way)
+        now = self._checked(now, way)
         stability, more = self._stability(now, way)
         return Pressed(now, stability, error, (*notes, *more))
+
+    def _checked(self, held: Held, way: Way) -> Held:
+        """The state on its fine mesh with what touches looked at as finely."""
+        self.toucher.limit = self.fine
+        try:
+            if self.toucher.wrong(held, way) is None:
+                return held
+            return self._onto(held.mesh, held, way, anew=True)
+        finally:
+            self.toucher.limit = COARSE
 
     @property
     def _all_fixed(self) -> bool:

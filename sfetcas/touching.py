@@ -52,6 +52,12 @@ CHANGES = 24
 SHORTEST = 2e-5, 5e-4
 """First and later steps below this part of the way end the search."""
 
+SNAP = 2e-3
+"""Part of the way beyond a limit point at which a state is left for another."""
+
+MOST_SNAPS = 4
+"""Snaps on one way."""
+
 TRIES = 60
 """Steps tried before giving up."""
 
@@ -156,6 +162,8 @@ class Toucher:
     def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], limit: float) -> None:
         self.scene, self.prepare, self.limit = scene, prepare, limit
         self.ways: dict[tuple[str, str], float] = {}
+        self.leave = scene.analysis.unstable == "leave"
+        self.snapped: list[float] = []
 
     # -- settling -------------------------------------------------------------------------------
 
@@ -468,12 +476,33 @@ class Toucher:
             there = self.resolved(base, now, touches, way(trial))
             if there is None:
                 step *= 0.25
-                if step < SHORTEST[done > 0.0]:
+                if step >= SHORTEST[done > 0.0]:
+                    continue
+                trial = min(1.0, done + SNAP)
+                there = self._snapped(base, now, way(trial))
+                if there is None:
                     return None
-                continue
+                self.snapped.append(trial)
+                step = 0.05
             now, touches, done = there, there.mesh.touches, trial
             step *= 2.0
         return None
+
+
+    def _snapped(self, base: Mesh, now: Held | None, way: Way) -> Held | None:
+        """Where a state that ceases to be goes to: downhill on what touches, then what touches is looked at again."""
+        if now is None or not self.leave or not now.prepared.model.minimisable or len(self.snapped) >= MOST_SNAPS:
+            return None
+        touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in now.mesh.touches)
+        prepared = self.prepare(replace(now.mesh, touches=touches))
+        loading = way.loading(prepared.model)
+        stability = now.prepared.stability(now.corrected)
+        try:
+            corrected, _ = prepared.leave(now.corrected.state, stability, loading)
+        except SolveError:
+            return None
+        there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+        return self.resolved(base, there, touches, way)
 
 
 def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
