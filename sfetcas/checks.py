@@ -98,7 +98,9 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
         return _entry(step.certificate.to_dict(), parts[1])
     if quantity == "factor":
         return step.factor
-    known = "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, contacts.NAME.KEY, energy.KEY, certificate.KEY, factor"
+    known = (
+        "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, contacts.NAME.KEY, energy.KEY, certificate.KEY, factor"
+    )
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 
 

@@ -197,7 +197,9 @@ def _report_contact(name: str, entry: dict[str, Any]) -> None:
         print(f"  contact {name}: none" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
         return
     several = isinstance(entry["member"], list)
-    for member, at, force in zip(*(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True):
+    for member, at, force in zip(
+        *(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True
+    ):
         where = f"from {at[0]:.9g} to {at[1]:.9g}" if isinstance(at, list) else f"at {at:.9g}"
         print(f"  contact {name}: {member} {where}, force {_vector(force)} N")
 

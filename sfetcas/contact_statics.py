@@ -16,16 +16,13 @@ from .obstacles import members_of, nearest, obstacle, takes_part
 from .prepared import Prepared
 from .scene import Scene
 from .stability import Stability
-from .touches import Touched, edge_sides, obstacles_of
-from .touching import Held, Toucher, Way
+from .touches import COARSE, Touched, edge_sides, obstacles_of
+from .touching import Held, Toucher, Way, can_leave
 
 __all__ = ["ContactRun", "Pressed"]
 
 INSIDE = 1e-9
 """How deep a place may be inside an obstacle over the size of the scene: rounding, and what curves between nodes."""
-
-COARSE = 1e-6
-"""The same on the coarse meshes of the way: beside a stretch they waver about the obstacle by some 1e-7."""
 
 WEAK = 1e-9
 """Forces of obstacles below this share of the largest force hardly touch."""
@@ -124,8 +121,11 @@ class ContactRun:
                     way = self.toucher.ways[contact, member]
                     places = np.array(nearest(stop, line.positions, line.tangents, x))
                     gaps = stop.gaps(line.positions(places), line.tangents(places), 0.0, way) if len(places) else places
-                    found += [Touch(contact, member, float(p), way=way) for p, gap in zip(places, gaps, strict=True)
-                              if abs(gap) < INSIDE * self.scene.size]
+                    found += [
+                        Touch(contact, member, float(p), way=way)
+                        for p, gap in zip(places, gaps, strict=True)
+                        if abs(gap) < INSIDE * self.scene.size
+                    ]
                     continue
                 gaps = stop.gaps(line.positions(x), line.tangents(x))
                 found += self._lying(contact, member, x, gaps)
@@ -280,8 +280,7 @@ class ContactRun:
 
     def _left(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
         """An equilibrium in contact left for a stable one along its escape shape, as far as that is found."""
-        model = held.prepared.model
-        if self.scene.analysis.unstable != "leave" or not model.minimisable or self._judged(held, way).negative <= 0:
+        if self.scene.analysis.unstable != "leave" or not can_leave(held) or self._judged(held, way).negative <= 0:
             return held, ()
         pressing = self._pressing(held, way)
         prepared, loading = pressing.prepared, pressing.loading

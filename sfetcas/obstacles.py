@@ -86,16 +86,16 @@ def _unit(vector: object) -> Array:
 def obstacle(contact: Contact, space: bool) -> Obstacle:
     """The numbers of an obstacle; in the plane a line along z is a point, one within it a wall."""
     eye = np.eye(3)
-    if contact.type == "plane" or (contact.type == "line" and not space and contact.direction[:2] != (0.0, 0.0)):
+    if contact.type == "plane" or (contact.type == "line" and not space and abs(_unit(contact.direction)[2]) < 0.5):
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
         normal = _unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], _unit(contact.direction))
         normal = -normal if side is not None and side @ normal < 0.0 else normal
         return Obstacle("flat", np.asarray(contact.point), np.outer(normal, normal), normal)
     if contact.type in ("point", "line"):
-        place = contact.position if contact.type == "point" else contact.point
+        point = contact.position if contact.type == "point" else contact.point
         edge = eye[2] if contact.type == "point" else _unit(contact.direction)
         side = np.asarray(contact.side, dtype=float)
-        return Obstacle("sharp", np.asarray(place, dtype=float), eye - np.outer(edge, edge), edge, side=side)
+        return Obstacle("sharp", np.asarray(point, dtype=float), eye - np.outer(edge, edge), edge, side=side)
     axis = _unit(contact.axis)
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0

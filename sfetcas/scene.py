@@ -17,8 +17,8 @@ from .errors import SceneError
 from .later import Staged
 from .loads import History, Load, Motion
 from .matrices import check_rigid_motion
-from .quaternion import matrix
 from .obstacles import check_start, members_of, obstacle
+from .quaternion import matrix
 from .records import Fraction, Named, Number, Numbers, Vector, number, say, unknown
 from .sections import CrossSection
 from .shapes import CenterLine, place
@@ -354,7 +354,8 @@ def _check_contacts(scene: Scene) -> None:
             if scene.members[member].type != "flexible":
                 accepted = "flexible members, whose whole length can touch"
                 raise SceneError(
-                    f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}", ("contacts", name)
+                    f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
+                    ("contacts", name),
                 )
             line = scene.center_lines[member]
             try:

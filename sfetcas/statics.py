@@ -390,7 +390,8 @@ class _Run:
     def _in_contact(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium:
         """The answer where obstacles may stop members."""
         base = self.pilot_mesh.refined()
-        held, notes = contact.continued(base, factor), ()
+        notes: tuple[str, ...] = ()
+        held = contact.continued(base, factor)
         if held is None or not held.mesh.touches:
             free, failure = self._unstopped(pilot, factor)
             held = None

@@ -25,7 +25,13 @@ from .model import Model
 from .obstacles import Obstacle, members_of, nearest, obstacle, takes_part
 from .scene import Scene
 
-__all__ = ["Gap", "Touched", "answers", "edge_sides", "obstacles_of"]
+__all__ = ["COARSE", "Gap", "Touched", "answers", "edge_sides", "obstacles_of"]
+
+COARSE = 1e-6
+"""Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
+
+NOISE = 1e-4
+"""On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
 
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
@@ -282,8 +288,36 @@ class Touched:
         runs = []
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             i = a + int(np.argmin(gaps[a:b]))
+            if limit >= COARSE * self.model.scene.size and gaps[i] > -NOISE * self.model.scene.size:
+                if self._wavers(contact, member, float(x[a]), float(x[b - 1])):
+                    continue
             runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
         return runs
+
+    def _wavers(self, contact: str, member: str, begin: float, end: float) -> bool:
+        """Whether a run is in the element beside a place where curvatures already say that the member leaves.
+
+        At a free end of a member they do not.
+        """
+        scene, cuts = self.model.scene, self.model.mesh.cuts[member]
+        for touch in self.model.mesh.touches:
+            if touch.contact != contact:
+                continue
+            for x in touch.places:
+                place: float | None = x if touch.member == member else None
+                if x in (0.0, 1.0):
+                    node = scene.members[touch.member].nodes[int(x)]
+                    if sum(node in other.nodes for other in scene.members.values()) == 1 and touch.to is None:
+                        continue
+                    nodes = scene.members[member].nodes
+                    place = float(nodes.index(node)) if node in nodes else place
+                if place is None:
+                    continue
+                cut = self.model.mesh.cut_at(member, place)
+                low, high = cuts[max(cut - 1, 0)], cuts[min(cut + 1, len(cuts) - 1)]
+                if low <= begin and end <= high:
+                    return True
+        return False
 
     def _over_edge(self, contact: str, member: str, offset: float, way: float, limit: float) -> list[Gap]:
         if any(t.contact == contact and t.member == member for t in self.model.mesh.touches):
@@ -322,8 +356,8 @@ def answers(fields: Fields) -> dict[str, dict[str, Any]]:
         touches = sorted((t for t in fields.model.mesh.touches if t.contact == contact), key=lambda t: t.at)
         if not touches:
             gap = touched.smallest_gap(contact, sides)
-            gap = gap if np.isfinite(gap) else None
-            found[contact] = {"force": np.zeros(3), "at": None, "gap": gap, "member": None}
+            known = gap if np.isfinite(gap) else None
+            found[contact] = {"force": np.zeros(3), "at": None, "gap": known, "member": None}
             continue
         entries = [
             {

@@ -24,12 +24,12 @@ from .loading import Loading
 from .mesh import Mesh, Touch, breaks_of
 from .model import Model
 from .newton import Corrected
-from .obstacles import obstacle, takes_part
+from .obstacles import members_of, obstacle, takes_part
 from .prepared import Prepared
 from .scene import Scene
 from .touches import Gap, Touched, obstacles_of
 
-__all__ = ["Held", "Toucher", "Way", "placed"]
+__all__ = ["Held", "Toucher", "Way", "can_leave", "placed"]
 
 NEAR = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
@@ -57,6 +57,9 @@ SNAP = 2e-3
 
 MOST_SNAPS = 4
 """Snaps on one way."""
+
+MOST_SOLVES = 800
+"""Equilibria with places held that are solved on one way."""
 
 TRIES = 60
 """Steps tried before giving up."""
@@ -164,12 +167,14 @@ class Toucher:
         self.ways: dict[tuple[str, str], float] = {}
         self.leave = scene.analysis.unstable == "leave"
         self.snapped: list[float] = []
+        self.solves = 0
 
     # -- settling -------------------------------------------------------------------------------
 
     def solved(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way, *, same: bool = False) -> Held | None:
         """The equilibrium with places held; None where Newton's method does not get there."""
         touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in mesh.touches)
+        self.solves += 1
         prepared = self.prepare(replace(mesh, touches=touches))
         loading = way.loading(prepared.model)
         if source is None:
@@ -267,7 +272,7 @@ class Toucher:
         rest = touches[:i] + touches[i + 1 :]
         if where == "collapsed":
             middle = 0.5 * sum(touch.places)
-            at = middle if 0.0 < min(touch.places) and max(touch.places) < 1.0 else float(round(middle))
+            at = middle if min(touch.places) > 0.0 and max(touch.places) < 1.0 else float(round(middle))
             return _Change(_numbered((*rest, replace(touch, at=at, to=None))))
         end = float(round(touch.places[k]))
         member = self.scene.members[touch.member]
@@ -372,30 +377,55 @@ class Toucher:
 
     def _flattened(self, held: Held) -> _Change | None:
         """A place beside which the member curves into a plane or a round obstacle becomes a stretch."""
-        scales, touches = held.prepared.model.scales, held.mesh.touches
+        touches = held.mesh.touches
         for i, touch in enumerate(touches):
-            if touch.to is not None or not 0.0 < touch.at < 1.0 or held.touched.obstacles[touch.contact].kind == "sharp":
+            if touch.to is not None or held.touched.obstacles[touch.contact].kind == "sharp":
                 continue
-            bent = held.touched.gap_curvature(touch) * scales.length
-            if bent < -FLAT:
-                # The moment falls by half of the force to either side, down to what the obstacle's shape takes.
-                push = held.touched.push(touch) / scales.force
-                stiff = held.touched.fields.stiffness(touch.member, touch.at)
-                length = self.scene.center_lines[touch.member].length / scales.length
-                reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
-                low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
-                lying = replace(touch, at=low, to=high, way=self._bend(held, touch))
-                return _Change(_numbered((*touches[:i], lying, *touches[i + 1 :])))
+            beside = [touch, *self._across_node(touch)]
+            if touch.at in (0.0, 1.0) and len(beside) == 1:
+                continue
+            lying = [self._laid(held, part) for part in beside]
+            found = [part for part in lying if part is not None]
+            if found:
+                return _Change(_numbered((*touches[:i], *found, *touches[i + 1 :])))
         return None
+
+    def _across_node(self, touch: Touch) -> list[Touch]:
+        """The same place on the other members where a member ends."""
+        if touch.at not in (0.0, 1.0):
+            return []
+        node = self.scene.members[touch.member].nodes[int(touch.at)]
+        others = [(n, m) for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
+        allowed = members_of(self.scene.contacts[touch.contact], self.scene.members)
+        flexible = [(n, m) for n, m in others if m.type == "flexible" and n in allowed]
+        return [replace(touch, member=n, at=float(m.nodes.index(node))) for n, m in flexible]
+
+    def _laid(self, held: Held, touch: Touch) -> Touch | None:
+        """The stretch that a place becomes; None where the member curves away from the obstacle."""
+        scales = held.prepared.model.scales
+        bent = held.touched.gap_curvature(touch) * scales.length
+        if bent > -FLAT:
+            return None
+        # The moment falls by half of the force to either side, down to what the obstacle's shape takes.
+        push = max((held.touched.push(t) for t in held.mesh.touches if t.to is None), default=0.0) / scales.force
+        stiff = held.touched.fields.stiffness(touch.member, touch.at)
+        length = self.scene.center_lines[touch.member].length / scales.length
+        reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
+        low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
+        return replace(touch, at=low, to=high, way=self._bend(held, touch))
 
     def _joined(self, held: Held, way: Way) -> _Change | None:
         """Between two places of one obstacle without any gap between them the member lies on it."""
         touches, limit = held.mesh.touches, self.limit * self.scene.size
-        for i, touch in enumerate(touches):
+        for touch in touches:
             if held.touched.obstacles[touch.contact].kind == "sharp":
                 continue
-            others = [(t, x) for t in touches if t.contact == touch.contact and t.member == touch.member
-                      and t is not touch for x in t.places]
+            others = [
+                (t, x)
+                for t in touches
+                if t.contact == touch.contact and t.member == touch.member and t is not touch
+                for x in t.places
+            ]
             for k, sign in ((-1, 1.0), (0, -1.0)):
                 here = touch.places[k]
                 beside = sorted((x for _, x in others if (x - here) * sign > 0.0), key=lambda x: abs(x - here))
@@ -424,9 +454,13 @@ class Toucher:
             if pressed.min() < -1e-6 * max(np.abs(pressed).max(), held.prepared.model.scales.force):
                 j = int(np.argmin(pressed))
                 rest = held.mesh.touches[:i] + held.mesh.touches[i + 1 :]
-                parts = [replace(touch, to=float(x[j])), replace(touch, at=float(x[j + 1]))]
-                return _Change(_numbered((*rest, *(p if p.to - p.at > 0.05 * (touch.to - touch.at) else
-                                                   replace(p, at=p.places[0 if p is parts[0] else 1], to=None) for p in parts))))  # type: ignore[operator]
+                halves = [(touch.at, float(x[j])), (float(x[j + 1]), float(touch.to))]
+                parts = []
+                for low, high in halves:
+                    short = high - low < 0.05 * (touch.to - touch.at)
+                    outer = low if low == touch.at else high
+                    parts.append(replace(touch, at=outer if short else low, to=None if short else high))
+                return _Change(_numbered((*rest, *parts)))
         return None
 
     def _with(self, held: Held, gap: Gap) -> tuple[Touch, ...]:
@@ -445,7 +479,10 @@ class Toucher:
                 return (*rest, replace(touch, at=float(np.clip(gap.at, 1e-4, 1.0 - 1e-4))))
             if touch.to is None:
                 low, high = max(0.0, touch.at - 0.5 * width), min(1.0, touch.at + 0.5 * width)
-                low, high = min(low, gap.begin) if gap.begin == 0.0 else low, max(high, gap.end) if gap.end == 1.0 else high
+                low, high = (
+                    min(low, gap.begin) if gap.begin == 0.0 else low,
+                    max(high, gap.end) if gap.end == 1.0 else high,
+                )
                 return (*rest, replace(touch, at=low, to=high, way=self._bend(held, touch)))
             low, high = min(touch.at, gap.begin), max(touch.to, gap.end)
             return (*rest, replace(touch, at=low, to=high))
@@ -469,9 +506,12 @@ class Toucher:
         now = start if isinstance(start, Held) else None
         touches = start.mesh.touches if isinstance(start, Held) else start
         done, step = 0.0, 0.5
+        most = self.solves + MOST_SOLVES
         for _ in range(TRIES):
             if done >= 1.0:
                 return now
+            if self.solves > most:
+                return None
             trial = min(1.0, done + step)
             there = self.resolved(base, now, touches, way(trial))
             if there is None:
@@ -488,10 +528,9 @@ class Toucher:
             step *= 2.0
         return None
 
-
     def _snapped(self, base: Mesh, now: Held | None, way: Way) -> Held | None:
         """Where a state that ceases to be goes to: downhill on what touches, then what touches is looked at again."""
-        if now is None or not self.leave or not now.prepared.model.minimisable or len(self.snapped) >= MOST_SNAPS:
+        if now is None or not self.leave or not can_leave(now) or len(self.snapped) >= MOST_SNAPS:
             return None
         touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in now.mesh.touches)
         prepared = self.prepare(replace(now.mesh, touches=touches))
@@ -503,6 +542,12 @@ class Toucher:
             return None
         there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
         return self.resolved(base, there, touches, way)
+
+
+def can_leave(held: Held) -> bool:
+    """Whether there is an energy and anything left to move."""
+    equations = held.prepared.equations
+    return held.prepared.model.minimisable and equations.rows < equations.unknowns
 
 
 def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
@@ -524,8 +569,10 @@ def _shortened(
         if abs(change) < SETTLED:
             continue
         if room < 10.0 * APART:
-            met = touch.to is not None and room == abs(touch.places[1 - k] - x) and touch.places[1 - k] not in (
-                (1.0,) if change > 0.0 and touch.places[1 - k] == x else ()
+            met = (
+                touch.to is not None
+                and room == abs(touch.places[1 - k] - x)
+                and touch.places[1 - k] not in ((1.0,) if change > 0.0 and touch.places[1 - k] == x else ())
             )
             return step, (i, k, "collapsed" if met and len(beside) > 1 else "end")
         # Two places of a stretch may both move towards each other.
@@ -546,6 +593,7 @@ def _numbered(touches: tuple[Touch, ...]) -> tuple[Touch, ...]:
 
 def _alike(a: tuple[Touch, ...], b: tuple[Touch, ...]) -> bool:
     """Whether two sets of touches are the same but for rounding of the places."""
+
     def key(touches: tuple[Touch, ...]) -> Any:
         return [(t.contact, t.member, *(round(x, 6) for x in t.places)) for t in touches]
 
