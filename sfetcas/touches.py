@@ -288,9 +288,9 @@ class Touched:
         runs = []
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             i = a + int(np.argmin(gaps[a:b]))
-            if limit >= COARSE * self.model.scene.size and gaps[i] > -NOISE * self.model.scene.size:
-                if self._wavers(contact, member, float(x[a]), float(x[b - 1])):
-                    continue
+            small = limit >= COARSE * self.model.scene.size and gaps[i] > -NOISE * self.model.scene.size
+            if small and self._wavers(contact, member, float(x[a]), float(x[b - 1])):
+                continue
             runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
         return runs
 

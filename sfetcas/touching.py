@@ -21,7 +21,7 @@ from .equations import Equations, State
 from .errors import SolveError, Status
 from .fields import transferred
 from .loading import Loading
-from .mesh import Mesh, Touch, breaks_of
+from .mesh import SAME, Mesh, Touch, breaks_of
 from .model import Model
 from .newton import Corrected
 from .obstacles import members_of, obstacle, takes_part
@@ -349,7 +349,7 @@ class Toucher:
                 place = place + np.pad(shift[model.nodes.index(node)], (0, 3 - model.element.axes))
                 tangent = np.array([[1.0, 0.0, 0.0]])
                 gap = stops[touch.contact].gaps(place[None, :], tangent, way.offsets.get(touch.contact, 0.0))[0]
-                if gap > self.limit * self.scene.size:
+                if gap > SAME * self.scene.size:
                     touch = _moved(touch, k, x + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at))
             found.append(touch)
         return tuple(found)
