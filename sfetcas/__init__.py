@@ -15,6 +15,7 @@ large motion, Part 1.
 """
 
 from .checks import check
+from .contacts import Contact
 from .errors import SceneError, SolveError, Status
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Model, assemble
@@ -35,6 +36,7 @@ __all__ = [
     "Analysis",
     "Arc",
     "Certificate",
+    "Contact",
     "CrossSection",
     "Curvature",
     "Equilibrium",

@@ -11,7 +11,7 @@ from .arrays import Array
 from .scene import Scene
 from .sections import breaks as kinks
 
-__all__ = ["Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = ["SAME", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 SAME = 1e-12
 """Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
