@@ -17,6 +17,7 @@ large motion, Part 1.
 
 from .analyses import solve
 from .checks import check
+from .contacts import Contact
 from .errors import SceneError, SolveError, Status
 from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Model, assemble
@@ -40,6 +41,7 @@ __all__ = [
     "Arc",
     "Branch",
     "Certificate",
+    "Contact",
     "CrossSection",
     "Curvature",
     "Equilibrium",

@@ -229,6 +229,8 @@ def _report_step(step: Equilibrium, place: str) -> None:
         units = ("rad", "N m") if state.rotational else ("m", "N")
         (travel, at), (effort, how) = state.to_dict().items()
         print(f"  spring {name}: {travel} {at:.9g} {units[0]}, {effort} {how:.9g} {units[1]}")
+    for name, entry in step.contacts.items():
+        _report_contact(name, entry)
     proof = step.certificate
     error = proof.error_estimate
     said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
@@ -243,6 +245,18 @@ def _kind(step: Equilibrium) -> str:
         return "stability not defined, as loads have no potential"
     kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
     return f"{kind}, smallest eigenvalue {proof.smallest:.4g} N" if np.isfinite(proof.smallest) else kind
+
+
+def _report_contact(name: str, entry: dict[str, Any]) -> None:
+    if entry["at"] is None:
+        print(f"  contact {name}: none" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
+        return
+    several = isinstance(entry["member"], list)
+    for member, at, force in zip(
+        *(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True
+    ):
+        where = f"from {at[0]:.9g} to {at[1]:.9g}" if isinstance(at, list) else f"at {at:.9g}"
+        print(f"  contact {name}: {member} {where}, force {_vector(force)} N")
 
 
 def _vector(values: Any) -> str:

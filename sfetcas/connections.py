@@ -12,23 +12,31 @@ from .beams import Scales
 from .bodies import BodyData, body_of
 from .elements import Element
 from .joints import (
+    Along,
+    AlongRound,
+    Bent,
     Body,
     Connection,
     DrivenSlide,
     DrivenTurn,
     Hinge,
     LineSpring,
+    OnEdge,
+    OnPlane,
+    OnRound,
     Slide,
     Spring,
     TurnSpring,
     Universal,
 )
+from .mesh import Mesh, Touch
+from .obstacles import Obstacle, obstacle, takes_part
 from .positions import normals
-from .rotations import Pin, Rotations, end_joints
+from .rotations import Pin, Rotations, Turn, end_joints
 from .scene import Scene
 from .segments import Segments
 
-__all__ = ["GROUND", "Group", "body_numbers", "connect", "freedoms"]
+__all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
 
 GROUND = -1
 """Number of a side that is the ground: it neither turns nor moves."""
@@ -75,12 +83,13 @@ class _One:
 
 
 def connect(
-    scene: Scene, segments: Segments, rotations: Rotations, element: Element, scales: Scales
+    scene: Scene, mesh: Mesh, segments: Segments, rotations: Rotations, element: Element, scales: Scales
 ) -> tuple[Group, ...]:
     """The groups of a scene; those of a kind in the order of the scene."""
     maker = _Maker(scene, segments, rotations, element.space, scales)
     by_kind: dict[Connection, list[_One]] = {}
-    for one in maker.all():
+    ones = [*maker.all(), *_Toucher(scene, mesh, segments, rotations, element, scales).all()]
+    for one in ones:
         by_kind.setdefault(one.kind, []).append(one)
     return tuple(_grouped(kind, ones) for kind, ones in by_kind.items())
 
@@ -214,6 +223,105 @@ class _Maker:
         return _One(
             kind, name, member.nodes[0], data, self.rotations.ends[name], places, f"member {name} does not stretch"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Toucher:
+    """What touches obstacles: a place on each, and along stretches the directions of the sections."""
+
+    scene: Scene
+    mesh: Mesh
+    segments: Segments
+    rotations: Rotations
+    element: Element
+    scales: Scales
+
+    def all(self) -> Iterator[_One]:
+        """Every touch of the mesh; what is held or lies there already needs no row."""
+        touched = {touch.contact for touch in self.mesh.touches}
+        obstacles = {name: obstacle(self.scene.contacts[name], self.element.space) for name in touched}
+        covered: set[tuple[str, int]] = set()
+        for touch in self.mesh.touches:
+            stop = obstacles[touch.contact]
+            if touch.to is None:
+                yield self._on(touch, stop)
+                continue
+            ends = [(touch.contact, self.place(touch, at)) for at in touch.places if at in (0.0, 1.0)]
+            if anchored(self.scene, touch, stop) and not covered & set(ends):
+                yield self._on(touch, stop)
+            yield from self._lying(touch, stop, covered)
+            covered |= set(ends)
+
+    def place(self, touch: Touch, at: float) -> int:
+        """Number of the place of a touch."""
+        if at in (0.0, 1.0):
+            return self.segments.place(self.segments.ends[touch.member, int(at)])
+        return self.segments.place(touch.name)
+
+    def _on(self, touch: Touch, stop: Obstacle) -> _One:
+        axes, unit = self.element.axes, self.scales.length
+        start = self.scene.center_lines[touch.member].positions(np.array([touch.at]))[0] - stop.place
+        places = (self.place(touch, touch.at),)
+        if stop.kind == "flat":
+            gap = (start @ stop.normal + touch.offset) / unit
+            return _One(OnPlane(axes == 3), touch.name, "", np.append(stop.normal[:axes], gap), (), places, touch.name)
+        if stop.kind == "round":
+            across = stop.across[:axes, :axes].T.ravel()
+            radius = stop.radius - stop.sign * touch.offset
+            data = np.concatenate([across, start[:axes] / unit, [radius / unit, stop.sign]])
+            return _One(OnRound(axes == 3), touch.name, "", data, (), places, touch.name)
+        turns, _ = self._chain(touch)
+        tangent = self.scene.center_lines[touch.member].tangents(np.array([touch.at]))[0]
+        start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
+        data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
+        return _One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
+
+    def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[_One]:
+        """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""
+        axes, name = self.element.axes, f"{touch.name} along"
+        turns, x = self._chain(touch)
+        line = self.scene.center_lines[touch.member]
+        tangents = line.tangents(x)[:, :axes]
+        if stop.kind == "flat":
+            for turn, tangent in zip(turns.tolist(), tangents, strict=True):
+                key = (touch.contact, -2 - turn)
+                if self.rotations.kind[turn] != Turn.HELD and key not in covered:
+                    covered.add(key)
+                    data = np.concatenate([stop.normal[:axes], tangent])
+                    yield _One(Along(axes == 3), name, "", data, (turn,), row=name)
+            return
+        start = (line.positions(x[:1])[0] - stop.place)[:axes] / self.scales.length
+        if self.rotations.kind[turns[0]] != Turn.HELD:
+            data = np.concatenate([start, tangents[0]])
+            yield _One(AlongRound(False), name, "", data, (int(turns[0]),), (self.place(touch, touch.at),), name)
+        rest = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0]))
+        radius = stop.radius - stop.sign * touch.offset
+        angles = touch.way / radius * (x - x[0]) * line.length - (rest - rest[0])
+        for turn, angle in zip(turns[1:].tolist(), angles[1:], strict=True):
+            yield _One(Bent(False), name, "", np.array([angle]), (int(turns[0]), turn), row=name)
+
+    def _chain(self, touch: Touch) -> tuple[Index, Array]:
+        """Rotations along a stretch, and the fractions at which they stand."""
+        first = 0
+        for name, cuts in ((name, self.mesh.cuts.get(name)) for name in self.scene.members):
+            if name == touch.member:
+                break
+            first += 0 if cuts is None else len(cuts) - 1
+        cuts = self.mesh.cuts[touch.member]
+        a, b = (self.mesh.cut_at(touch.member, at) for at in (touch.at, touch.places[-1]))
+        if a == b:
+            last = a == len(cuts) - 1
+            number = self.rotations.turns[first + a - last, -1 if last else 0]
+            return np.array([number], dtype=np.intp), cuts[a : a + 1]
+        inner = cuts[a:b, None] + np.diff(cuts[a : b + 1])[:, None] * self.element.nodes[:-1]
+        return self.rotations.chain(slice(first + a, first + b)), np.append(inner.ravel(), cuts[b])
+
+
+def anchored(scene: Scene, touch: Touch, stop: Obstacle) -> bool:
+    """Whether a place of a stretch has to be put on the obstacle: no support holds an end of it there."""
+    nodes = scene.members[touch.member].nodes
+    ends = [nodes[int(at)] for at in touch.places if at in (0.0, 1.0)]
+    return all(takes_part(end, scene.nodes[end], scene.motions.values(), stop) for end in ends)
 
 
 def _unit(direction: object) -> Array:

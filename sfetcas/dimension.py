@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from .contacts import Contact
 from .loads import Load, Motion
 from .shapes import CenterLine
 from .springs import Spring
@@ -27,6 +28,7 @@ def out_of_plane(
     springs: Mapping[str, Spring],
     gravity: Triple | None,
     members: Mapping[str, Member],
+    contacts: Mapping[str, Contact],
 ) -> Finding | None:
     """The place of the first thing out of x-y with what it does there; None where all lies in it."""
     if gravity is not None and _leaves(gravity):
@@ -38,6 +40,7 @@ def out_of_plane(
         _motions(motions),
         _springs(springs),
         _cylindrical(nodes, members),
+        _contacts(contacts),
     )
     return next((finding for group in findings for finding in group), None)
 
@@ -103,6 +106,18 @@ def _springs(springs: Mapping[str, Spring]) -> Iterator[Finding]:
             vector = getattr(spring, key)
             if vector is not None and _leaves(vector):
                 yield ("springs", name, key), "has a z component"
+
+
+def _contacts(contacts: Mapping[str, Contact]) -> Iterator[Finding]:
+    for name, contact in contacts.items():
+        if contact.normal is not None and _leaves(contact.normal):
+            yield ("contacts", name, "normal"), "has a z component"
+        if contact.direction is not None and _leaves(contact.direction) and _turns_out(contact.direction):
+            yield ("contacts", name, "direction"), "is neither along z nor in x-y"
+        if _turns_out(contact.axis):
+            yield ("contacts", name, "axis"), "is not along z"
+        if contact.type == "sphere" and contact.center is not None and contact.center[2] != 0.0:
+            yield ("contacts", name, "center"), "has a z component"
 
 
 def _leaves(vector: Triple) -> bool:

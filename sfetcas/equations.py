@@ -329,6 +329,15 @@ class Equations:
         pairs = zip(self._linked, loading.loads, strict=True)
         return three, [link.evaluated(self, state, nodal, load)[3].copy() for link, load in pairs]
 
+    def starting_moments(self, state: State, loading: Loading) -> Array:
+        """Moments (elements, 3) about the fixed axes that the surroundings exert on the first node of each element."""
+        model, loading = self.model, self.effective(state, loading)
+        self._kernel.set(0, state.q[model.rotations.turns])
+        constant = self.segment_pulls(state.lam, loading)[self._owner]
+        self._kernel.set(3, loading.pull + constant[:, None, :])
+        first = self._kernel()[2][:, : model.element.turns]
+        return first.copy() if model.space else np.pad(first, ((0, 0), (2, 0)))
+
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
         model, positions = self.model, self.model.positions

@@ -18,6 +18,7 @@ from .balance import Balance, SpringState
 from .balance import three as _three
 from .equations import Equations, State
 from .loading import Loading
+from .mesh import Touch
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -26,7 +27,7 @@ class Fields:
     """Fields of one state of a model.  All results are in SI units and fixed axes, with three components."""
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
-        self.model, self._state, self._applied = equations.model, state, loading
+        self.model, self.state, self._applied = equations.model, state, loading
         self._loading = loading = equations.effective(state, loading)
         self._equations = equations
         self.q = state.q
@@ -45,7 +46,7 @@ class Fields:
         last = [loading.spread[part.elements][-1].sum(axis=0) for part in parts]
         ends = [force[-1] - spread for force, spread in zip(starts, last, strict=True)]
         starts = [force[0] for force in starts]
-        return Balance(self._equations, self._state, self._applied, starts, ends, self._nodal)
+        return Balance(self._equations, self.state, self._applied, starts, ends, self._nodal)
 
     # -- nodes ----------------------------------------------------------------------------------
 
@@ -57,7 +58,7 @@ class Fields:
     def rotation(self, node: str) -> Array | None:
         """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
         number = self.model.rotations.node_turn[node]
-        return None if number is None else self._state.q[number]
+        return None if number is None else self.state.q[number]
 
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
@@ -97,7 +98,10 @@ class Fields:
         # m' = -r' x n; the pull at the points is minus the force there.
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
-        rotation = rotations_along(model, self._state.q, member, x)
+        rotation = rotations_along(model, self.state.q, member, x)
+        for touch in model.mesh.touches:
+            if touch.member == member and touch.to is not None:
+                self._lay(touch, x, rotation, force, moment)
         frames = self._frames(member, x, rotation)
         result = {"position": position, "rotation": rotation, "force": force, "moment": moment}
         if dimensionless:
@@ -113,6 +117,147 @@ class Fields:
             strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
         return result
+
+    def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
+        """Force and moment along a stretch that lies on an obstacle, in place, dimensionless.
+
+        Its shape across the obstacle is known, so that the moment about the axis across is, and the derivative of
+        that is the force towards the obstacle.  The force along changes with what acts along, and on a circle with
+        the force across.
+        """
+        inside = (x >= touch.at) & (x <= float(touch.to or 0.0))
+        if not inside.any():
+            return
+        model, here = self.model, x[inside]
+        tangents = self._tangents(touch.member, here, rotation[inside])
+        pressed, axes = self.pressed_moments(touch, here)
+        across = np.cross(axes, tangents)
+        step = 1e-5
+        low, high = np.clip(here - step, touch.at, None), np.clip(here + step, None, touch.to)
+        (before, first), (after, last) = self.pressed_moments(touch, low), self.pressed_moments(touch, high)
+        length = model.scales.length / model.scene.center_lines[touch.member].length
+        spans = np.maximum(high - low, 1e-300)
+        moment[inside] += (pressed - np.einsum("ni,ni->n", moment[inside], axes))[:, None] * axes
+        # m' = -t x n, and the axis turns with the member on the obstacle.
+        turning = np.einsum("ni,ni->n", moment[inside], (last - first) / spans[:, None])
+        shear = -((after - before) / spans - turning) * length
+        if self._curvature(touch):
+            along = self._along_round(touch, here, pressed)
+            force[inside] = along[:, None] * tangents + shear[:, None] * across
+        else:
+            force[inside] += (shear - np.einsum("ni,ni->n", force[inside], across))[:, None] * across
+
+    def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
+        """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""
+        model = self.model
+        part, cuts = model.elements_of(touch.member), model.mesh.cuts[touch.member]
+        first = model.mesh.cut_at(touch.member, touch.at)
+        spread, turned = self._loading.spread[part], self.turned[part]
+        pushed = np.einsum("eka,eka->ek", spread, turned) / np.linalg.norm(turned, axis=2)
+        sums = np.concatenate([[0.0], np.cumsum(pushed.sum(axis=1))])
+        e, xi = _located(cuts, x)
+        element = model.element
+        to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
+        gained = sums[e] - sums[first] + np.einsum("nk,nk->n", to_x, pushed[e])
+        start = self.along(touch.member, np.array([np.nextafter(touch.at, 0.0)]), dimensionless=True)
+        if first == 0:
+            begin = float(_three(self._start_forces(part)[0]) @ self._tangent_at(touch.member, 0.0))
+        else:
+            begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
+        bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
+        return np.asarray(begin - bent * model.scales.length - gained)
+
+    def own_force(self, node: str) -> Array:
+        """Load (3,) on a node itself, N."""
+        return _three(self._loading.own[self.model.segments.place(node)]) * self.model.scales.force
+
+    def own_moment(self, node: str) -> Array:
+        """Moment (3,) on a node itself about the fixed axes, dimensionless."""
+        return np.asarray(self._loading.couple[self.model.segments.place(node)])
+
+    def load_before(self, member: str, x: Array) -> Array:
+        """Distributed load (n, 3) from the start of a member to fractions of its length, dimensionless."""
+        model, element = self.model, self.model.element
+        spread = self._loading.spread[model.elements_of(member)]
+        sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
+        e, xi = _located(model.mesh.cuts[member], x)
+        to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
+        return _three(sums[e] + np.einsum("nk,nka->na", to_x, spread[e]))
+
+    def stiffness(self, member: str, x: float) -> float:
+        """Smallest bending stiffness of the section at a place, dimensionless."""
+        values = self.model.scene.sections[str(self.model.scene.members[member].section)].stiffness(np.array([x]))
+        return float(np.nanmin(values[0, 1:])) / (self.model.scales.moment * self.model.scales.length)
+
+    def bend(self, member: str, x: Array, found: dict[str, Array]) -> Array:
+        """Derivative (n, 3) of the tangent along the member, 1/m, of what :meth:`along` found."""
+        frames = self._frames(member, x, found["rotation"])
+        return np.cross(np.einsum("nij,nj->ni", frames, found["curvature"]), frames[:, :, 0])
+
+    def _tangent_at(self, member: str, x: float) -> Array:
+        place = np.array([x])
+        return np.asarray(self._tangents(member, place, rotations_along(self.model, self.state.q, member, place))[0])
+
+    def _tangents(self, member: str, x: Array, rotation: Array) -> Array:
+        """Tangents (n, 3) at fractions of the length."""
+        return self._frames(member, x, rotation)[:, :, 0]
+
+    def tangents(self, member: str, x: Array) -> Array:
+        """Tangents (n, 3) at fractions of the length."""
+        return self._tangents(member, x, rotations_along(self.model, self.state.q, member, x))
+
+    def positions(self, member: str, x: Array) -> Array:
+        """Positions (n, 3) at fractions of the length, m."""
+        model, element = self.model, self.model.element
+        part = model.elements_of(member)
+        e, xi = _located(model.mesh.cuts[member], x)
+        to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
+        moved = np.einsum("nk,nka->na", to_x, (self.turned[part] - model.beams.tangent[part])[e])
+        start = self._element_starts(member)[0]
+        return model.scene.center_lines[member].positions(x) + _three(start[e] + moved) * model.scales.length
+
+    def _curvature(self, touch: Touch) -> float:
+        """Signed curvature that an obstacle gives to a stretch, 1/m."""
+        contact = self.model.scene.contacts[touch.contact]
+        if contact.radius is None:
+            return 0.0
+        return touch.way / (contact.radius - (-1.0 if contact.side == "inside" else 1.0) * touch.offset)
+
+    def pressed_moments(self, touch: Touch, x: Array) -> tuple[Array, Array]:
+        """Moments (n,) that bend a member to the shape of an obstacle, dimensionless, and their axes (n, 3)."""
+        if self.model.space:
+            return self._pressed_in_space(touch, x)
+        scene = self.model.scene
+        line = scene.center_lines[touch.member]
+        stiffness = scene.sections[str(scene.members[touch.member].section)].stiffness(x)
+        column = 1 if line.bending_axis == 2 else 2
+        sign = np.rint(quaternion.matrix(line.quaternions(x))[:, 2, column])
+        bent = self._curvature(touch) - sign * line.curvatures(x)[:, column]
+        axes = np.broadcast_to([0.0, 0.0, 1.0], (len(x), 3))
+        return np.asarray(stiffness[:, column] * bent / self.model.scales.moment), axes
+
+    def _pressed_in_space(self, touch: Touch, x: Array) -> tuple[Array, Array]:
+        """The same on a plane in space: what bends about the axis in the plane across the member."""
+        model, element = self.model, self.model.element
+        normal = np.asarray(model.scene.contacts[touch.contact].normal, dtype=float)
+        cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
+        # At the border of the stretch its own element says how it is bent.
+        middle = np.clip(x, np.nextafter(touch.at, 1.0), np.nextafter(float(touch.to or 1.0), 0.0))
+        e, xi = _located(cuts, middle)
+        nodal = self.q[model.rotations.turns[part]][e]
+        rows = _per_place(xi, lambda places: interpolation.differentiation(element.nodes, places))
+        rotation = rotations_along(model, self.state.q, touch.member, middle)
+        lengths = model.beams.weight[part].sum(axis=1)[e] * model.scales.length
+        slope = np.einsum("nj,njc->nc", rows, nodal) / lengths[:, None]
+        spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
+        line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
+        strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
+        stiffness = model.scene.sections[str(record.section)].stiffness(middle)
+        frames = self._frames(touch.member, middle, rotation)
+        moments = np.einsum("nij,nj->ni", frames, stiffness * strain) / model.scales.moment
+        axes = np.cross(normal / np.linalg.norm(normal), frames[:, :, 0])
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        return np.einsum("ni,ni->n", moments, axes), axes
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
@@ -130,7 +275,7 @@ class Fields:
         numbers = [ends[0], ends[-1]]
         places = [model.segments.place(model.segments.ends[member, i]) for i in (0, len(ends) - 1)]
         moved = _three(self._nodal[places]) * model.scales.length
-        turned = self._state.q[numbers]
+        turned = self.state.q[numbers]
         if not model.space:
             turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
         signed = turned[1] * (1.0 if turned[0] @ turned[1] >= 0.0 else -1.0)
@@ -154,7 +299,7 @@ class Fields:
         if model.space:
             rotation = mixed
         else:
-            rotation = ((1.0 - x) * self._state.q[ends[0], 0] + x * self._state.q[ends[-1], 0])[:, None]
+            rotation = ((1.0 - x) * self.state.q[ends[0], 0] + x * self.state.q[ends[-1], 0])[:, None]
         scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
         return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
 
@@ -185,6 +330,9 @@ class Fields:
         start = self.balance.start_moment(member)
         moment = -start
         moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
+        if any(touch.to is not None for touch in model.mesh.touches):
+            # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
+            moments[:-1] = -self._equations.starting_moments(self.state, self._applied)[part]
         return starts, moments
 
 

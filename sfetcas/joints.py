@@ -21,12 +21,18 @@ import numpy as np
 from .quaternion import product, turned
 
 __all__ = [
+    "Along",
+    "AlongRound",
+    "Bent",
     "Body",
     "Connection",
     "DrivenSlide",
     "DrivenTurn",
     "Hinge",
     "LineSpring",
+    "OnEdge",
+    "OnPlane",
+    "OnRound",
     "Slide",
     "Spring",
     "TurnSpring",
@@ -336,6 +342,112 @@ class Body(Connection):
         """Deformations that do not exist."""
         rest, _, stiff = self._split(data)
         return ca.vertsplit(ca.mtimes(stiff, self.deformation(q, u, rest))) if self.stiff else []
+
+
+# -- contact: what lies on an obstacle ----------------------------------------------------------------
+
+
+@final
+@dataclass(frozen=True)
+class OnPlane(Connection):
+    """A place on a plane; data: its normal, the gap in the undeformed scene."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 0, 1, 1, self.axes + 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The gap."""
+        return [ca.dot(data[: self.axes], ca.vertcat(*u[0])) + data[self.axes]]
+
+
+@final
+@dataclass(frozen=True)
+class OnRound(Connection):
+    """A place on a circle, cylinder or sphere; data: projection across the axis, centre to place, radius, sign."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 0, 1, 1, self.axes * self.axes + self.axes + 2, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The gap."""
+        n = self.axes
+        out = ca.mtimes(ca.reshape(data[: n * n], n, n), ca.vertcat(*u[0]) + data[n * n : n * n + n])
+        return [data[n * n + n + 1] * (ca.norm_2(out) - data[n * n + n])]
+
+
+@final
+@dataclass(frozen=True)
+class OnEdge(Connection):
+    """A place whose section passes an edge at no distance; data: edge, undeformed tangent, edge to place, side.
+
+    The distance counts across the edge and the tangent of the section.  It is the gap where the place is the one
+    nearest to the edge, and then the force goes through the place.
+    """
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 1, 1, 6 + self.axes + 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The gap."""
+        tangent = ca.vertcat(*self.forth(q[0], ca.vertsplit(data[3 : 3 + self.axes])))
+        tangent = tangent if self.space else ca.vertcat(tangent, 0.0)
+        across = ca.cross(data[:3], tangent)
+        across = data[6 + self.axes] * across / ca.norm_2(across)
+        return [ca.dot(across[: self.axes], ca.vertcat(*u[0]) + data[6 : 6 + self.axes])]
+
+
+@final
+@dataclass(frozen=True)
+class Along(Connection):
+    """A section whose tangent lies in a plane; data: the normal of the plane, the tangent in the undeformed scene."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 0, 1, 2 * self.axes, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Sine of the angle to the plane."""
+        n = self.axes
+        return [ca.dot(data[:n], ca.vertcat(*self.forth(q[0], ca.vertsplit(data[n:]))))]
+
+
+@final
+@dataclass(frozen=True)
+class AlongRound(Connection):
+    """A section tangential to a circle about its centre; data: centre to place, tangent.  Plane only."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 1, 1, 2 * self.axes, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Sine of the angle to the tangent of the circle."""
+        n = self.axes
+        out = ca.vertcat(*u[0]) + data[:n]
+        return [ca.dot(out, ca.vertcat(*self.forth(q[0], ca.vertsplit(data[n:])))) / ca.norm_2(out)]
+
+
+@final
+@dataclass(frozen=True)
+class Bent(Connection):
+    """Two rotations whose difference is prescribed by a circle between them; data: the angle.  Plane only."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 2, 0, 1, 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The difference less what it shall be."""
+        return [q[1][0] - q[0][0] - data]
 
 
 # -- derivatives, the same for all kinds --------------------------------------------------------------

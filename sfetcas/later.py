@@ -13,7 +13,6 @@ from .records import Record
 __all__ = ["Staged", "refusal"]
 
 _LATER = {
-    "Scene.contacts": "contacts",
     "Scene.rotating": "rotating axes",
     "Node.velocity": "velocities",
     "Member.spin": "angular velocities of members",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,10 +11,47 @@ from .arrays import Array
 from .scene import Scene
 from .sections import breaks as kinks
 
-__all__ = ["Mesh", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = ["SAME", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 SAME = 1e-12
 """Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Where a member touches an obstacle: at one place, or from one place to another.
+
+    Attributes
+    ----------
+    contact, member : str
+    at, to : float, float or None
+        Fractions of the length; an element ends at each that is not an end of the member.
+    number : int
+        Tells apart touches of the same two.
+    offset : float
+        How far the obstacle has stepped back on the way to its place, m.
+    way : float
+        1 or -1: on which side of the member an edge is (1: the member's normal is the edge times the tangent), or
+        to which side a circle bends the member.
+    """
+
+    contact: str
+    member: str
+    at: float
+    to: float | None = None
+    number: int = 0
+    offset: float = 0.0
+    way: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Name of its rows, and of its place where that is no end of the member."""
+        return f"{self.contact} on {self.member}" + (f" ({self.number + 1})" if self.number else "")
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """The fractions."""
+        return (self.at,) if self.to is None else (self.at, self.to)
 
 
 @dataclass(frozen=True)
@@ -31,12 +68,15 @@ class Mesh:
         Gauss integration instead of integration at the nodes.
     rigid : frozenset of str
         Members whose elements are never halved.
+    touches : tuple of Touch
+        Where members touch obstacles; elements end there.
     """
 
     order: int
     cuts: Mapping[str, Array]
     gauss: bool = False
     rigid: frozenset[str] = frozenset()
+    touches: tuple[Touch, ...] = ()
 
     @property
     def elements(self) -> int:
@@ -51,7 +91,11 @@ class Mesh:
             chosen = chosen & (name not in self.rigid)
             middles = 0.5 * (old[1:] + old[:-1])
             cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
-        return Mesh(self.order, cuts, self.gauss, self.rigid)
+        return replace(self, cuts=cuts)
+
+    def cut_at(self, member: str, place: float) -> int:
+        """Number of the cut of a member that is nearest to a fraction of its length."""
+        return int(np.argmin(np.abs(self.cuts[member] - place)))
 
 
 def breaks_of(scene: Scene, member: str) -> Array:

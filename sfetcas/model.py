@@ -200,7 +200,7 @@ def assemble(
     if assembly == "auto":
         closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
         assembly = "closing" if closing <= nodal else "nodal"
-    connections = connect(scene, segments, rotations, element, scales)
+    connections = connect(scene, mesh, segments, rotations, element, scales)
     followers = find_followers(scene, mesh, element, segments, rotations)
     return Model(
         scene=scene,

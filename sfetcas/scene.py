@@ -11,11 +11,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
+from .contacts import Contact
 from .dimension import out_of_plane
 from .errors import SceneError
 from .later import Staged
 from .loads import History, Load, Motion
 from .matrices import check_rigid_motion
+from .obstacles import check_start, members_of, obstacle
 from .quaternion import matrix
 from .records import Fraction, Named, Number, Numbers, Vector, number, say, unknown
 from .sections import CrossSection
@@ -24,7 +26,7 @@ from .springs import Spring
 from .structure import Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 
-__all__ = ["Analysis", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
+__all__ = ["Analysis", "Contact", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
 
 
 def _accuracy(value: float) -> float:
@@ -169,7 +171,7 @@ class Scene(Staged):
     title, source : free text
     dimension : plane (x-y), space, or auto: plane where everything lies in x-y
     gravity : (3,), m/s2, fixed axes
-    sections, nodes, members, springs, loads, motions, histories : tables by name, read-only
+    sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only
     analysis : what is asked for
     expect : what is known about the answer
 
@@ -202,6 +204,7 @@ class Scene(Staged):
     loads: Named[Load] = Field(default_factory=dict)
     motions: Named[Motion] = Field(default_factory=dict)
     histories: Named[History] = Field(default_factory=dict)
+    contacts: Named[Contact] = Field(default_factory=dict)
     analysis: Analysis = Analysis()
     expect: tuple[Expect, ...] = ()
 
@@ -244,8 +247,16 @@ class Scene(Staged):
 
     @cached_property
     def _out_of_plane(self) -> tuple[tuple[str, ...], str] | None:
-        parts = self.nodes, self.center_lines, self.loads, self.motions, self.springs, self.gravity, self.members
-        return out_of_plane(*parts)
+        return out_of_plane(
+            self.nodes,
+            self.center_lines,
+            self.loads,
+            self.motions,
+            self.springs,
+            self.gravity,
+            self.members,
+            self.contacts,
+        )
 
 
 def _check_members(scene: Scene) -> None:
@@ -396,11 +407,42 @@ def _check_motions(scene: Scene) -> None:
 
 
 def _check_supports(scene: Scene) -> None:
-    check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+    # What obstacles hold is known when it is found where members touch them.
+    if not scene.contacts:
+        check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+
+
+def _check_contacts(scene: Scene) -> None:
+    space = scene.resolved_dimension == "space"
+    for name, contact in scene.contacts.items():
+        _known(contact.member, scene.members, "members", "contacts", name, "member")
+        for member in contact.members if isinstance(contact.members, tuple) else ():
+            _known(member, scene.members, "members", "contacts", name, "members")
+        if contact.type == "point" and space:
+            message = f"found a point, accepted in space: a line, as {scene.dimension_reason}"
+            raise SceneError(message, ("contacts", name, "type"))
+        for member in members_of(contact, scene.members):
+            if scene.members[member].type != "flexible":
+                accepted = "flexible members, whose whole length can touch"
+                raise SceneError(
+                    f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
+                    ("contacts", name),
+                )
+            line = scene.center_lines[member]
+            try:
+                check_start(obstacle(contact, space), line.positions, line.tangents, scene.size)
+            except SceneError as error:
+                raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
 
 def _check_expect(scene: Scene) -> None:
-    tables = {"nodes": scene.nodes, "reactions": scene.nodes, "members": scene.members, "springs": scene.springs}
+    tables = {
+        "nodes": scene.nodes,
+        "reactions": scene.nodes,
+        "members": scene.members,
+        "springs": scene.springs,
+        "contacts": scene.contacts,
+    }
     for i, expect in enumerate(scene.expect):
         if expect.equilibrium is not None and scene.analysis.equilibria != "all":
             message = "found with analysis.equilibria = 'one', accepted: with analysis.equilibria = 'all'"
@@ -428,5 +470,6 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_springs,
     _check_motions,
     _check_supports,
+    _check_contacts,
     _check_expect,
 )

@@ -69,6 +69,11 @@ class Segments:
         return {name: i for i, name in enumerate(self.places)}
 
 
+def _touched(mesh: Mesh, member: str) -> dict[int, str]:
+    """Cuts of a member where it touches obstacles, with the names of these places; its ends among them."""
+    return {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+
+
 def _kept_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
     inner = range(1, len(cuts) - 1)
@@ -108,10 +113,12 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         if name not in mesh.cuts:
             continue
         cuts = mesh.cuts[name]
-        stops = [0, *_kept_cuts(scene, name, cuts), len(cuts) - 1]
+        touched, last = _touched(mesh, name), len(cuts) - 1
+        kept |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
+        stops = [0, *sorted({*_kept_cuts(scene, name, cuts), *touched} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
-            there = ends[name, 1] if b == len(cuts) - 1 else f"{name} at {cuts[b]:.12g}"
+            there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, f"{name} at {cuts[b]:.12g}")
             if b < len(cuts) - 1:
                 places.append(there)
                 kept.add(there)

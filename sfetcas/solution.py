@@ -17,8 +17,9 @@ from .errors import SceneError, Status
 from .fields import Fields
 from .loading import Loading
 from .model import Model
-from .records import nearest
+from .records import nearest, plain
 from .stability import Stability
+from .touches import answers
 
 __all__ = ["Certificate", "Equilibrium", "Solution", "equilibrium"]
 
@@ -141,6 +142,15 @@ class Equilibrium:
         elastic, total = self.strain * unit, self.potential * unit
         return {"elastic": elastic, "loads": total - elastic, "total": total}
 
+    @functools.cached_property
+    def contacts(self) -> dict[str, dict[str, Any]]:
+        """Of each obstacle ``force`` (3,) N on the member, ``at``, ``gap`` m, ``member``; lists where several touch.
+
+        ``at`` is a fraction of the length, or [from, to] of a stretch whose whole force is given; None, with the
+        smallest gap, where nothing touches.
+        """
+        return answers(self.fields) if self.model.scene.contacts else {}
+
     def _as_quaternions(self, rotation: Array) -> Array:
         if self.model.space:
             return rotation
@@ -177,6 +187,8 @@ class Equilibrium:
             members[name] = {"s": places.tolist(), **{key: value.tolist() for key, value in found.items()}}
         answer: dict[str, Any] = {"factor": self.factor, "nodes": nodes, "reactions": reactions, "members": members}
         answer |= {"springs": {name: self.spring(name).to_dict() for name in scene.springs}} if scene.springs else {}
+        if self.contacts:
+            answer["contacts"] = {name: plain(entry) for name, entry in self.contacts.items()}
         answer |= {"energy": self.energy, "certificate": self.certificate.to_dict()}
         return {**answer, "notes": list(self.notes)}
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
+from .contact_statics import ContactRun, Pressed
 from .continuation import follow
 from .deflation import deflated
 from .doctor import in_words, moves_nodes
@@ -34,6 +35,8 @@ from .several import Search, long_elements, missing, same, search
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
+from .touches import Touched
+from .touching import Held
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
 
@@ -275,7 +278,11 @@ class _Run:
         pilot = self._prepared(self.pilot_mesh)
         steps: list[Equilibrium] = []
         last: tuple[float, _Found] | None = None
+        contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed) if self.scene.contacts else None
         for factor in self.scene.analysis.steps:
+            if contact is not None:
+                steps.append(self._in_contact(contact, pilot, factor))
+                continue
             found = self._found(pilot, factor, last)
             last = (factor, found) if found.prepared is pilot else None
             steps.append(self._refined(found, factor))
@@ -471,6 +478,49 @@ class _Run:
         self.others = [(prepared.model, other.state) for other in result.found]
         return result
 
+    # -- contact --------------------------------------------------------------------------------
+
+    def _in_contact(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium:
+        """The answer where obstacles may stop members."""
+        base = self.pilot_mesh.refined()
+        notes: tuple[str, ...] = ()
+        held = contact.continued(base, factor)
+        if held is None or not held.mesh.touches:
+            free, failure = self._unstopped(pilot, factor)
+            held = None
+            if free is not None:
+                there = self._onto(base, free, factor)
+                held, notes = _as_held(there, factor), there.notes
+                if contact.toucher.wrong(held, contact.at(factor)) is None:
+                    answer = self._refined(free, factor)
+                    if contact.clear(answer.fields):
+                        contact.last = (factor, held)
+                        return answer
+            held = contact.reached(base, factor, held, nearer=self.started or bool(notes))
+            if held is None:
+                detail = "no state in contact was found on the way of the loads from zero, nor by obstacles coming back"
+                raise SolveError(Status.FAILED, f"{detail}: {', '.join(contact.named(failure))}")
+        return self._pressed(contact.answered(held, factor, self.target, notes), factor)
+
+    def _unstopped(self, pilot: Prepared, factor: float) -> tuple[_Found | None, SolveError | None]:
+        """The answer as if there were no obstacles; None where nothing else holds the structure."""
+        try:
+            return self._on_pilot(pilot, factor, None), None
+        except SolveError as error:
+            return None, error
+
+    def _pressed(self, found: Pressed, factor: float) -> Equilibrium:
+        held = found.held
+        return _finished(
+            held.prepared,
+            held.corrected,
+            held.loading,
+            factor,
+            found.stability,
+            estimate=found.error,
+            notes=found.notes,
+        )
+
     # -- accuracy -------------------------------------------------------------------------------
 
     def _onto(self, mesh: Mesh, source: _Found, factor: float) -> _Found:
@@ -582,6 +632,13 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
         motion = in_words(prepared.equations, shape)
         message = f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
         raise SceneError(message)
+
+
+def _as_held(found: _Found, factor: float) -> Held:
+    """An equilibrium without contact as one that may begin it."""
+    loading = found.prepared.model.loading(factor)
+    touched = Touched(found.prepared.equations, found.corrected.state, loading)
+    return Held(found.prepared, found.corrected, loading, touched)
 
 
 def _with_unique_reactions(found: _Found, loading: Loading) -> _Found:

@@ -322,7 +322,6 @@ def test_combinations(changes, sentence):
 @pytest.mark.parametrize(
     ("place", "value", "sentence"),
     [
-        ("contacts", {}, "contacts: contacts are not available yet"),
         ("rotating", [0, 0, 1], "rotating: rotating axes are not available yet"),
         ("nodes/A/velocity", [0, 0], "nodes.A.velocity: velocities are not available yet"),
         ("members/beam/spin", 0.0, "members.beam.spin: angular velocities of members are not available yet"),

@@ -1,0 +1,331 @@
+"""Static equilibria of a scene with obstacles: the way to a state in contact, its mesh and its stability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .accuracy import largest_difference, roughness
+from .arrays import Array
+from .errors import SolveError, Status
+from .fields import Fields
+from .mesh import Mesh, Touch
+from .obstacles import members_of, nearest, obstacle, takes_part
+from .prepared import Prepared
+from .scene import Scene
+from .stability import Stability
+from .touches import COARSE, Touched, edge_sides, obstacles_of
+from .touching import Held, Toucher, Way, can_leave
+
+__all__ = ["ContactRun", "Pressed"]
+
+INSIDE = 1e-9
+"""How deep a place may be inside an obstacle over the size of the scene: rounding, and what curves between nodes."""
+
+WEAK = 1e-9
+"""Forces of obstacles below this share of the largest force hardly touch."""
+
+IDLE = 1e-7
+"""Share of the force on a stretch below which it is without pressure between its ends."""
+
+LEVELS, MOST_ELEMENTS = 40, 20_000
+"""Most refinements of a mesh, and most elements."""
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """An answer: the state, its stability with sliding places, the estimate of its error and what to say of it."""
+
+    held: Held
+    stability: Stability
+    error: float
+    notes: tuple[str, ...]
+
+
+class ContactRun:
+    """Contact over the load factors of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    accuracy : float
+        Wanted error of the positions over the size of the scene.
+    fixed : set of str
+        Members whose mesh is prescribed.
+    """
+
+    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: set[str]) -> None:
+        self.scene, self.accuracy, self.fixed = scene, accuracy, fixed
+        self.toucher = Toucher(scene, prepare, COARSE)
+        self.fine = max(INSIDE, 0.1 * accuracy)
+        self.toucher.ways = edge_sides(scene)
+        self.prepare = prepare
+        self.last: tuple[float, Held] | None = None
+
+    # -- ways -----------------------------------------------------------------------------------
+
+    def continued(self, base: Mesh, factor: float) -> Held | None:
+        """From the contact of the last factor, where that lies on the way from zero."""
+        if self.last is None or self.last[0] * (factor - self.last[0]) < 0.0 or not self.last[1].mesh.touches:
+            return None
+        return self._through(base, self.last[0], factor, self.last[1])
+
+    def grown(self, base: Mesh, factor: float) -> Held | None:
+        """From the undeformed scene, loads and motions growing together."""
+        start: Held | tuple[Touch, ...] = self.first_touches(base)
+        if self.scene.histories and factor != 0.0:
+            held = self.toucher.follow(base, lambda t: Way(lambda model: model.loading(0.0, t), {}), start)
+            if held is None:
+                return None
+            start = held
+        return self._through(base, 0.0, factor, start)
+
+    def _through(self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...]) -> Held | None:
+        low, high = min(begin, end), max(begin, end)
+        knots = {t for history in self.scene.histories.values() for t in history.t if low < t < high}
+        stops = [begin, *sorted(knots, reverse=end < begin), end]
+        held: Held | None = None
+        for a, b in zip(stops, stops[1:], strict=False):
+            way = _between(a, b)
+            held = self.toucher.follow(base, way, start)
+            if held is None:
+                return None
+            start = held
+        return held
+
+    def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
+        """From the state without obstacles, these coming back from where they do not reach it."""
+        gaps = free.touched.inside({}, self.toucher.ways, 0.0)
+        depths: dict[str, float] = {}
+        for gap in gaps:
+            depths[gap.contact] = max(depths.get(gap.contact, 0.0), -gap.depth)
+
+        def way(t: float) -> Way:
+            return Way(lambda model: model.loading(factor), {n: (1.0 - t) * depth for n, depth in depths.items()})
+
+        return self.toucher.follow(base, way, free)
+
+    def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
+        """What touches in the undeformed scene."""
+        model = self.prepare(base).model
+        found: list[Touch] = []
+        for contact, stop in obstacles_of(model).items():
+            for member in members_of(self.scene.contacts[contact], self.scene.members):
+                line = self.scene.center_lines[member]
+                x = np.linspace(0.0, 1.0, 257)
+                if stop.kind == "sharp":
+                    way = self.toucher.ways[contact, member]
+                    places = np.array(nearest(stop, line.positions, line.tangents, x))
+                    gaps = stop.gaps(line.positions(places), line.tangents(places), 0.0, way) if len(places) else places
+                    found += [
+                        Touch(contact, member, float(p), way=way)
+                        for p, gap in zip(places, gaps, strict=True)
+                        if abs(gap) < INSIDE * self.scene.size
+                    ]
+                    continue
+                gaps = stop.gaps(line.positions(x), line.tangents(x))
+                found += self._lying(contact, member, x, gaps)
+        return tuple(found)
+
+    def _takes_part(self, contact: str, node: str) -> bool:
+        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
+
+    def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
+        """Places and stretches of the undeformed member at no distance."""
+        near = np.abs(gaps) < INSIDE * self.scene.size
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
+        nodes = self.scene.members[member].nodes
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            low, high = float(x[a]), float(x[b - 1])
+            if b - a == 1:
+                if 0.0 < low < 1.0 or self._takes_part(contact, nodes[int(low)]):
+                    yield Touch(contact, member, low)
+                continue
+            yield Touch(contact, member, low, high)
+
+    def at(self, factor: float) -> Way:
+        """The point of the way that a factor is."""
+        return Way(lambda model: model.loading(factor), {})
+
+    def clear(self, fields: Fields) -> bool:
+        """Whether no obstacle is in the way of a state."""
+        return not Touched.of(fields).inside({}, self.toucher.ways, self.fine * self.scene.size)
+
+    def reached(self, base: Mesh, factor: float, free: Held | None, *, nearer: bool) -> Held | None:
+        """A state in contact: by the loads growing from zero, or near the state without obstacles."""
+        ways: list[Callable[[], Held | None]] = [lambda: self.grown(base, factor)]
+        if free is not None:
+            ways.insert(0 if nearer else 1, lambda: self.retracted(base, factor, free))
+        return next((held for held in (way() for way in ways) if held is not None), None)
+
+    def named(self, failure: SolveError | None) -> list[str]:
+        """What may be in the way, for a sentence."""
+        return [*(f"contacts.{name}" for name in self.scene.contacts), *([str(failure)] if failure else [])]
+
+    # -- accuracy -------------------------------------------------------------------------------
+
+    def answered(self, held: Held, factor: float, target: Mesh, notes: tuple[str, ...]) -> Pressed:
+        """The state on a mesh that is fine enough, with its stability.
+
+        Raises
+        ------
+        SolveError
+            What touches on a coarse mesh is not found again on a fine one.
+        """
+        way = self.at(factor)
+        held, left = self._left(held, way)
+        notes += left
+        self.last = (factor, held)
+        now = held
+        if held.mesh.order != target.order or self.fixed:
+            now = self._onto(target, held, way, anew=True)
+        smooth, error = np.sqrt(self.accuracy), np.inf
+        for _ in range(LEVELS):
+            marks = self._marked(now, smooth)
+            if not any(marked.any() for marked in marks.values()):
+                finer = self._onto(now.mesh.refined(), now, way)
+                error = largest_difference(now.touched.fields, finer.touched.fields)
+                now = finer
+                if error <= self.accuracy or self._all_fixed:
+                    break
+                smooth *= 0.1
+            elif now.mesh.elements > MOST_ELEMENTS:
+                break
+            else:
+                now = self._onto(now.mesh.refined(marks), now, way)
+        now = self._checked(now, way)
+        stability, more = self._stability(now, way)
+        return Pressed(now, stability, error, (*notes, *more))
+
+    def _checked(self, held: Held, way: Way) -> Held:
+        """The state on its fine mesh with what touches looked at as finely."""
+        self.toucher.limit = self.fine
+        try:
+            if self.toucher.wrong(held, way) is None:
+                return held
+            return self._onto(held.mesh, held, way, anew=True)
+        finally:
+            self.toucher.limit = COARSE
+
+    @property
+    def _all_fixed(self) -> bool:
+        return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
+
+    def _marked(self, held: Held, smooth: float) -> dict[str, Array]:
+        rough, model = roughness(held.touched.fields) > smooth, held.prepared.model
+        return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+    def _onto(self, mesh: Mesh, held: Held, way: Way, *, anew: bool = False) -> Held:
+        """The same contact on another mesh; what touches is looked at again."""
+        if not anew:
+            source = held.prepared.model, held.corrected.state
+            found = self.toucher.settle(mesh, source, way)
+            if isinstance(found, Held) and self.toucher.wrong(found, way) is None:
+                return found
+        there = self.toucher.resolved(replace(mesh, touches=()), held, held.mesh.touches, way)
+        if there is None:
+            raise SolveError(Status.FAILED, f"contact found on a coarse mesh was lost on a finer one: {_told(held)}")
+        return there
+
+    # -- stability ------------------------------------------------------------------------------
+
+    def _stability(self, held: Held, way: Way) -> tuple[Stability, list[str]]:
+        """Stability with what touches held on its obstacles, free to slide along them."""
+        notes: list[str] = []
+        touched, touches = held.touched, held.mesh.touches
+        stability = self._judged(held, way)
+        if touches:
+            notes.append(f"in contact: {_told(held)}; stability is that with these places held on their obstacles")
+        pushes = {touch.name: float(np.linalg.norm(touched.force(touch))) for touch in touches}
+        largest = max([held.prepared.model.scales.force, *pushes.values()])
+        weak = [name for name, push in pushes.items() if push < WEAK * largest]
+        if weak:
+            notes.append(f"touches without force: {', '.join(weak)}")
+        return stability, notes
+
+    def _judged(self, held: Held, way: Way) -> Stability:
+        """Stability on what touches with a force, at places that slide.
+
+        A stretch without pressure may leave its obstacle between its ends: only these hold it.
+        """
+        held = self._pressing(held, way)
+        stability = held.prepared.stability(held.corrected)
+        if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
+            stability = replace(stability, stable=True, negative=0)
+        return stability
+
+    def _pressing(self, held: Held, way: Way) -> Held:
+        """The state with the ends of stretches without pressure in their place; itself where there is none."""
+        touches: list[Touch] = []
+        for touch in held.mesh.touches:
+            if touch.to is None:
+                touches.append(touch)
+                continue
+            pressed = held.touched.pressures(touch, np.linspace(touch.at, touch.to, 9))
+            idle = np.abs(pressed).max() < IDLE * float(np.linalg.norm(held.touched.force(touch)))
+            if idle and all(0.0 < x < 1.0 or held.touched.goes_on(touch, x) for x in touch.places):
+                inner = [x for x in touch.places if 0.0 < x < 1.0]
+                touches += [replace(touch, at=x, to=None, number=touch.number + 50 * i) for i, x in enumerate(inner)]
+            else:
+                touches.append(touch)
+        if [t.to for t in touches] == [t.to for t in held.mesh.touches]:
+            return held
+        source = held.prepared.model, held.corrected.state
+        return self.toucher.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
+
+    def _left(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
+        """An equilibrium in contact left for a stable one along its escape shape, as far as that is found."""
+        if self.scene.analysis.unstable != "leave" or not can_leave(held) or self._judged(held, way).negative <= 0:
+            return held, ()
+        pressing = self._pressing(held, way)
+        prepared, loading = pressing.prepared, pressing.loading
+        touches = pressing.mesh.touches
+        try:
+            stability = prepared.stability(pressing.corrected)
+            corrected, _ = prepared.leave(pressing.corrected.state, stability, loading)
+            there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+            found = self.toucher.resolved(replace(pressing.mesh, touches=()), there, touches, way)
+        except SolveError:
+            found = None
+        if found is None or self._judged(found, way).negative > 0:
+            return held, ("unstable, and no stable equilibrium was found along its escape shape",)
+        return found, ("left an unstable equilibrium in contact along its escape shape",)
+
+    def _freed(self, held: Held, way: Way) -> int:
+        """How many more ways out there are when places of contact may slide along their members.
+
+        With f the force and g the gap, the Lagrangian ``Pi - f g(x, s)`` has the places s among its unknowns;
+        its inertia counted with s eliminated last and first gives the two numbers of ways out.
+        """
+        touched, touches = held.touched, held.mesh.touches
+        free = [(i, k) for i, t in enumerate(touches) for k, x in enumerate(t.places) if 0.0 < x < 1.0]
+        single = [j for j, (i, _) in enumerate(free) if touches[i].to is None]
+        if not single:
+            return 0
+        slopes = self.toucher.slopes(held, way)
+        if slopes is None:
+            return 0
+        own = np.array([touched.gap_curvature(touches[free[j][0]]) for j in single])
+        push = np.array([touched.push(touches[free[j][0]]) for j in single])
+        sharp = np.array([touched.obstacles[touches[free[j][0]].contact].kind == "sharp" for j in single])
+        weight = np.where(sharp, push * own, -push)
+        last = weight[:, None] * slopes[np.ix_(single, single)]
+        first = np.where(sharp, push * own, -push * own)
+        return int((np.linalg.eigvalsh(0.5 * (last + last.T)) < 0.0).sum()) - int((first < 0.0).sum())
+
+
+def _between(a: float, b: float) -> Callable[[float], Way]:
+    return lambda t: Way(lambda model: model.loading(a + t * (b - a)), {})
+
+
+def _told(held: Held) -> str:
+    parts = []
+    for touch in held.mesh.touches:
+        where = f"at {touch.at:.6g}" if touch.to is None else f"from {touch.at:.6g} to {touch.to:.6g}"
+        parts.append(f"{touch.member} on {touch.contact} {where}")
+    return ", ".join(parts)

@@ -1,0 +1,373 @@
+"""What touches what at a state: forces of obstacles, conditions of the places of contact, gaps along members.
+
+A place of contact within a member is an unknown of its own beside the equilibrium with that place held:
+
+* on a plane or a round obstacle the member is tangential to it there;
+* to a point or an edge it is the nearest one;
+* where a stretch begins or ends, the bending moment is the one that the obstacle's shape takes.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .arrays import Array
+from .equations import Equations, State
+from .fields import Fields
+from .loading import Loading
+from .mesh import Touch
+from .model import Model
+from .obstacles import Obstacle, members_of, nearest, obstacle, takes_part
+from .scene import Scene
+
+__all__ = ["COARSE", "Gap", "Touched", "answers", "edge_sides", "obstacles_of"]
+
+COARSE = 1e-6
+"""Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
+
+NOISE = 1e-4
+"""On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
+
+SAMPLES = 12
+"""Places in each element at which gaps are looked at."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A run of places of a member that are inside an obstacle, and the deepest of them.
+
+    Attributes
+    ----------
+    contact, member : str
+    begin, end, at : float
+        Fractions of the length.
+    depth : float
+        m, negative.
+    way : float
+        As in :class:`~sfetcas.mesh.Touch`.
+    """
+
+    contact: str
+    member: str
+    begin: float
+    end: float
+    at: float
+    depth: float
+    way: float = 1.0
+
+
+def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
+    """The obstacles of a model's scene by name."""
+    return {name: obstacle(contact, model.space) for name, contact in model.scene.contacts.items()}
+
+
+def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
+    """Of each edge and member the sign that turns edge times tangent to the allowed side, in the undeformed scene."""
+    found = {}
+    for name, contact in scene.contacts.items():
+        stop = obstacle(contact, scene.resolved_dimension == "space")
+        if stop.side is None:
+            continue
+        for member in members_of(contact, scene.members):
+            line, x = scene.center_lines[member], np.linspace(0.0, 1.0, 257)
+            near = np.argmin(np.linalg.norm((line.positions(x) - stop.place) @ stop.across, axis=1))
+            normal = np.cross(stop.normal, line.tangents(x[near : near + 1])[0])
+            found[name, member] = 1.0 if normal @ stop.side >= 0.0 else -1.0
+    return found
+
+
+class Touched:
+    """Contact at one state of a model."""
+
+    def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
+        self._take(Fields(equations, state, loading), state)
+
+    @classmethod
+    def of(cls, fields: Fields) -> Touched:
+        """Contact at the state that fields were made of."""
+        self = cls.__new__(cls)
+        self._take(fields, fields.state)
+        return self
+
+    def _take(self, fields: Fields, state: State) -> None:
+        self.fields, self.model, self._state = fields, fields.model, state
+        self.obstacles = obstacles_of(self.model)
+        names = self.model.row_names
+        self._row = {name: i for i, name in reversed(list(enumerate(names)))}
+
+    # -- forces ---------------------------------------------------------------------------------
+
+    def force(self, touch: Touch) -> Array:
+        """Force (3,) of an obstacle on a member at a place or over a stretch, N."""
+        model = self.model
+        if touch.to is not None:
+            return self._resultant(touch)
+        normal = self.normal(touch, touch.at)
+        force = -self._state.lam[self._row[touch.name]] * normal
+        return np.asarray(force * model.scales.force)
+
+    def _resultant(self, touch: Touch) -> Array:
+        """Force over a stretch by the balance of its forces, N."""
+        before, after = self._beside(touch, touch.at, -1.0), self._beside(touch, float(touch.to or 0.0), 1.0)
+        total = before - after - self._load_between(touch.member, touch.at, float(touch.to or 0.0))
+        stop = self.obstacles[touch.contact]
+        # What holds an end along a plane is not of the plane.
+        return np.asarray(stop.across @ total if stop.kind == "flat" else total)
+
+    def _beside(self, touch: Touch, at: float, way: float) -> Array:
+        """Internal force just outside a stretch, N; inside it where a support or another stretch continues it."""
+        model, record = self.model, self.model.scene.members[touch.member]
+        if 0.0 < at < 1.0:
+            x = np.nextafter(at, at + way)
+            return np.asarray(self.fields.along(touch.member, np.array([x]))["force"][0])
+        node = record.nodes[int(at)]
+        if not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
+            return np.asarray(self.fields.along(touch.member, np.array([at]))["force"][0])
+        beyond = np.array(self.fields.own_force(node))
+        for name, member in model.scene.members.items():
+            if name != touch.member and node in member.nodes and name in model.members:
+                ends = self.fields.along(name, np.array([0.0, 1.0]))["force"]
+                beyond = beyond + ends[0] if member.nodes[0] == node else beyond - ends[1]
+        return way * beyond
+
+    def goes_on(self, touch: Touch, at: float) -> bool:
+        """Whether another stretch of the same obstacle begins where a stretch reaches the end of its member."""
+        node = self.model.scene.members[touch.member].nodes[int(at)]
+        for other in self.model.mesh.touches:
+            if other is not touch and other.contact == touch.contact and other.to is not None:
+                nodes = self.model.scene.members[other.member].nodes
+                if any(x in (0.0, 1.0) and nodes[int(x)] == node for x in other.places):
+                    return True
+        return False
+
+    def _load_between(self, member: str, begin: float, end: float) -> Array:
+        """Distributed load between two places, N."""
+        before = self.fields.load_before(member, np.array([begin, end]))
+        return np.asarray((before[1] - before[0]) * self.model.scales.force)
+
+    def push(self, touch: Touch) -> float:
+        """Force of a touch along the normal, N: below zero the obstacle would have to pull."""
+        return float(self.force(touch) @ self.normal(touch, touch.at))
+
+    def end_pushes(self, touch: Touch) -> list[float]:
+        """Concentrated forces at the inner ends of a stretch along the normals there, N."""
+        found = []
+        for at, way in ((touch.at, -1.0), (float(touch.to or 0.0), 1.0)):
+            if 0.0 < at < 1.0:
+                inside = self.fields.along(touch.member, np.array([at]))["force"][0]
+                jump = way * (inside - self._beside(touch, at, way))
+                found.append(float(jump @ self.normal(touch, at)))
+        return found
+
+    def pressures(self, touch: Touch, x: Array) -> Array:
+        """Forces (n - 1,) of an obstacle between places of a stretch along the normals in their middles, N."""
+        forces = self.fields.along(touch.member, x)["force"]
+        loads = self.fields.load_before(touch.member, x) * self.model.scales.force
+        pushed = -np.diff(forces, axis=0) - np.diff(loads, axis=0)
+        middles = 0.5 * (x[1:] + x[:-1])
+        return np.array([push @ self.normal(touch, at) for push, at in zip(pushed, middles, strict=True)])
+
+    def loose_end(self, touch: Touch) -> int | None:
+        """The end (0 or 1) of a stretch at a member's free end that the obstacle would have to pull or to clamp."""
+        model = self.model
+        for k, at in enumerate(touch.places if touch.to is not None else ()):
+            member = model.scene.members[touch.member]
+            node = member.nodes[int(at)] if at in (0.0, 1.0) else ""
+            alone = sum(node in other.nodes for other in model.scene.members.values()) == 1
+            if not node or not alone or not self.takes_part(touch.contact, node):
+                continue
+            way = 1.0 if k else -1.0
+            pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
+            couple = way * self.fields.own_moment(node) @ axes[0] - pressed[0]
+            inside = self.fields.along(touch.member, np.array([at]))["force"][0]
+            push = (way * inside - self.fields.own_force(node)) @ self.normal(touch, at)
+            held = model.scene.nodes[node].support != "free"
+            if push < -1e-9 * model.scales.force or (abs(couple) > 1e-8 and not held):
+                return k
+        return None
+
+    def normal(self, touch: Touch, at: float) -> Array:
+        """Normal (3,) of an obstacle at a place of a member."""
+        x = np.array([at])
+        place, tangent = self.fields.positions(touch.member, x), self.fields.tangents(touch.member, x)
+        return np.asarray(self.obstacles[touch.contact].normals(place, tangent, touch.way)[0])
+
+    def _tangent(self, touch: Touch, at: float) -> Array:
+        return np.asarray(self.fields.tangents(touch.member, np.array([at]))[0])
+
+    # -- conditions -----------------------------------------------------------------------------
+
+    @functools.cached_property
+    def conditions(self) -> Array:
+        """What has to be zero at each place of contact within a member, dimensionless, in their order."""
+        found = []
+        for touch in self.model.mesh.touches:
+            if touch.to is not None:
+                found += [self._moment_jump(touch, at, way) for at, way in zip(touch.places, (-1.0, 1.0), strict=True)]
+            elif 0.0 < touch.at < 1.0:
+                sharp = self.obstacles[touch.contact].kind == "sharp"
+                out = self._from_edge(touch) if sharp else self.normal(touch, touch.at)
+                found.append(float(out @ self._tangent(touch, touch.at)))
+        return np.array([value for value in found if value is not None])
+
+    def _from_edge(self, touch: Touch) -> Array:
+        """Distance (3,) of a place from an edge, across it, dimensionless."""
+        stop = self.obstacles[touch.contact]
+        out = self.fields.positions(touch.member, np.array([touch.at]))[0] - stop.place
+        if stop.side is not None:
+            out = out + touch.offset * stop.side / np.linalg.norm(stop.side)
+        return np.asarray(out @ stop.across / self.model.scales.length)
+
+    def _moment_jump(self, touch: Touch, at: float, way: float) -> float | None:
+        """Moment just outside a stretch less the one that the obstacle's shape takes; None at a member's end."""
+        if not 0.0 < at < 1.0:
+            return None
+        x = np.array([np.nextafter(at, at + way)])
+        outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0]
+        pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
+        return float(outside @ axes[0] - pressed[0])
+
+    def gap_curvature(self, touch: Touch) -> float:
+        """Second derivative of the gap along the member at a place of contact, 1/m."""
+        x = np.array([touch.at])
+        found = self.fields.along(touch.member, x)
+        normal, tangent = self.normal(touch, touch.at), self._tangent(touch, touch.at)
+        bent = self.fields.bend(touch.member, x, found)[0] @ normal
+        stop = self.obstacles[touch.contact]
+        if stop.kind != "round":
+            return float(bent)
+        along = tangent @ stop.across
+        return float(bent + stop.sign * (along @ along) / stop.radius)
+
+    # -- gaps -----------------------------------------------------------------------------------
+
+    def samples(self, member: str) -> Array:
+        """Fractions at which gaps are looked at: finely between the cuts."""
+        cuts = self.model.mesh.cuts[member]
+        # Towards the ends of an element, where contact begins, the samples are dense.
+        inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / SAMPLES)
+        return np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * inner).ravel(), 1.0)
+
+    def gaps(self, contact: str, member: str, x: Array, offset: float, way: float = 1.0) -> Array:
+        """Gaps (n,) of places of a member, m."""
+        place, tangent = self.fields.positions(member, x), self.fields.tangents(member, x)
+        return self.obstacles[contact].gaps(place, tangent, offset, way)
+
+    def inside(self, offsets: Mapping[str, float], ways: Mapping[tuple[str, str], float], limit: float) -> list[Gap]:
+        """All runs of places that are deeper inside an obstacle than the limit (m), where members are free of it."""
+        found: list[Gap] = []
+        for contact, stop in self.obstacles.items():
+            for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
+                offset = offsets.get(contact, 0.0)
+                if stop.kind == "sharp":
+                    found += self._over_edge(contact, member, offset, ways[contact, member], limit)
+                else:
+                    found += self._runs(contact, member, offset, limit)
+        return found
+
+    def takes_part(self, contact: str, node: str) -> bool:
+        """Whether an obstacle can push a node."""
+        scene = self.model.scene
+        return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
+
+    def _runs(self, contact: str, member: str, offset: float, limit: float) -> list[Gap]:
+        x = self.samples(member)
+        keep = np.ones(len(x), bool)
+        keep[0], keep[-1] = (self.takes_part(contact, node) for node in self.model.scene.members[member].nodes)
+        for touch in self.model.mesh.touches:
+            if touch.contact == contact and touch.member == member and touch.to is not None:
+                keep &= (x < touch.at) | (x > touch.to)
+        gaps = self.gaps(contact, member, x, offset)
+        deep = (gaps < -limit) & keep
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], deep, [False]]).astype(int)))
+        runs = []
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            i = a + int(np.argmin(gaps[a:b]))
+            small = limit >= COARSE * self.model.scene.size and gaps[i] > -NOISE * self.model.scene.size
+            if small and self._wavers(contact, member, float(x[a]), float(x[b - 1])):
+                continue
+            runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
+        return runs
+
+    def _wavers(self, contact: str, member: str, begin: float, end: float) -> bool:
+        """Whether a run is in the element beside a place where curvatures already say that the member leaves.
+
+        At a free end of a member they do not.
+        """
+        scene, cuts = self.model.scene, self.model.mesh.cuts[member]
+        for touch in self.model.mesh.touches:
+            if touch.contact != contact:
+                continue
+            for x in touch.places:
+                place: float | None = x if touch.member == member else None
+                if x in (0.0, 1.0):
+                    node = scene.members[touch.member].nodes[int(x)]
+                    if sum(node in other.nodes for other in scene.members.values()) == 1 and touch.to is None:
+                        continue
+                    nodes = scene.members[member].nodes
+                    place = float(nodes.index(node)) if node in nodes else place
+                if place is None:
+                    continue
+                cut = self.model.mesh.cut_at(member, place)
+                low, high = cuts[max(cut - 1, 0)], cuts[min(cut + 1, len(cuts) - 1)]
+                if low <= begin and end <= high:
+                    return True
+        return False
+
+    def _over_edge(self, contact: str, member: str, offset: float, way: float, limit: float) -> list[Gap]:
+        if any(t.contact == contact and t.member == member for t in self.model.mesh.touches):
+            return []
+        found = []
+        for x in self.passing(contact, member):
+            gap = float(self.gaps(contact, member, np.array([x]), offset, way)[0])
+            near = abs(gap) < 0.2 * self.model.scene.size
+            if gap < -limit and near:
+                found.append(Gap(contact, member, x, x, x, gap, way))
+        return found
+
+    def passing(self, contact: str, member: str) -> list[float]:
+        """Fractions at which a member comes nearest to an edge."""
+        fields = self.fields
+        positions, tangents = (lambda x: fields.positions(member, x)), (lambda x: fields.tangents(member, x))
+        return nearest(self.obstacles[contact], positions, tangents, self.samples(member))
+
+    def smallest_gap(self, contact: str, way: Mapping[tuple[str, str], float]) -> float:
+        """Smallest gap of all members that an obstacle stops, m; infinite where none passes an edge."""
+        found = [np.inf]
+        for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
+            sharp = self.obstacles[contact].kind == "sharp"
+            x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
+            if len(x):
+                gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
+                found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
+        return min(found)
+
+
+def answers(fields: Fields) -> dict[str, dict[str, Any]]:
+    """Of each obstacle the force on what touches it, where, the gap and the member; lists where several touch."""
+    touched, sides = Touched.of(fields), edge_sides(fields.model.scene)
+    found: dict[str, dict[str, Any]] = {}
+    for contact in touched.obstacles:
+        touches = sorted((t for t in fields.model.mesh.touches if t.contact == contact), key=lambda t: t.at)
+        if not touches:
+            gap = touched.smallest_gap(contact, sides)
+            known = gap if np.isfinite(gap) else None
+            found[contact] = {"force": np.zeros(3), "at": None, "gap": known, "member": None}
+            continue
+        entries = [
+            {
+                "force": touched.force(touch),
+                "at": touch.at if touch.to is None else [touch.at, touch.to],
+                "gap": float(touched.gaps(contact, touch.member, np.array([touch.at]), 0.0, touch.way)[0]),
+                "member": touch.member,
+            }
+            for touch in touches
+        ]
+        several = {key: [entry[key] for entry in entries] for key in entries[0]}
+        found[contact] = entries[0] if len(entries) == 1 else several
+    return found

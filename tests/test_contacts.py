@@ -1,0 +1,469 @@
+"""Contact against closed forms, identities, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes import SOFT, made
+
+from sfetcas import SceneError, SolveError, Status, load, solve
+from sfetcas.checks import look_up
+from sfetcas.obstacles import obstacle
+from sfetcas.scene import Contact
+from sfetcas.touches import Touched, edge_sides
+
+FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
+
+
+def above(height, *, length=1.0, contact=None, **more):
+    """A cantilever along x at a height above a floor."""
+    return {
+        "sections": {"s": SOFT},
+        "nodes": {"A": {"position": [0, height], "support": "clamped"}, "B": {"position": [length, height]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "contacts": {"floor": contact or FLOOR},
+        **more,
+    }
+
+
+def weight(value):
+    return {"w": {"type": "distributed", "member": "m", "value": [0, -value]}}
+
+
+def tip(value):
+    return {"F": {"type": "force", "node": "B", "value": [0, -value]}}
+
+
+def between_walls(gap, steps, *, nodes=True, support="hinge"):
+    """A strip buckled between two walls by shortening; a start chooses the upper one."""
+    table = {
+        "sections": {"s": SOFT},
+        "nodes": {"A": {"position": [0, 0], "support": support}, "B": {"position": [1, 0], "support": support}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "contacts": {
+            "upper": {"type": "plane", "point": [0, gap], "normal": [0, -1], "members": "all"},
+            "lower": {"type": "plane", "point": [0, -gap], "normal": [0, 1], "members": "all"},
+        },
+        "motions": {"shorten": {"node": "B", "displacement": [-1, 0]}},
+        "analysis": {"accuracy": 1e-8, "steps": steps},
+    }
+    if nodes:
+        table["nodes"]["M"] = {"position": [0.5, 0], "start": [0.49, 0.09]}
+        table["members"] = {"l": {"nodes": ["A", "M"], "section": "s"}, "r": {"nodes": ["M", "B"], "section": "s"}}
+    return table
+
+
+def turned(table, angle, shift):
+    """The scene turned about z and moved: vectors and places of everything."""
+    c, s = math.cos(angle), math.sin(angle)
+    out = {**table, "nodes": {}, "loads": {}, "contacts": {}}
+
+    def direction(v):
+        return [c * v[0] - s * v[1], s * v[0] + c * v[1]]
+
+    def place(v):
+        return (np.array(direction(v)) + shift).tolist()
+
+    for name, node in table["nodes"].items():
+        out["nodes"][name] = {**node, "position": place(node["position"])}
+    for name, force in table["loads"].items():
+        out["loads"][name] = {**force, "value": direction(force["value"])}
+    for name, contact in table["contacts"].items():
+        keys = {k: place(contact[k]) for k in ("point", "position", "center") if k in contact}
+        ways = {k: direction(contact[k]) for k in ("normal", "side") if isinstance(contact.get(k), list)}
+        out["contacts"][name] = {**contact, **keys, **ways}
+    return out
+
+
+def balance(step):
+    """Sum of all forces of supports and obstacles, N."""
+    total = np.zeros(3)
+    for name, node in step.model.scene.nodes.items():
+        if node.support != "free":
+            total += step.reaction(name)[0]
+    for entry in step.contacts.values():
+        total += np.atleast_2d(entry["force"]).sum(axis=0)
+    return total
+
+
+def smallest_gap(step):
+    """Smallest gap at very many places of all members, m."""
+    touched, found = Touched.of(step.fields), []
+    for name, contact in step.model.scene.contacts.items():
+        if obstacle(contact, step.model.space).kind == "sharp":
+            found.append(touched.smallest_gap(name, edge_sides(step.model.scene)))
+            continue
+        for member in step.model.members if contact.members == "all" else [contact.member]:
+            found.append(touched.gaps(name, member, np.linspace(0.0, 1.0, 5003), 0.0).min())
+    return min(found)
+
+
+# -- closed forms ---------------------------------------------------------------------------------------
+
+
+def test_small_deflection_force_of_a_propped_cantilever():
+    """Below the limit of small deflections: delta = F L^3/(3 EI) is stopped at the gap, the rest is the floor's."""
+    gap, force = 1e-5, 1e-4
+    step = solve(made(above(gap, loads=tip(force), analysis={"accuracy": 1e-9}))).last
+    taken = 3.0 * SOFT["EI3"] * gap
+    # Second order in the slope 1.5e-5.
+    assert step.contacts["floor"]["force"][1] == pytest.approx(force - taken, rel=1e-8)
+    assert step.contacts["floor"]["at"] == 1.0
+
+
+def test_small_deflection_of_a_heavy_propped_cantilever():
+    """3/8 of the weight less what the gap takes."""
+    gap, w = 5e-5, 1e-3
+    step = solve(made(above(gap, loads=weight(w), analysis={"accuracy": 1e-9}))).last
+    assert step.contacts["floor"]["force"][1] == pytest.approx(0.375 * w - 3.0 * gap, rel=1e-6)
+
+
+def test_heavy_strip_lifted_from_a_floor_by_a_small_height():
+    """Lifted length (24 EI h/w)^(1/4), concentrated force w l/2, for slopes that vanish."""
+    height, w = 1e-5, 1.0
+    table = above(0.0, length=2.0, loads=weight(w), motions={"lift": {"node": "B", "displacement": [0, height]}})
+    table["nodes"] = {"A": {"position": [0, 0]}, "B": {"position": [2, 0], "support": "hinge"}}
+    table["analysis"] = {"accuracy": 1e-10}
+    step = solve(made(table)).last
+    lifted = (24.0 * SOFT["EI3"] * height / w) ** 0.25
+    begin, end = step.contacts["floor"]["at"]
+    assert begin == 0.0
+    # Slopes of 1e-4 change nothing in these digits.
+    assert 2.0 * (1.0 - end) == pytest.approx(lifted, rel=1e-6)
+    assert step.reaction("B")[0][1] == pytest.approx(0.5 * w * lifted, rel=1e-5)
+
+
+@pytest.mark.parametrize("moment", [0.3, 1.2, 3.0])
+def test_end_lifted_from_a_floor_by_a_moment(moment):
+    """M = w l^2/2 where the strip begins to rise; exact for any slope that the weight's lever does not see."""
+    w = 4000.0
+    table = above(0.0, loads=weight(w) | {"M": {"type": "moment", "node": "B", "value": moment}})
+    table["analysis"] = {"accuracy": 1e-9}
+    step = solve(made(table)).last
+    begin, end = step.contacts["floor"]["at"]
+    assert begin == 0.0
+    lifted = math.sqrt(2.0 * moment / w)
+    # The lever is x, not s: second order in the slope M l/3 EI, at most 0.04.
+    assert 1.0 - end == pytest.approx(lifted, rel=1e-3)
+
+
+def test_wrapping_a_drum_takes_the_curvature_of_the_drum():
+    """Along the stretch the moment is EI/R and the force inside turns with it: the capstan without friction."""
+    scene = load("problems/drum_cantilever_tip_force.toml")
+    step = solve(scene).last
+    begin, end = step.contacts["drum"]["at"]
+    x = np.linspace(begin, end, 9)[1:-1]
+    found = step.along("beam", x)
+    np.testing.assert_allclose(found["moment"][:, 2], -1.0 / 0.6, rtol=1e-12)
+    # Frictionless: the pull along the stretch is the same everywhere.
+    pull = np.linalg.norm(found["force"], axis=1)
+    np.testing.assert_allclose(pull, pull[0], rtol=1e-9)
+    # The stretch is the arc between the places where it begins and ends.
+    places = step.along("beam", [begin, end])["position"][:, :2] - [0.5, -0.6]
+    angles = np.arctan2(places[:, 1], places[:, 0])
+    assert angles[0] - angles[1] == pytest.approx(2.0 * (end - begin) / 0.6, rel=1e-8)
+    np.testing.assert_allclose(np.hypot(*places.T), 0.6, atol=1e-9)
+
+
+def test_edge_pushes_across_the_member():
+    scene = load("problems/knife_edge_half_beam.toml")
+    for step in solve(scene).steps:
+        entry = step.contacts["edge"]
+        at = entry["at"]
+        angle = step.along("half", [at])["angle"][0]
+        across = entry["force"] @ [-math.sin(angle), math.cos(angle), 0.0]
+        assert across == pytest.approx(float(np.linalg.norm(entry["force"])), rel=1e-9)
+        np.testing.assert_allclose(step.along("half", [at])["position"][0], [1.0, 0.0, 0.0], atol=1e-9)
+
+
+# -- identities -----------------------------------------------------------------------------------------
+
+CASES = {
+    "tip": above(0.2, loads=weight(3.0), analysis={"accuracy": 1e-8}),
+    "stretch": above(0.2, loads=weight(30.0), analysis={"accuracy": 1e-8}),
+    "drum": above(
+        0.0,
+        length=2.0,
+        contact={"type": "circle", "center": [0.5, -0.7], "radius": 0.6, "member": "m"},
+        loads=tip(1.2),
+        analysis={"accuracy": 1e-8},
+    ),
+    "wrapped": above(
+        0.0,
+        length=2.0,
+        contact={"type": "circle", "center": [0.5, -0.6], "radius": 0.6, "member": "m"},
+        loads=tip(6.0),
+        analysis={"accuracy": 1e-8},
+    ),
+    "edge": above(
+        0.0,
+        length=2.0,
+        contact={"type": "point", "position": [0.5, -0.05], "side": [0, 1], "member": "m"},
+        loads=tip(1.2),
+        analysis={"accuracy": 1e-8},
+    ),
+    "tube": above(
+        0.0,
+        contact={"type": "circle", "center": [0, 1], "radius": 1.5, "side": "inside", "member": "m"},
+        loads=tip(3.0),
+        analysis={"accuracy": 1e-8},
+    ),
+    "upset": above(0.2, loads={"M": {"type": "moment", "node": "B", "value": -1.0}}, analysis={"accuracy": 1e-8}),
+}
+every = pytest.mark.parametrize("name", CASES)
+
+
+def pushes(step):
+    """Forces of all touches along the normals."""
+    touched = Touched.of(step.fields)
+    found = [touched.push(t) for t in step.model.mesh.touches if t.to is None]
+    for touch in step.model.mesh.touches:
+        if touch.to is not None:
+            found += touched.end_pushes(touch)
+    return np.array(found)
+
+
+@every
+def test_forces_balance_push_and_leave_no_place_inside(name):
+    scene = made(CASES[name])
+    step = solve(scene).last
+    applied = sum((np.array(load.vector) for load in scene.loads.values() if load.type != "moment"), np.zeros(3))
+    # Lengths are 1 where loads are distributed.
+    np.testing.assert_allclose(balance(step) + applied, 0.0, atol=1e-11 * max(1.0, float(np.linalg.norm(applied))))
+    assert len(pushes(step))
+    assert (pushes(step) > 0.0).all()
+    # A tenth of the accuracy, times the size, is what places may be inside.
+    assert smallest_gap(step) > -1e-9 * scene.size * 1.01
+    assert step.certificate.residual < 1e-11
+    assert step.certificate.stable is True
+
+
+@every
+def test_contact_does_not_depend_on_the_axes(name):
+    if name == "upset":
+        pytest.skip("a moment has no direction in the plane")
+    angle, shift = 2.1, np.array([3.0, -1.0])
+    one, other = solve(made(CASES[name])).last, solve(made(turned(CASES[name], angle, shift))).last
+    a, b = one.contacts["floor"], other.contacts["floor"]
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    # Both are the same discrete problem: rounding, more of it in places of contact.
+    np.testing.assert_allclose(turn @ a["force"][:2], b["force"][:2], atol=1e-9 * max(1.0, np.linalg.norm(a["force"])))
+    np.testing.assert_allclose(a["at"], b["at"], atol=1e-8)
+
+
+@every
+def test_member_may_run_the_other_way(name):
+    one = solve(made(CASES[name])).last
+    table = {**CASES[name], "members": {"m": {"nodes": ["B", "A"], "section": "s"}}}
+    other = solve(made(table)).last
+    a, b = one.contacts["floor"], other.contacts["floor"]
+    np.testing.assert_allclose(a["force"], b["force"], atol=1e-7 * max(1.0, np.linalg.norm(a["force"])))
+    np.testing.assert_allclose(np.sort(1.0 - np.atleast_1d(b["at"])), np.atleast_1d(a["at"]), atol=1e-7)
+    # Two meshes of accuracy 1e-8.
+    np.testing.assert_allclose(one.position("B"), other.position("B"), atol=4e-8)
+
+
+@pytest.mark.parametrize("name", ["stretch", "wrapped", "drum", "edge"])
+def test_answer_does_not_depend_on_the_mesh(name):
+    coarse, fine = (solve(made(CASES[name]), element="SFET6", elements=n).last for n in (12, 17))
+    a, b = coarse.contacts["floor"], fine.contacts["floor"]
+    # Of order 10: elements of a twelfth leave 1e-8.
+    np.testing.assert_allclose(a["at"], b["at"], atol=1e-7)
+    np.testing.assert_allclose(a["force"], b["force"], rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("nodes", [False, True], ids=["one member", "a node at the wall"])
+def test_wall_contact_is_symmetric(nodes):
+    """What a trial with contact at nodes only got wrong."""
+    if not nodes:
+        table = between_walls(0.1, [0.028, 0.04], nodes=False)
+        steps = solve(made(table)).steps
+        for step in steps:
+            ats = np.atleast_1d(next(e["at"] for e in step.contacts.values() if e["at"] is not None))
+            np.testing.assert_allclose(ats, 1.0 - ats[::-1], atol=1e-9)
+            np.testing.assert_allclose(step.reaction("A")[0][1], step.reaction("B")[0][1], rtol=1e-9)
+        return
+    point, stretch = solve(made(between_walls(0.1, [0.028, 0.04]))).steps
+    np.testing.assert_allclose(point.reaction("A")[0][1], point.reaction("B")[0][1], rtol=1e-9)
+    (right, left), forces = stretch.contacts["upper"]["at"], stretch.contacts["upper"]["force"]
+    np.testing.assert_allclose(left[0], 1.0 - right[1], atol=1e-9)
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
+    np.testing.assert_allclose(balance(stretch), 0.0, atol=1e-10)
+
+
+def test_flat_stretch_that_buckles_is_left():
+    """P l^2 > 4 pi^2 EI of the flat part: it leaves the wall in its middle, and two places stay."""
+    before, after = solve(made(between_walls(0.1, [0.06, 0.08]))).steps
+    assert all(isinstance(at, list) for at in before.contacts["upper"]["at"])
+    assert before.certificate.stable is True
+    assert all(isinstance(at, float) for at in after.contacts["upper"]["at"])
+    assert any("left an unstable equilibrium" in note for note in after.notes)
+    assert after.certificate.stable is True
+
+
+def test_loads_may_come_and_go():
+    """The state at a factor does not depend on what touched before: nothing is dissipated."""
+    table = above(0.2, loads=weight(1.0), analysis={"accuracy": 1e-8, "steps": [6.0, 30.0, 6.0, 1.0]})
+    up, _, down, off = solve(made(table)).steps
+    assert up.contacts["floor"]["at"] == down.contacts["floor"]["at"] == 1.0
+    np.testing.assert_allclose(up.contacts["floor"]["force"], down.contacts["floor"]["force"], atol=1e-7)
+    assert off.contacts["floor"]["at"] is None
+    assert off.contacts["floor"]["gap"] == pytest.approx(off.position("B")[1], abs=1e-9)
+
+
+def test_obstacle_out_of_reach_changes_nothing():
+    free = above(0.2, loads=weight(1.0), analysis={"accuracy": 1e-8})
+    del free["contacts"]
+    one, other = solve(made(above(0.2, loads=weight(1.0), analysis={"accuracy": 1e-8}))).last, solve(made(free)).last
+    np.testing.assert_array_equal(one.position("B"), other.position("B"))
+    assert "contacts" not in other.to_dict()
+    assert one.to_dict()["contacts"]["floor"]["at"] is None
+
+
+# -- space ----------------------------------------------------------------------------------------------
+
+
+def rotation():
+    axis, angle = np.array([1.0, 2.0, 3.0]) / math.sqrt(14.0), 0.9
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * k @ k
+
+
+def in_space(table, contact):
+    """A plane scene turned into space, with an obstacle given in the axes of the plane."""
+    turn = rotation()
+
+    def d(v):
+        return (turn @ np.pad(np.array(v, dtype=float), (0, 3 - len(v)))).tolist()
+
+    nodes = {n: {**node, "position": d(node["position"])} for n, node in table["nodes"].items()}
+    loads = {n: {**each, "value": d(each["value"])} for n, each in table["loads"].items()}
+    keys = ("point", "center", "normal", "axis", "direction", "side")
+    moved = {k: d(v) if k in keys and isinstance(v, list) else v for k, v in contact.items()}
+    member = {**table["members"]["m"], "b2": d([0, 1, 0])}
+    return {**table, "nodes": nodes, "loads": loads, "members": {"m": member}, "contacts": {"floor": moved}}
+
+
+ROUND = {"center": [0.5, -0.7, 0], "radius": 0.6, "member": "m"}
+
+
+@pytest.mark.parametrize(
+    ("name", "contact"),
+    [
+        ("tip", FLOOR),
+        ("stretch", FLOOR),
+        ("drum", {"type": "cylinder", "axis": [0, 0, 1], **ROUND}),
+        ("drum", {"type": "sphere", **ROUND}),
+        ("edge", {"type": "line", "point": [0.5, -0.05, 0], "direction": [0, 0, 1], "side": [0, 1, 0], "member": "m"}),
+    ],
+    ids=["tip on a plane", "stretch on a plane", "cylinder", "sphere", "line"],
+)
+def test_space_agrees_with_the_plane(name, contact):
+    flat, step = solve(made(CASES[name])).last, solve(made(in_space(CASES[name], contact))).last
+    a, b = flat.contacts["floor"], step.contacts["floor"]
+    # Two ways to interpolate rotations, both to 1e-8.
+    np.testing.assert_allclose(rotation().T @ b["force"], a["force"], atol=1e-6 * np.linalg.norm(a["force"]))
+    np.testing.assert_allclose(b["at"], a["at"], atol=1e-6)
+    np.testing.assert_allclose(rotation().T @ step.position("B"), flat.position("B"), atol=1e-7)
+
+
+def test_stretch_on_a_floor_bent_sideways_balances_and_does_not_depend_on_the_mesh():
+    """A side force bends the part that lies on the floor within the floor: no closed form, but identities."""
+    table = above(0.2, loads=weight(30.0) | {"S": {"type": "force", "node": "B", "value": [0, 0, 2.0]}})
+    table["sections"] = {"s": {"EI2": 1.4, "EI3": 1.0, "GJ": 0.8}}
+    table["analysis"] = {"accuracy": 1e-8}
+    one = solve(made(table)).last
+    two = solve(made(table), element="SFET6", elements=14).last
+    begin, end = one.contacts["floor"]["at"]
+    assert end == 1.0
+    assert abs(one.position("B")[2]) > 0.3
+    np.testing.assert_allclose(balance(one), [0, 30, -2], atol=1e-9)
+    heights = one.along("m", np.linspace(begin, 1.0, 50))["position"][:, 1]
+    np.testing.assert_allclose(heights, 0.0, atol=1e-8)
+    assert two.contacts["floor"]["at"][0] == pytest.approx(begin, abs=1e-5)
+    np.testing.assert_allclose(two.contacts["floor"]["force"], one.contacts["floor"]["force"], atol=1e-5)
+
+
+def test_line_pushes_across_itself_and_the_member():
+    edge = {"type": "line", "point": [0.5, -0.05, 0], "direction": [0.5, 0, 1], "side": [0, 1, 0], "member": "m"}
+    step = solve(made({**CASES["edge"], "dimension": "space", "contacts": {"floor": edge}})).last
+    entry = step.contacts["floor"]
+    at, force = entry["at"], entry["force"] / np.linalg.norm(entry["force"])
+    assert force @ np.array([0.5, 0, 1]) == pytest.approx(0.0, abs=1e-10)
+    x = np.array([at])
+    assert force @ step.fields.tangents("m", x)[0] == pytest.approx(0.0, abs=1e-10)
+    out = step.along("m", x)["position"][0] - [0.5, -0.05, 0]
+    np.testing.assert_allclose(np.cross(out, [0.5, 0, 1]), 0.0, atol=1e-10)
+
+
+# -- answers and refusals -------------------------------------------------------------------------------
+
+
+def test_answer_by_name():
+    step = solve(made(CASES["tip"])).last
+    entry = step.to_dict()["contacts"]["floor"]
+    assert entry["member"] == "m"
+    assert entry["at"] == 1.0
+    assert look_up(step, "contacts.floor.gap") == pytest.approx(0.0, abs=1e-12)
+    assert look_up(step, "contacts.floor.force")[1] == entry["force"][1]
+
+
+@pytest.mark.parametrize(
+    ("contact", "message"),
+    [
+        ({"type": "plane", "point": [0, 0.3], "normal": [0, 1], "member": "m"}, "member 'm' starts inside, by 0.1 m"),
+        ({"type": "circle", "center": [0.5, 0], "radius": 0.3, "member": "m"}, "member 'm' starts inside, by 0.1 m"),
+        (
+            {"type": "circle", "center": [0.5, 0.2], "radius": 0.3, "side": "inside", "member": "m"},
+            "member 'm' starts inside, by 0.2 m",
+        ),
+        ({"type": "point", "position": [0.5, 0.3], "side": [0, 1], "member": "m"}, "member 'm' starts inside"),
+        ({"type": "point", "position": [0.5, 0.1], "side": [1, 0], "member": "m"}, "member 'm' passes along the key"),
+        ({"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "q"}, "member: found 'q', accepted: m"),
+        ({"type": "plane", "point": [0, 0], "normal": [0, 1]}, "accepted: either member or members"),
+        ({"type": "plane", "point": [0, 0], "member": "m"}, "the key 'normal' is missing"),
+        ({"type": "circle", "center": [0, 0], "radius": 0.1, "normal": [0, 1], "member": "m"}, "normal: not accepted"),
+        ({"type": "circle", "center": [0, -1], "radius": 0.1, "side": [0, 1], "member": "m"}, "side: found"),
+        ({"type": "circle", "center": [0, -1], "radius": -0.1, "member": "m"}, "radius: found -0.1"),
+        ({"type": "plane", "point": [0, 0], "normal": [0, 0], "member": "m"}, "normal: found"),
+        ({"type": "wall", "point": [0, 0], "member": "m"}, "type: found 'wall', accepted"),
+    ],
+)
+def test_wrong_contacts_are_refused(contact, message):
+    with pytest.raises(SceneError, match=r"^contacts\.floor") as found:
+        made(above(0.2, contact=contact, loads=weight(1.0)))
+    assert message in str(found.value)
+
+
+def test_point_in_space_and_rigid_member_are_refused():
+    point = {"type": "point", "position": [0.5, 0], "side": [0, 1], "member": "m"}
+    with pytest.raises(SceneError, match="found a point, accepted in space: a line"):
+        made(above(0.2, contact=point, loads=weight(1.0), dimension="space"))
+    table = above(0.2, loads=tip(1.0))
+    table["members"]["m"]["type"] = "rigid"
+    with pytest.raises(SceneError, match="found the rigid member 'm', accepted: flexible members"):
+        made(table)
+
+
+def test_contact_that_cannot_be_satisfied():
+    """A clamped end driven into a floor takes its member along."""
+    table = above(0.2, motions={"down": {"node": "A", "displacement": [0, -0.5]}})
+    table["nodes"]["A"]["position"], table["nodes"]["B"]["position"] = [0, 0.2], [0, 1.2]
+    table["nodes"]["B"]["support"] = "clamped"
+    with pytest.raises(SolveError) as found:
+        solve(made(table))
+    assert found.value.status in (Status.FAILED, Status.INFEASIBLE)
+
+
+def test_stretch_on_a_cylinder_in_space_is_refused():
+    contact = {"type": "cylinder", "axis": [0, 0, 1], **ROUND, "center": [0.5, -0.6, 0]}
+    with pytest.raises(SolveError, match="found a stretch on a cylinder in space, accepted: stretches on planes"):
+        solve(made(in_space(CASES["wrapped"], contact)))
+
+
+def test_plane_may_be_given_by_its_other_normal():
+    one = obstacle(Contact(type="plane", point=[0, 0], normal=[0, -2], side=[0, 1], member="m"), False)
+    np.testing.assert_allclose(one.normal, [0, 1, 0])
+    other = obstacle(Contact(type="line", point=[0, 0], direction=[3, 0], side=[0, 1], member="m"), False)
+    assert other.kind == "flat"
+    np.testing.assert_allclose(other.normal, [0, 1, 0])
