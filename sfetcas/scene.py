@@ -414,6 +414,12 @@ def _check_supports(scene: Scene) -> None:
 
 def _check_contacts(scene: Scene) -> None:
     space = scene.resolved_dimension == "space"
+    if scene.contacts and scene.analysis.type == "path":
+        message = "found 'path' with contacts, accepted: 'static' with steps of a motion, which pass limit loads too"
+        raise SceneError(message, ("analysis", "type"))
+    if scene.contacts and scene.analysis.equilibria == "all":
+        message = "found 'all' with contacts, accepted: 'one'; a node's 'start' chooses among several"
+        raise SceneError(message, ("analysis", "equilibria"))
     for name, contact in scene.contacts.items():
         _known(contact.member, scene.members, "members", "contacts", name, "member")
         for member in contact.members if isinstance(contact.members, tuple) else ():

@@ -467,3 +467,15 @@ def test_plane_may_be_given_by_its_other_normal():
     other = obstacle(Contact(type="line", point=[0, 0], direction=[3, 0], side=[0, 1], member="m"), False)
     assert other.kind == "flat"
     np.testing.assert_allclose(other.normal, [0, 1, 0])
+
+
+@pytest.mark.parametrize(
+    ("analysis", "sentence"),
+    [
+        ({"type": "path", "range": [0, 1]}, r"^analysis\.type: found 'path' with contacts"),
+        ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with contacts"),
+    ],
+)
+def test_searches_that_know_no_contact_are_refused(analysis, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        made(above(0.2, loads=weight(3), analysis=analysis))
