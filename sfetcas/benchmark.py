@@ -1,17 +1,21 @@
-"""Accuracy and speed measured: ``python -m sfetcas.benchmark [order] [loads] [size] [repeated] [start]``.
+"""Accuracy and speed measured: ``python -m sfetcas.benchmark [order] [loads] [size] [repeated] [net] [path] [start]``.
 
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
-the 45-degree bend under 300 and 600; S3, S3b a roll-up of 1 and 5 turns; S4 a beam on hinge and slider.
+the 45-degree bend under 300 and 600; S3, S3b a roll-up of 1 and 5 turns; S4 a beam on hinge and slider; Lee's frame and
+the arch of 215 degrees for paths.  A net of wavy strips has as many members as wanted.
 """
 
 from __future__ import annotations
 
+import math
+import multiprocessing
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,11 +24,12 @@ from .equations import Equations
 from .errors import SolveError
 from .mesh import uniform_mesh
 from .model import assemble
+from .paths import follow_path
 from .prepared import Prepared
-from .scene import Load, Member, Node, Scene
+from .scene import Analysis, Load, Member, Node, Scene
 from .sections import CrossSection
 from .shapes import Arc
-from .statics import solve, solve_model
+from .statics import Settings, solve, solve_model
 
 __all__ = ["main"]
 
@@ -32,6 +37,9 @@ T = TypeVar("T")
 
 TIP = np.array([0.445004402246249, 0.810609024880296])
 """Tip of the cantilever under F L^2/EI = 10, elliptic integrals."""
+
+NETS = (100, 300, 1000, 2000)
+"""Members of the nets, at least."""
 
 
 def cantilever(force: list[float], dimension: str = "plane") -> Scene:
@@ -75,6 +83,67 @@ def on_slider() -> Scene:
     }
     force = Load(type="force", node="middle", value=[0, -5])
     return cantilever([0.0, 1.0]).replace(nodes=nodes, members=members, loads={"middle": force})
+
+
+def lee_frame() -> Scene:
+    """The frame of Lee, Manuel and Rossow: it snaps through at 1.856."""
+    nodes = {
+        "foot": Node(position=[0, 0], support="hinge"),
+        "corner": Node(position=[0, 120]),
+        "load": Node(position=[24, 120]),
+        "end": Node(position=[120, 120], support="hinge"),
+    }
+    pairs = {"column": ("foot", "corner"), "short": ("corner", "load"), "long": ("load", "end")}
+    return Scene(
+        sections={"strip": CrossSection(EI3=1440.0)},
+        nodes=nodes,
+        members={name: Member(nodes=pair, section="strip") for name, pair in pairs.items()},
+        loads={"load": Load(type="force", node="load", value=[0, -1])},
+    )
+
+
+def arch() -> Scene:
+    """The arch of DaDeppo and Schmidt, 215 degrees, hinged and clamped; it snaps through at 897."""
+    half = math.radians(107.5)
+    x, y = 100.0 * math.sin(half), 100.0 * math.cos(half)
+    nodes = {
+        "left": Node(position=[-x, y], support="hinge"),
+        "load": Node(position=[0, 100]),
+        "right": Node(position=[x, y], support="clamped"),
+    }
+    pairs = {"first": ("left", "load"), "second": ("load", "right")}
+    return Scene(
+        sections={"strip": CrossSection(EI3=1e6)},
+        nodes=nodes,
+        members={name: Member(nodes=pair, section="strip", shape=Arc(angle=-half)) for name, pair in pairs.items()},
+        loads={"load": Load(type="force", node="load", value=[0, -1])},
+    )
+
+
+def woven(members: int) -> Scene:
+    """A net of at least so many wavy strips welded at their crossings, its lowest row clamped, its highest one pulled.
+
+    Squares of 0.1 m; the strips are arcs of 0.8 rad that bulge to either side in turn, so that the net can stretch.
+    Columns c and rows r of squares have r (c + 1) upright strips and r c level ones.
+    """
+    columns = max(1, round((math.sqrt(8 * members + 1) - 1) / 4))
+    rows = math.ceil(members / (2 * columns + 1))
+    nodes, strips, loads = {}, {}, {}
+    for j in range(rows + 1):
+        for i in range(columns + 1):
+            here, bulge = f"{i} {j}", 0.8 * (-1) ** (i + j)
+            nodes[here] = Node(position=[0.1 * i, 0.1 * j], support="free" if j else "clamped")
+            if j < rows:
+                strips[f"up {here}"] = _wavy(here, f"{i} {j + 1}", -bulge)
+            if j > 0 and i < columns:
+                strips[f"right {here}"] = _wavy(here, f"{i + 1} {j}", bulge)
+            if j == rows:
+                loads[here] = Load(type="force", node=here, value=[0.3, 0.6])
+    return Scene(sections={"strip": CrossSection(EI3=0.01)}, nodes=nodes, members=strips, loads=loads)
+
+
+def _wavy(first: str, second: str, angle: float) -> Member:
+    return Member(nodes=[first, second], section="strip", shape=Arc(angle=angle))
 
 
 def _median(call: Callable[[], T], runs: int) -> tuple[float, T]:
@@ -174,6 +243,49 @@ def repeated() -> None:
             print(f"{kernels:>12} {name:>9} {error:8.1e} {1e3 * first:8.1f} {1e3 * cold:8.2f} {1e3 * warm:8.2f}")
 
 
+def net() -> None:
+    """Nets of many members at the default accuracy, each in a process of its own."""
+    print("Nets: members, elements, unknowns; seconds of the scene, of the models, of the solve, of all; memory\n")
+    context = multiprocessing.get_context("spawn")
+    for members in NETS:
+        with context.Pool(1) as pool:
+            print(pool.apply(_net, (members,)))
+
+
+def _net(members: int) -> str:
+    begin = time.perf_counter()
+    scene = woven(members)
+    made = time.perf_counter() - begin
+    solution = solve(scene)
+    total, seconds, model = time.perf_counter() - begin, solution.seconds, solution.last.model
+    sizes = f"{len(scene.members):6d} {model.mesh.elements:7d} {model.unknowns:8d}"
+    times = f"{made:8.2f} {seconds['model']:8.2f} {seconds['solve']:8.2f} {total:8.2f} s"
+    return f"{sizes} {times} {1e6 * total / model.unknowns:8.0f} us an unknown {_peak():>9}"
+
+
+def _peak() -> str:
+    """Largest memory of this process so far; Linux counts it for the program alone, without what started it."""
+    status = Path("/proc/self/status")
+    if not status.exists():
+        return "-"
+    kilobytes = next(line.split()[1] for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+    return f"{float(kilobytes) / 1e6:.2f} GB"
+
+
+def path() -> None:
+    """Equilibria along a path against single solves from the undeformed state, both at the default accuracy."""
+    print("Paths: points, limit points, seconds; milliseconds a point and of a single solve; what 100 points cost\n")
+    courses = {"Lee's frame": (lee_frame(), [-1.5, 2.5], 1.0), "215-degree arch": (arch(), [-100.0, 1000.0], 500.0)}
+    for name, (scene, factors, factor) in courses.items():
+        along = scene.replace(analysis=Analysis(type="path", range=factors))
+        seconds, found = _median(lambda along=along: follow_path(along, Settings()), 3)  # type: ignore[misc]
+        single = scene.replace(analysis=Analysis(steps=[factor]))
+        cold, _ = _median(lambda single=single: solve(single), 5)  # type: ignore[misc]
+        count, each = len(found.points), seconds / len(found.points)
+        figures = f"{count:4d} {len(found.limit_points):3d} {seconds:8.3f} s {1e3 * each:8.2f} {1e3 * cold:8.2f} ms"
+        print(f"{name:>16} {figures}   100 points: {100.0 * each / cold:.1f} single solves")
+
+
 def start() -> None:
     """Import, and a whole run of the command line, as processes of their own."""
     for name, command in {"import": ["-c", "import sfetcas"], "command line": ["-m", "sfetcas", "--help"]}.items():
@@ -184,7 +296,8 @@ def start() -> None:
 
 def main(names: list[str]) -> None:
     """Run the benchmarks of these names, all by default."""
-    known = {"order": order, "loads": loads, "size": size, "repeated": repeated, "start": start}
+    known = {"order": order, "loads": loads, "size": size, "repeated": repeated}
+    known |= {"net": net, "path": path, "start": start}
     for name in names or list(known):
         if name not in known:
             raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join(known)}")

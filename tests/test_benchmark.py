@@ -1,0 +1,80 @@
+"""The measurements run and print what they say; times are not judged."""
+
+import re
+
+import pytest
+
+from sfetcas import benchmark
+from sfetcas.checks import check
+from sfetcas.scene import Analysis, Expect
+from sfetcas.statics import solve
+
+
+@pytest.fixture
+def once(monkeypatch):
+    """One timed run instead of the median of several."""
+    median = benchmark._median
+    monkeypatch.setattr(benchmark, "_median", lambda call, runs: median(call, 1))
+
+
+def rows(printed):
+    """Lines of a table below its title."""
+    return [line.split() for line in printed.strip().splitlines()[2:]]
+
+
+def test_benchmark_of_another_name_is_refused():
+    with pytest.raises(SystemExit, match=r"found benchmark 'nets', accepted: .*size, repeated, net, path, start$"):
+        benchmark.main(["nets"])
+
+
+def test_start_is_measured(capsys, once):
+    benchmark.main(["start"])
+    lines = capsys.readouterr().out.strip().splitlines()
+    assert [re.sub(r"[\d.]+", "", line).split() for line in lines] == [["import", "s"], ["command", "line", "s"]]
+
+
+@pytest.mark.parametrize("members", [1, 7, 30, 100])
+def test_net_has_as_many_members_as_asked_for_and_a_row_more_at_most(members):
+    scene = benchmark.woven(members)
+    columns = sum(name.endswith(" 0") for name in scene.nodes) - 1
+    assert members <= len(scene.members) < members + 2 * columns + 1
+    assert len(scene.nodes) == len(scene.members) / (2 * columns + 1) * (columns + 1) + columns + 1
+
+
+def test_net_is_measured_in_a_process_of_its_own(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark, "NETS", (3, 10))
+    benchmark.main(["net"])
+    found = rows(capsys.readouterr().out)
+    assert [int(row[0]) for row in found] == [len(benchmark.woven(n).members) for n in (3, 10)]
+    for row in found:
+        made, model, solving, total = (float(cell) for cell in row[3:7])
+        # printed with two digits
+        assert made + model + solving <= total + 0.02
+        assert int(row[2]) == solve(benchmark.woven(int(row[0]))).last.model.unknowns
+
+
+def test_paths_are_measured(capsys, once):
+    benchmark.main(["path"])
+    for line in capsys.readouterr().out.strip().splitlines()[2:]:
+        _, points, limits, seconds, each, single, hundred = re.match(
+            r"\s+([\w' -]+?)\s+(\d+)\s+(\d+)\s+([\d.]+) s\s+([\d.]+)\s+([\d.]+) ms\s+100 points: ([\d.]+) single", line
+        ).groups()
+        assert int(points) > 40
+        assert int(limits) == 2
+        # printed with two digits or more
+        assert float(each) == pytest.approx(1e3 * float(seconds) / int(points), rel=0.01)
+        assert float(hundred) == pytest.approx(100.0 * float(each) / float(single), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("scene", "factors", "limit"),
+    [(benchmark.lee_frame(), [-1.5, 2.5], 1.8558746454), (benchmark.arch(), [-100, 1000], 897.3089969723)],
+    ids=["lee", "arch"],
+)
+def test_scenes_of_the_paths_are_those_of_the_literature(scene, factors, limit):
+    # a millionth of the factor: far above the accuracy 1e-8 of limit points, far below any other frame's difference
+    expect = Expect(quantity="factor", limit_point=1, value=limit, tolerance=1e-6 * limit, why="a millionth")
+    analysis = Analysis(type="path", range=factors, accuracy=1e-8, points=60)
+    asked = scene.replace(analysis=analysis, expect=[expect])
+    (found,) = check(asked, benchmark.follow_path(asked, benchmark.Settings()))
+    assert found.passed, found
