@@ -414,6 +414,10 @@ def _check_supports(scene: Scene) -> None:
 
 def _check_contacts(scene: Scene) -> None:
     space = scene.resolved_dimension == "space"
+    for name, spring in scene.springs.items():
+        if spring.stop is not None and scene.analysis.type == "path":
+            message = "found a stop on a path, accepted: with analysis.type = 'static' and steps"
+            raise SceneError(message, ("springs", name, "stop"))
     if scene.contacts and scene.analysis.type == "path":
         message = "found 'path' with contacts, accepted: 'static' with steps of a motion, which pass limit loads too"
         raise SceneError(message, ("analysis", "type"))

@@ -196,7 +196,64 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
+    if any(spring.stop is not None for spring in scene.springs.values()):
+        return _stopped(scene, settings)
     return _Run(scene, settings).solution()
+
+
+def _stopped(scene: Scene, settings: Settings) -> Solution:
+    """Equilibria where springs may stand at their stops: each factor by itself, a stop taken or left at a time."""
+    if scene.analysis.equilibria == "all":
+        message = "found 'all' with stops of springs, accepted: 'one'"
+        raise SceneError(message, ("analysis", "equilibria"))
+    steps: list[Equilibrium] = []
+    status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
+    stops: tuple[tuple[str, str], ...] = ()
+    for factor in scene.analysis.steps:
+        found, stops = _at_stops(scene, settings, factor, stops)
+        steps += found.steps
+        status = found.status if status is Status.SOLVED else status
+        seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
+    return Solution(scene, status, tuple(steps), seconds)
+
+
+def _at_stops(
+    scene: Scene, settings: Settings, factor: float, stops: tuple[tuple[str, str], ...]
+) -> tuple[Solution, tuple[tuple[str, str], ...]]:
+    """The answer of one factor, from the stops that the factor before it reached."""
+    alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
+    tried = set()
+    while stops not in tried:
+        tried.add(stops)
+        found = _Run(alone, settings, stops).solution()
+        change = _next_stops(found.last, stops)
+        if change == stops:
+            return found, stops
+        stops = change
+    names = ", ".join(f"springs.{name}" for name, _ in stops)
+    raise SolveError(Status.FAILED, f"no choice of stops holds at factor {factor:g}: {names}")
+
+
+def _next_stops(answer: Equilibrium, stops: tuple[tuple[str, str], ...]) -> tuple[tuple[str, str], ...]:
+    """The stops without the one that pulls most or, where none does, with the one that is passed most."""
+    scene, held = answer.model.scene, dict(stops)
+    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops}
+    if pulls and max(pulls.values()) > 0.0:
+        worst = max(pulls, key=lambda name: pulls[name])
+        return tuple(stop for stop in stops if stop[0] != worst)
+    passed: dict[tuple[str, str], float] = {}
+    for name, spring in scene.springs.items():
+        if spring.stop is not None and name not in held:
+            travel, (low, high) = answer.spring(name).travel, spring.stop
+            passed[name, "low"], passed[name, "high"] = low - travel, travel - high
+    if passed and max(passed.values()) > 0.0:
+        return (*stops, max(passed, key=lambda stop: passed[stop]))
+    return stops
+
+
+def _pull(effort: float, side: str) -> float:
+    """How much a stop holds back instead of pushing back: a high one pushes down, a low one up."""
+    return effort if side == "high" else -effort
 
 
 def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
@@ -219,8 +276,8 @@ class _Found:
 class _Run:
     """One run over the load factors of a scene."""
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
-        self.scene, self.settings = scene, settings
+    def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
+        self.scene, self.settings, self.stops = scene, settings, stops
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
         self.seconds = {"model": 0.0, "solve": 0.0}
@@ -250,11 +307,11 @@ class _Run:
         self.fixed = {n for n, count in counts.items() if count is not None}
         equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
         cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
-        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid)
+        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops)
         if order >= PILOT_ORDER and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
             self.pilot_mesh = self.target
         else:
-            self.pilot_mesh = first_mesh(scene, max(order, PILOT_ORDER), turning=1.0)
+            self.pilot_mesh = replace(first_mesh(scene, max(order, PILOT_ORDER), turning=1.0), stops=self.stops)
 
     @property
     def _prescribed(self) -> bool:
@@ -572,7 +629,7 @@ class _Run:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.target
         if mesh.elements > HUGE:
-            half = Mesh(mesh.order, {n: every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss, mesh.rigid)
+            half = replace(mesh, cuts={n: every_other(c) for n, c in mesh.cuts.items()})
             coarse = self._onto(half, pilot, factor)
             now = self._onto(mesh, coarse, factor)
             # The error falls by 4^p a halving; twice that share for not being there yet.
