@@ -1,5 +1,7 @@
 """Stability against Euler's columns, closed forms and a second route."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import SOFT, ZOO, cantilever, made, model_of
@@ -321,25 +323,43 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
     assert max(counts) > 0
 
 
+def redundant():
+    """Two four-bars of parallel hinges in space, rigid but for one member."""
+    hinge = {"joint": "hinge"}
+    return {
+        "dimension": "space",
+        "sections": {"s": SOFT},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [0, 1]} | hinge,
+            "C": {"position": [1.2, 1.1]} | hinge,
+            "D": {"position": [1.2, 0], "support": "hinge"},
+            "E": {"position": [2.2, 1.0]} | hinge,
+            "F": {"position": [2.2, 0], "support": "hinge"},
+        },
+        "members": {n: {"nodes": list(n), "type": "rigid"} for n in ("BC", "CD", "CE", "EF")}
+        | {"AB": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"f": {"type": "force", "node": "C", "value": [1.0, -0.5]}},
+    }
+
+
+def test_bordered_count_with_redundant_rows():
+    """Rows that depend on others count as rows all the same, at states far from stable too."""
+    prepared = Prepared(model_of(redundant(), 2, 3))
+    rng, counts = np.random.default_rng(5), set()
+    start = prepared.equations.start(prepared.model.loading(0.0))
+    for size in (0.0, 30.0, 100.0, 300.0):
+        lam = size * rng.normal(size=prepared.equations.rows)
+        point = prepared.equations.at(replace(start, lam=lam), prepared.model.loading(1.0))
+        counts.add(count := prepared._test._below_dense(point, -1e-6))
+        assert prepared._test._below_bordered(point, -1e-6) == count
+    assert len(counts) > 1
+
+
 @pytest.mark.parametrize("name", [*SYSTEMS, "four_bar", "hinged_space", "redundant"])
 def test_loose_rows_by_inverse_iteration_are_those_of_all_singular_values(name):
     """Four-bars of parallel hinges in space have rows that depend on others: both ways find as many, and the same."""
-    if name == "redundant":
-        hinge = {"joint": "hinge"}
-        table = {
-            "dimension": "space",
-            "sections": {"s": SOFT},
-            "nodes": {
-                "A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [0, 1]} | hinge,
-                "C": {"position": [1.2, 1.1]} | hinge, "D": {"position": [1.2, 0], "support": "hinge"},
-                "E": {"position": [2.2, 1.0]} | hinge, "F": {"position": [2.2, 0], "support": "hinge"},
-            },
-            "members": {n: {"nodes": list(n), "type": "rigid"} for n in ("BC", "CD", "CE", "EF")}
-            | {"AB": {"nodes": ["A", "B"], "section": "s"}},
-            "loads": {"f": {"type": "force", "node": "C", "value": [1.0, -0.5]}},
-        }  # fmt: skip
-    else:
-        table = EVERY[name]()
+    table = redundant() if name == "redundant" else EVERY[name]()
     equations = Equations(model_of(table, 2, 3))
     state = equations.start(equations.model.loading(0.0))
     point = equations.at(state, equations.model.loading(1.0))
