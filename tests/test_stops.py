@@ -65,7 +65,9 @@ def test_angle_within_the_stops_and_stops_only_push(force):
 def test_stop_along_a_direction_takes_what_the_tip_cannot():
     table = lever([1.0, 8.0])
     table["nodes"]["A"]["support"] = "clamped"
-    table["springs"] = {"k": {"type": "translational", "node": "B", "stiffness": 0.0, "direction": [0, 1], "stop": [0, 0.1]}}
+    table["springs"] = {
+        "k": {"type": "translational", "node": "B", "stiffness": 0.0, "direction": [0, 1], "stop": [0, 0.1]}
+    }
     small, large = solve(made(table)).steps
     for step in (small, large):
         assert step.position("B")[1] == pytest.approx(0.1, abs=1e-12)

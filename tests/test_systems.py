@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from scenes import SOFT, cantilever, gauss_points, made, model_of, three
+from scenes import SOFT, UNLIKE, arc_across, cantilever, gauss_points, made, model_of, three
 from systems import EVERY, EVERYTHING, PLANE_SYSTEMS, SYSTEMS, linked, linked_space, sliding_plane, sliding_space
 
 import sfetcas
@@ -390,6 +390,31 @@ def test_universal_support_and_joint_keep_their_axes_normal():
     assert np.linalg.norm(moment) > 1e-3
     assert moment @ a == pytest.approx(0.0, abs=1e-10)
     assert moment @ b == pytest.approx(0.0, abs=1e-10)
+
+
+def test_universal_support_of_a_flexible_member():
+    """Its moment is normal to the axis in the ground and to the one that the member carries; a ball holds the rest."""
+    table = {
+        "sections": {"s": UNLIKE},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "universal", "axis": [0, 0.2, 1], "axis2": [0, 1, -0.2]},
+            "B": {"position": [1, 0.4, 0.3], "support": "ball"},
+        },
+        "members": {
+            "m": {"nodes": ["A", "B"], "section": "s", "shape": arc_across([0] * 3, [1, 0.4, 0.3], 1.2, [0, 0, 1])}
+        },
+        "loads": {"f": {"type": "force", "member": "m", "at": 0.4, "value": [0.5, -1.0, 4.0]}},
+    }
+    step = answer(table)
+    (force, moment), node = step.reaction("A"), step.model.scene.nodes["A"]
+    a, b = np.asarray(node.axis), quat.rotate(step.quaternion("A"), np.asarray(node.axis2))
+    assert a @ b == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(moment) > 1e-2
+    assert moment @ a == pytest.approx(0.0, abs=1e-10)
+    assert moment @ b == pytest.approx(0.0, abs=1e-10)
+    start = step.along("m", 0.0)
+    np.testing.assert_allclose(start["moment"][0] + moment, 0.0, atol=1e-10)
+    np.testing.assert_allclose(start["force"][0] + force, 0.0, atol=1e-10)
 
 
 def test_cylindrical_support_holds_neither_along_nor_about_its_line():
