@@ -637,7 +637,9 @@ def _sketch_contact(sketch: _Sketch, name: str, stop: Obstacle, largest: float) 
         along = np.cross([0.0, 0.0, 1.0], stop.normal)
         outline = foot + np.linspace(-reach, reach, 41)[:, None] * along
     elif stop.kind == "round":
-        outline = np.pad(_circle(stop.radius, (stop.place[0], stop.place[1])), ((0, 0), (0, 1))) / unit
+        angle = np.linspace(0.0, 2.0 * math.pi, 181)
+        turns = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        outline = (stop.place + stop.radius * turns) / unit
     else:
         outline = stop.place[None, :] / unit
     if not sketch.step.model.space:

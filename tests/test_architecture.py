@@ -57,6 +57,8 @@ ORDER = [
     "open_problem",
     "fields",
     "touches",
+    "settling",
+    "revising",
     "touching",
     "solution",
     "accuracy",
