@@ -15,7 +15,7 @@ from .mesh import Mesh, Touch
 from .obstacles import members_of, nearest, obstacle, takes_part
 from .prepared import Prepared
 from .scene import Scene
-from .settling import Held, Way
+from .settling import Held, Way, placed
 from .stability import Stability
 from .touches import COARSE, Touched, edge_sides, obstacles_of
 from .touching import Toucher, can_leave
@@ -184,7 +184,7 @@ class ContactRun:
         self.last = (factor, held)
         now = held
         if held.mesh.order != target.order or self.fixed:
-            now = self._onto(target, held, way, anew=True)
+            now = self._onto(placed(self.scene, target, held.mesh.touches), held, way)
         smooth, error = np.sqrt(self.accuracy), np.inf
         for _ in range(LEVELS):
             marks = self._marked(now, smooth)
@@ -199,13 +199,13 @@ class ContactRun:
                 break
             else:
                 now = self._onto(now.mesh.refined(marks), now, way)
-        now = self._checked(now, way)
+        now = self._checked(now, way, error)
         stability, more = self._stability(now, way)
         return Pressed(now, stability, error, (*notes, *more))
 
-    def _checked(self, held: Held, way: Way) -> Held:
-        """The state on its fine mesh with what touches looked at as finely."""
-        self.reviser.limit = self.fine
+    def _checked(self, held: Held, way: Way, error: float) -> Held:
+        """The state on its fine mesh with what touches looked at as finely as the error of positions allows."""
+        self.reviser.limit = max(self.fine, error)
         try:
             if self.reviser.wrong(held, way) is None:
                 return held
@@ -222,11 +222,10 @@ class ContactRun:
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
     def _onto(self, mesh: Mesh, held: Held, way: Way, *, anew: bool = False) -> Held:
-        """The same contact on another mesh; what touches is looked at again."""
+        """The same contact on another mesh; ``anew`` with what touches looked at again."""
         if not anew:
-            source = held.prepared.model, held.corrected.state
-            found = self.settler.settle(mesh, source, way)
-            if isinstance(found, Held) and self.reviser.wrong(found, way) is None:
+            found = self.settler.settle(mesh, (held.prepared.model, held.corrected.state), way)
+            if isinstance(found, Held):
                 return found
         there = self.toucher.resolved(replace(mesh, touches=()), held, held.mesh.touches, way)
         if there is None:

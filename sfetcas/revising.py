@@ -11,7 +11,7 @@ from .errors import SolveError, Status
 from .loading import Loading
 from .mesh import SAME, Touch
 from .model import Model
-from .obstacles import members_of, obstacle, takes_part
+from .obstacles import members_of, obstacle, swept, takes_part
 from .scene import Scene
 from .settling import APART, Held, Ran, Way, moved
 from .touches import Gap, obstacles_of
@@ -100,6 +100,20 @@ class Reviser:
                     touch = moved(touch, k, x + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at))
             found.append(touch)
         return tuple(found)
+
+    def ran_over(self, now: Held | None, there: Held) -> bool:
+        """Whether a step takes a member over an obstacle without touching it."""
+        touched = [touch.contact for touch in there.mesh.touches]
+        before = () if now is None else now.mesh.touches
+        for contact, stop in there.touched.obstacles.items():
+            if stop.kind == "flat" or contact in touched or contact in [t.contact for t in before]:
+                continue
+            for member in members_of(self.scene.contacts[contact], self.scene.members):
+                line = self.scene.center_lines[member]
+                begin = line.positions(np.linspace(0.0, 1.0, 65)) if now is None else now.touched.course(member)
+                if swept(stop, begin, there.touched.course(member)):
+                    return True
+        return False
 
     def wrong(self, held: Held, way: Way) -> Touches | None:
         """What has to touch otherwise at this state; None where all is right."""

@@ -33,6 +33,12 @@ APART = 1e-7
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
 
+MOST_STEPS = 40
+"""Steps of places before giving up."""
+
+PATIENCE = 8
+"""Steps in a row in which a place may want beyond its room, before it counts as having got there."""
+
 MOST_TURN = 0.8
 """A step along the way is too long when its corrections turn a node by more, rad."""
 
@@ -169,28 +175,27 @@ class Settler:
         if held is None:
             return None
         slopes: Array | None = None
-        last = np.inf
-        for _ in range(30):
+        last, crowded = np.inf, 0
+        for _ in range(MOST_STEPS):
             free = free_places(held.mesh.touches)
             if not free:
                 return held
             here = held.touched.conditions
+            slopes = self.slopes(held, way) if slopes is None else slopes
             if slopes is None:
-                slopes = self.slopes(held, way)
-                if slopes is None:
-                    return None
+                return None
             step = -np.linalg.lstsq(slopes, here, rcond=1e-14)[0]
             if not np.isfinite(step).all():
                 return None
-            step, blocked = _shortened(held.mesh.touches, free, step)
-            if blocked is not None:
-                i, k, where = blocked
-                return Ran(held.mesh.touches, i, k, where == "collapsed")
+            step, ran, room = _shortened(held.mesh.touches, free, step)
+            crowded = 0 if ran is None else crowded + 1
+            if ran is not None and (room < 10.0 * APART or crowded > PATIENCE):
+                return ran
             if np.abs(step).max() < SETTLED:
                 return replace(held, slopes=slopes)
             there = self._stepped(held, free, step, way)
             if there is None:
-                return None
+                return ran
             change = there.touched.conditions - here
             taken = _places(there.mesh.touches, free) - _places(held.mesh.touches, free)
             slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), 1e-300)
@@ -246,27 +251,20 @@ def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
     return np.array([touches[i].places[k] for i, k in free])
 
 
-def _shortened(
-    touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array
-) -> tuple[Array, tuple[int, int, str] | None]:
-    """The step, shortened so that places keep their order; or the place that has nowhere to go, and why."""
-    factor, blocked = 1.0, None
+def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array) -> tuple[Array, Ran | None, float]:
+    """The step, shortened so that places keep their order; the place that wants beyond what is next to it; its room."""
+    factor, ran, least = 1.0, None, np.inf
     for (i, k), change in zip(free, step, strict=True):
-        touch, x = touches[i], touches[i].places[k]
-        beside = [1.0 if change > 0.0 else 0.0]
-        if touch.to is not None:
-            other = touch.places[1 - k]
-            beside += [other] if (other > x) == (change > 0.0) else []
-        room = min(abs(y - x) for y in beside)
         if abs(change) < SETTLED:
             continue
-        if room < 10.0 * APART:
-            met = (
-                touch.to is not None
-                and room == abs(touch.places[1 - k] - x)
-                and touch.places[1 - k] not in ((1.0,) if change > 0.0 and touch.places[1 - k] == x else ())
-            )
-            return step, (i, k, "collapsed" if met and len(beside) > 1 else "end")
+        touch, x = touches[i], touches[i].places[k]
+        room, collapsed = 1.0 - x if change > 0.0 else x, False
+        # Towards the other place of its stretch, unless that is an end of the member on the same side.
+        if touch.to is not None and (touch.places[1 - k] > x) == (change > 0.0):
+            room, collapsed = abs(touch.places[1 - k] - x), True
+        # Half of the room again and again: a double root at its end, as of a weight that hangs over.
+        if (abs(change) > 0.4 * room or room < 10.0 * APART) and room < least:
+            ran, least = Ran(touches, i, k, collapsed), room
         # Two places of a stretch may both move towards each other.
-        factor = min(factor, 0.45 * room / abs(change)) if abs(change) > 0.45 * room else factor
-    return factor * step, blocked
+        factor = min(factor, 0.45 * room / abs(change))
+    return factor * step, ran, least

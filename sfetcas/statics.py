@@ -398,7 +398,8 @@ class _Run:
             if free is not None:
                 there = self._onto(base, free, factor)
                 held, notes = _as_held(there, factor), there.notes
-                if contact.reviser.wrong(held, contact.at(factor)) is None:
+                free_way = contact.reviser.wrong(held, contact.at(factor)) is None
+                if free_way and not contact.reviser.ran_over(None, held):
                     answer = self._refined(free, factor)
                     if contact.clear(answer.fields):
                         contact.last = (factor, held)

@@ -87,7 +87,7 @@ class Toucher:
                 continue
             wrong = self.reviser.wrong(found, way)
             if wrong is None:
-                return found
+                return None if self.reviser.ran_over(now, found) else found
             touches = wrong
             source = found.prepared.model, found.corrected.state
         return None
