@@ -31,12 +31,12 @@ from .model import Model, assemble
 from .newton import Corrected, loose_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
+from .settling import Held
 from .several import Search, long_elements, missing, same, search
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
 from .touches import Touched
-from .touching import Held
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
 
@@ -548,7 +548,8 @@ class _Run:
             if free is not None:
                 there = self._onto(base, free, factor)
                 held, notes = _as_held(there, factor), there.notes
-                if contact.toucher.wrong(held, contact.at(factor)) is None:
+                free_way = contact.reviser.wrong(held, contact.at(factor)) is None
+                if free_way and not contact.reviser.ran_over(None, held):
                     answer = self._refined(free, factor)
                     if contact.clear(answer.fields):
                         contact.last = (factor, held)

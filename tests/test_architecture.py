@@ -65,6 +65,8 @@ ORDER = [
     "fields",
     "mirrors",
     "touches",
+    "settling",
+    "revising",
     "touching",
     "solution",
     "accuracy",
