@@ -174,7 +174,9 @@ def _finished(
 
 
 @single_threaded
-def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution:
+def solve(
+    scene: Scene, settings: Settings | None = None, *, stops: tuple[tuple[str, str], ...] = (), **changes: Any
+) -> Solution:
     """Equilibria of a scene for the load factors of its analysis.
 
     Parameters
@@ -182,6 +184,8 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     scene : Scene
     settings : Settings, optional
         Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
+    stops : tuple of (str, str)
+        Springs that stand at a stop, ``low`` or ``high``; others pass theirs (see :mod:`~sfetcas.stops`).
 
     Raises
     ------
@@ -196,64 +200,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
-    if any(spring.stop is not None for spring in scene.springs.values()):
-        return _stopped(scene, settings)
-    return _Run(scene, settings).solution()
-
-
-def _stopped(scene: Scene, settings: Settings) -> Solution:
-    """Equilibria where springs may stand at their stops: each factor by itself, a stop taken or left at a time."""
-    if scene.analysis.equilibria == "all":
-        message = "found 'all' with stops of springs, accepted: 'one'"
-        raise SceneError(message, ("analysis", "equilibria"))
-    steps: list[Equilibrium] = []
-    status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
-    stops: tuple[tuple[str, str], ...] = ()
-    for factor in scene.analysis.steps:
-        found, stops = _at_stops(scene, settings, factor, stops)
-        steps += found.steps
-        status = found.status if status is Status.SOLVED else status
-        seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
-    return Solution(scene, status, tuple(steps), seconds)
-
-
-def _at_stops(
-    scene: Scene, settings: Settings, factor: float, stops: tuple[tuple[str, str], ...]
-) -> tuple[Solution, tuple[tuple[str, str], ...]]:
-    """The answer of one factor, from the stops that the factor before it reached."""
-    alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
-    tried = set()
-    while stops not in tried:
-        tried.add(stops)
-        found = _Run(alone, settings, stops).solution()
-        change = _next_stops(found.last, stops)
-        if change == stops:
-            return found, stops
-        stops = change
-    names = ", ".join(f"springs.{name}" for name, _ in stops)
-    raise SolveError(Status.FAILED, f"no choice of stops holds at factor {factor:g}: {names}")
-
-
-def _next_stops(answer: Equilibrium, stops: tuple[tuple[str, str], ...]) -> tuple[tuple[str, str], ...]:
-    """The stops without the one that pulls most or, where none does, with the one that is passed most."""
-    scene, held = answer.model.scene, dict(stops)
-    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops}
-    if pulls and max(pulls.values()) > 0.0:
-        worst = max(pulls, key=lambda name: pulls[name])
-        return tuple(stop for stop in stops if stop[0] != worst)
-    passed: dict[tuple[str, str], float] = {}
-    for name, spring in scene.springs.items():
-        if spring.stop is not None and name not in held:
-            travel, (low, high) = answer.spring(name).travel, spring.stop
-            passed[name, "low"], passed[name, "high"] = low - travel, travel - high
-    if passed and max(passed.values()) > 0.0:
-        return (*stops, max(passed, key=lambda stop: passed[stop]))
-    return stops
-
-
-def _pull(effort: float, side: str) -> float:
-    """How much a stop holds back instead of pushing back: a high one pushes down, a low one up."""
-    return effort if side == "high" else -effort
+    return _Run(scene, settings, stops).solution()
 
 
 def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:

@@ -73,6 +73,7 @@ ORDER = [
     "several",
     "contact_statics",
     "statics",
+    "stops",
     "path",
     "paths",
     "analyses",
