@@ -3,6 +3,7 @@
 import importlib.util
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 FOLDER = Path(__file__).parent.parent / "problems"
@@ -35,3 +36,55 @@ def test_a_wrong_line_is_noticed(monkeypatch):
     monkeypatch.setattr(module, "HEIGHT", module.HEIGHT + 1e-6)
     monkeypatch.setattr(module, "with_slider", lambda: scene)
     assert module.check()["tip against slider"] > module.TOLERANCE
+
+
+def test_a_wrong_angle_of_the_parallelogram_is_noticed(monkeypatch):
+    module = imported(FOLDER / "parallelogram_transmission.py")
+    expected = module.expected
+    monkeypatch.setattr(module, "expected", lambda scene, quantity: expected(scene, quantity) + 1e-5)
+    differences = module.check()
+    wrong = {name for name, difference in differences.items() if difference > module.TOLERANCE}
+    assert wrong == {"flexible links, alpha against shooting", "flexible links, beta against shooting"}
+
+
+def test_output_angle_of_rigid_links_follows_the_input_and_that_of_flexible_ones_does_not():
+    module = imported(FOLDER / "parallelogram_transmission.py")
+    assert module.transmission(module.rigid()).ratio == pytest.approx(1.0, abs=module.TOLERANCE)
+    ratio = module.transmission(module.flexible()).ratio
+    # Slopes of chords lie between those at their ends.
+    alpha, beta = (module.expected(module.flexible(), f"nodes.{node}.angle") for node in "15")
+    chords = np.diff(beta) / np.diff(alpha)
+    assert ((ratio[1:] < chords) & (chords < ratio[:-1])).all()
+    assert ratio.max() < 0.5
+
+
+def test_picture_shows_the_mechanism_at_each_moment_and_both_curves(tmp_path):
+    module = imported(FOLDER / "parallelogram_transmission.py")
+    figure = module.picture()
+    figure.savefig(tmp_path / "transmission.png")
+    assert (tmp_path / "transmission.png").stat().st_size > 10_000
+    shapes, curves = figure.axes
+    # of each member a line, and the hinges
+    assert len(shapes.lines) == (len(module.MOMENTS) + 1) * 5
+    alpha, beta = np.radians(curves.lines[1].get_data())
+    assert np.diff(alpha)[-1] < 0.0 < np.diff(alpha)[0]
+    chosen = module.expected(module.flexible(), "nodes.1.angle")
+    before = alpha.argmax() + 1
+    # Straight between the 50 points of the curve.
+    on_curve = np.interp(chosen, alpha[:before], beta[:before])
+    assert on_curve == pytest.approx(module.expected(module.flexible(), "nodes.5.angle"), abs=2e-3)
+
+
+def test_links_that_do_not_become_as_stiff_as_said_are_noticed(monkeypatch):
+    module = imported(FOLDER / "mechanism_two_loops.py")
+    scene = module.scene
+    monkeypatch.setattr(module, "scene", lambda kind="flexible", stiffer=1.0: scene(kind, stiffer**0.99))
+    assert min(module.check().values()) > module.TOLERANCE
+
+
+def test_tables_of_the_two_loops_have_a_row_a_kind_and_a_row_a_stiffness(monkeypatch):
+    module = imported(FOLDER / "mechanism_two_loops.py")
+    monkeypatch.setattr(module, "RUNS", 1)
+    monkeypatch.setattr(module, "STIFFER", module.STIFFER[:2])
+    assert [line.split()[0] for line in module.side_by_side()[1:]] == list(module.KINDS)
+    assert [float(line.split()[0]) for line in module.agreement()[1:]] == list(module.STIFFER)
