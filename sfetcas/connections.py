@@ -37,6 +37,7 @@ from .positions import normals
 from .rotations import Pin, Rotations, Turn, end_joints
 from .scene import Scene
 from .segments import Segments
+from .structure import SLIDING
 
 __all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
 
@@ -130,7 +131,7 @@ class _Maker:
             yield from self._pin(pin)
         for name, member in self.scene.members.items():
             for i, (node, joint) in enumerate(end_joints(self.scene, member)):
-                if joint in ("slider", "cylindrical"):
+                if joint in SLIDING:
                     yield self._slide(name, i, node)
         yield from self._motions()
         for name in self.scene.springs:

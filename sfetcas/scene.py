@@ -23,7 +23,7 @@ from .records import Fraction, Named, Number, Numbers, Vector, number, say, unkn
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .springs import Spring
-from .structure import Member, Node, released, unit
+from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 
 __all__ = ["Analysis", "Contact", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
@@ -292,7 +292,7 @@ def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> No
 
 def _check_axes(scene: Scene) -> None:
     hinges, slides, universals = (
-        released(scene.nodes, scene.members, ends) for ends in (("hinge",), ("slider", "cylindrical"), ("universal",))
+        released(scene.nodes, scene.members, ends) for ends in (("hinge",), SLIDING, ("universal",))
     )
     for name, node in scene.nodes.items():
         used = name in hinges or name in universals or node.has_hinge

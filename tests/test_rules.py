@@ -142,7 +142,7 @@ REFUSED = [
     ({"motions": {"d": {"node": "B", "rotation": 0.1, "between": ["m", "x"]}}}, "motions.d.between: found 'x', acc"),
     (
         {"motions": {"d": {"node": "B", "displacement": [1, 0], "between": ["m", "n"]}}},
-        "motions.d.displacement: the second member is joined as rigid, accepted: as slider or cylindrical",
+        "motions.d.displacement: the second member is joined as rigid, accepted: as slider, cylindrical or slot",
     ),
     # loads
     (
