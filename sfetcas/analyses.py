@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from . import paths, statics
+from . import paths, statics, stops
 from .path import Path
 from .scene import Scene
 from .solution import Solution
@@ -41,4 +41,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
-    return paths.follow_path(scene, settings) if scene.analysis.type == "path" else statics.solve(scene, settings)
+    if scene.analysis.type == "path":
+        return paths.follow_path(scene, settings)
+    stopped = any(spring.stop is not None for spring in scene.springs.values())
+    return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)

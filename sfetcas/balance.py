@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from . import quaternion
 from .arrays import Array
 from .connections import GROUND, Group
 from .equations import Equations, State
-from .joints import Body, DrivenSlide, LineSpring, Slide, TurnSpring, Universal
+from .joints import Body, DrivenSlide, LineSpring, Slide, TurnSpring, TurnStop, Universal
 from .joints import Spring as Tension
 from .loading import Loading
 from .rotations import STIFF, end_joints
@@ -31,11 +31,13 @@ class SpringState:
     rotational: bool
     travel: float
     effort: float
+    stop: float | None = None
 
     def to_dict(self) -> dict[str, float]:
-        """As in the JSON answer."""
+        """As in the JSON answer; ``stop`` is what a stop does, zero while it is not reached."""
         names = ("angle", "moment") if self.rotational else ("travel", "force")
-        return dict(zip(names, (self.travel, self.effort), strict=True))
+        found = dict(zip(names, (self.travel, self.effort), strict=True))
+        return found if self.stop is None else {**found, "stop": self.stop}
 
 
 def three(a: Array) -> Array:
@@ -222,7 +224,16 @@ class Balance:
     # -- springs and small members ----------------------------------------------------------------
 
     def spring(self, name: str) -> SpringState:
-        """Angle and moment, or travel and force, in SI units."""
+        """Angle and moment, or travel and force, and what its stop does, in SI units."""
+        state, record = self._spring(name), self.model.scene.springs[name]
+        if record.stop is None:
+            return state
+        unit, row = self.model.scales.moment if state.rotational else self.model.scales.force, f"springs.{name}.stop"
+        names = self.model.row_names
+        effort = -float(self._state.lam[names.index(row)]) * unit if row in names else 0.0
+        return replace(state, stop=effort)
+
+    def _spring(self, name: str) -> SpringState:
         model, scales = self.model, self.model.scales
         group, i = next((g, g.names.index(name)) for g in model.connections if name in g.names and _is_spring(g))
         data, axes = group.data[i], model.element.axes
@@ -256,7 +267,7 @@ class Balance:
         raise KeyError(member)
 
 
-ONE_SIDED = (TurnSpring, Slide, DrivenSlide)
+ONE_SIDED = (TurnSpring, TurnStop, Slide, DrivenSlide)
 """Kinds whose moments on the rotations of a node do not add up to nothing."""
 
 

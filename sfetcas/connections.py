@@ -21,12 +21,14 @@ from .joints import (
     DrivenTurn,
     Hinge,
     LineSpring,
+    LineStop,
     OnEdge,
     OnPlane,
     OnRound,
     Slide,
     Spring,
     TurnSpring,
+    TurnStop,
     Universal,
 )
 from .mesh import Mesh, Touch
@@ -35,6 +37,7 @@ from .positions import normals
 from .rotations import Pin, Rotations, Turn, end_joints
 from .scene import Scene
 from .segments import Segments
+from .structure import SLIDING
 
 __all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
 
@@ -88,7 +91,7 @@ def connect(
     """The groups of a scene; those of a kind in the order of the scene."""
     maker = _Maker(scene, segments, rotations, element.space, scales)
     by_kind: dict[Connection, list[_One]] = {}
-    ones = [*maker.all(), *_Toucher(scene, mesh, segments, rotations, element, scales).all()]
+    ones = [*maker.all(), *maker.stops(mesh), *_Toucher(scene, mesh, segments, rotations, element, scales).all()]
     for one in ones:
         by_kind.setdefault(one.kind, []).append(one)
     return tuple(_grouped(kind, ones) for kind, ones in by_kind.items())
@@ -128,7 +131,7 @@ class _Maker:
             yield from self._pin(pin)
         for name, member in self.scene.members.items():
             for i, (node, joint) in enumerate(end_joints(self.scene, member)):
-                if joint in ("slider", "cylindrical"):
+                if joint in SLIDING:
                     yield self._slide(name, i, node)
         yield from self._motions()
         for name in self.scene.springs:
@@ -189,8 +192,7 @@ class _Maker:
         if spring.type == "rotational":
             data = np.array([*_unit(spring.axis), spring.stiffness / scales.moment, spring.rest])
             return _One(TurnSpring(self.space), name, spring.node, data, self.parties(name))
-        other = spring.to
-        places = GROUND if other is None else self.segments.place(other), self.segments.place(spring.node)
+        other, places = spring.to, self._ends_of(name)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
         if spring.direction is not None:
             data = np.array([*_unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
@@ -201,6 +203,27 @@ class _Maker:
         length = float(np.linalg.norm(gap)) if spring.length is None else spring.length
         data = np.array([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
         return _One(Spring(self.space), name, spring.node, data, (), places)
+
+    def _ends_of(self, name: str) -> tuple[int, int]:
+        """Places between which a translational spring acts."""
+        spring = self.scene.springs[name]
+        first = GROUND if spring.to is None else self.segments.place(spring.to)
+        return first, self.segments.place(spring.node)
+
+    def stops(self, mesh: Mesh) -> Iterator[_One]:
+        """Springs that stand at a stop."""
+        for name, side in mesh.stops:
+            spring, row = self.scene.springs[name], f"springs.{name}.stop"
+            assert spring.stop is not None
+            at = spring.stop[0 if side == "low" else 1]
+            if spring.type == "rotational":
+                data = np.array([*_unit(spring.axis), at])
+                yield _One(
+                    TurnStop(self.space), f"{side} stop of {name}", spring.node, data, self.parties(name), row=row
+                )
+                continue
+            data = np.array([*_unit(spring.direction)[: self.axes], at / self.scales.length])
+            yield _One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
 
     def parties(self, name: str) -> tuple[int, int]:
         """Rotations of the two parties of a rotational spring."""

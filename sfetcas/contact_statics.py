@@ -15,9 +15,10 @@ from .mesh import Mesh, Touch
 from .obstacles import members_of, nearest, obstacle, takes_part
 from .prepared import Prepared
 from .scene import Scene
+from .settling import Held, Way, placed
 from .stability import Stability
 from .touches import COARSE, Touched, edge_sides, obstacles_of
-from .touching import Held, Toucher, Way, can_leave
+from .touching import Toucher, can_leave
 
 __all__ = ["ContactRun", "Pressed"]
 
@@ -60,9 +61,9 @@ class ContactRun:
 
     def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: set[str]) -> None:
         self.scene, self.accuracy, self.fixed = scene, accuracy, fixed
-        self.toucher = Toucher(scene, prepare, COARSE)
+        self.toucher = Toucher(scene, prepare, COARSE, edge_sides(scene))
+        self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
         self.fine = max(INSIDE, 0.1 * accuracy)
-        self.toucher.ways = edge_sides(scene)
         self.prepare = prepare
         self.last: tuple[float, Held] | None = None
 
@@ -99,7 +100,7 @@ class ContactRun:
 
     def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
         """From the state without obstacles, these coming back from where they do not reach it."""
-        gaps = free.touched.inside({}, self.toucher.ways, 0.0)
+        gaps = free.touched.inside({}, self.reviser.sides, 0.0)
         depths: dict[str, float] = {}
         for gap in gaps:
             depths[gap.contact] = max(depths.get(gap.contact, 0.0), -gap.depth)
@@ -118,7 +119,7 @@ class ContactRun:
                 line = self.scene.center_lines[member]
                 x = np.linspace(0.0, 1.0, 257)
                 if stop.kind == "sharp":
-                    way = self.toucher.ways[contact, member]
+                    way = self.reviser.sides[contact, member]
                     places = np.array(nearest(stop, line.positions, line.tangents, x))
                     gaps = stop.gaps(line.positions(places), line.tangents(places), 0.0, way) if len(places) else places
                     found += [
@@ -154,7 +155,7 @@ class ContactRun:
 
     def clear(self, fields: Fields) -> bool:
         """Whether no obstacle is in the way of a state."""
-        return not Touched.of(fields).inside({}, self.toucher.ways, self.fine * self.scene.size)
+        return not Touched.of(fields).inside({}, self.reviser.sides, self.fine * self.scene.size)
 
     def reached(self, base: Mesh, factor: float, free: Held | None, *, nearer: bool) -> Held | None:
         """A state in contact: by the loads growing from zero, or near the state without obstacles."""
@@ -183,7 +184,7 @@ class ContactRun:
         self.last = (factor, held)
         now = held
         if held.mesh.order != target.order or self.fixed:
-            now = self._onto(target, held, way, anew=True)
+            now = self._onto(placed(self.scene, target, held.mesh.touches), held, way)
         smooth, error = np.sqrt(self.accuracy), np.inf
         for _ in range(LEVELS):
             marks = self._marked(now, smooth)
@@ -198,19 +199,19 @@ class ContactRun:
                 break
             else:
                 now = self._onto(now.mesh.refined(marks), now, way)
-        now = self._checked(now, way)
+        now = self._checked(now, way, error)
         stability, more = self._stability(now, way)
         return Pressed(now, stability, error, (*notes, *more))
 
-    def _checked(self, held: Held, way: Way) -> Held:
-        """The state on its fine mesh with what touches looked at as finely."""
-        self.toucher.limit = self.fine
+    def _checked(self, held: Held, way: Way, error: float) -> Held:
+        """The state on its fine mesh with what touches looked at as finely as the error of positions allows."""
+        self.reviser.limit = max(self.fine, error)
         try:
-            if self.toucher.wrong(held, way) is None:
+            if self.reviser.wrong(held, way) is None:
                 return held
             return self._onto(held.mesh, held, way, anew=True)
         finally:
-            self.toucher.limit = COARSE
+            self.reviser.limit = COARSE
 
     @property
     def _all_fixed(self) -> bool:
@@ -221,11 +222,10 @@ class ContactRun:
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
     def _onto(self, mesh: Mesh, held: Held, way: Way, *, anew: bool = False) -> Held:
-        """The same contact on another mesh; what touches is looked at again."""
+        """The same contact on another mesh; ``anew`` with what touches looked at again."""
         if not anew:
-            source = held.prepared.model, held.corrected.state
-            found = self.toucher.settle(mesh, source, way)
-            if isinstance(found, Held) and self.toucher.wrong(found, way) is None:
+            found = self.settler.settle(mesh, (held.prepared.model, held.corrected.state), way)
+            if isinstance(found, Held):
                 return found
         there = self.toucher.resolved(replace(mesh, touches=()), held, held.mesh.touches, way)
         if there is None:
@@ -276,7 +276,7 @@ class ContactRun:
         if [t.to for t in touches] == [t.to for t in held.mesh.touches]:
             return held
         source = held.prepared.model, held.corrected.state
-        return self.toucher.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
+        return self.settler.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
 
     def _left(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
         """An equilibrium in contact left for a stable one along its escape shape, as far as that is found."""
@@ -307,7 +307,7 @@ class ContactRun:
         single = [j for j, (i, _) in enumerate(free) if touches[i].to is None]
         if not single:
             return 0
-        slopes = self.toucher.slopes(held, way)
+        slopes = self.settler.slopes(held, way)
         if slopes is None:
             return 0
         own = np.array([touched.gap_curvature(touches[free[j][0]]) for j in single])

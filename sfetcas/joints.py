@@ -30,12 +30,14 @@ __all__ = [
     "DrivenTurn",
     "Hinge",
     "LineSpring",
+    "LineStop",
     "OnEdge",
     "OnPlane",
     "OnRound",
     "Slide",
     "Spring",
     "TurnSpring",
+    "TurnStop",
     "Universal",
     "by_components",
     "by_turning",
@@ -219,6 +221,37 @@ class TurnSpring(Connection):
         """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
         angle = self.angle(q[0], q[1], data[:3])
         return 0.5 * data[3] * angle * (angle - 2.0 * data[4])
+
+
+@final
+@dataclass(frozen=True)
+class TurnStop(Connection):
+    """A rotational spring that stands at a stop; data: axis, angle of the stop."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 2, 0, 1, 4, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The angle less that of the stop."""
+        return [self.angle(q[0], q[1], data[:3]) - data[3]]
+
+
+@final
+@dataclass(frozen=True)
+class LineStop(Connection):
+    """A spring along a direction that stands at a stop; data: direction, travel of the stop."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 0, 2, 1, self.axes + 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The travel less that of the stop."""
+        n = self.axes
+        return [ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n]]
 
 
 @final

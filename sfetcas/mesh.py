@@ -70,6 +70,8 @@ class Mesh:
         Members whose elements are never halved.
     touches : tuple of Touch
         Where members touch obstacles; elements end there.
+    stops : tuple of (str, str)
+        Springs that stand at a stop: name, and ``low`` or ``high``.
     """
 
     order: int
@@ -77,6 +79,7 @@ class Mesh:
     gauss: bool = False
     rigid: frozenset[str] = frozenset()
     touches: tuple[Touch, ...] = ()
+    stops: tuple[tuple[str, str], ...] = ()
 
     @property
     def elements(self) -> int:

@@ -236,6 +236,8 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("angles", free, f"1 for each of {free} free rotations: {model.reason}"))
     if model.positions.unknowns:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
+        if model.assembly != "nodal" and model.segments.kept:
+            why = "springs, small members, slides or followers act upon places"
         blocks.append(Block("displacements", len(model.positions.unknowns), f"{why}: positions are unknowns"))
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"

@@ -18,7 +18,7 @@ from .errors import SceneError
 from .loads import Motion
 from .structure import Node
 
-__all__ = ["Obstacle", "check_start", "edge_slopes", "members_of", "nearest", "obstacle", "takes_part"]
+__all__ = ["Obstacle", "check_start", "edge_slopes", "members_of", "nearest", "obstacle", "swept", "takes_part"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +122,19 @@ def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle)
     guide = np.asarray(node.direction, dtype=float)
     towards = stop.normal if stop.kind == "flat" else guide @ stop.across
     return bool(abs(guide @ towards) > PARALLEL * np.linalg.norm(guide))
+
+
+def swept(stop: Obstacle, before: Array, after: Array) -> bool:
+    """Whether a curve that moves from some places (n, 3) to others (m, 3) runs over the middle of an obstacle.
+
+    The two curves and what joins their ends wind round it then.  A plane is nowhere run over, nor a sphere.
+    """
+    if stop.kind == "flat" or np.linalg.matrix_rank(stop.across) != 2:
+        return False
+    basis = np.linalg.svd(stop.across)[2][:2]
+    around = (np.vstack([before, after[::-1], before[:1]]) - stop.place) @ basis.T
+    angles = np.unwrap(np.arctan2(around[:, 1], around[:, 0]))
+    return bool(abs(angles[-1] - angles[0]) > np.pi)
 
 
 PARALLEL = 1e-6

@@ -38,6 +38,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-u
 from . import quaternion
 from .errors import SceneError
 from .loads import Load, Motion
+from .obstacles import Obstacle, obstacle
 from .records import say
 from .scene import Scene
 from .sections import evaluate
@@ -401,6 +402,8 @@ def _sketch_all(sketch: _Sketch) -> None:
     for name, node in scene.nodes.items():
         if node.support != "free":
             _sketch_reaction(sketch, name, largest)
+    for name, contact in scene.contacts.items():
+        _sketch_contact(sketch, name, obstacle(contact, sketch.step.model.space), largest)
 
 
 def _factor(step: Equilibrium, history: str | None) -> float:
@@ -591,7 +594,8 @@ def _largest_force(sketch: _Sketch) -> float:
         abs(_factor(step, load.history)) * _norm(load.vector) for load in scene.loads.values() if load.type == "force"
     ]
     reactions = [_norm(step.reaction(name)[0]) for name, node in scene.nodes.items() if node.support != "free"]
-    return max([*loads, *reactions, 1e-10 * step.model.scales.force])
+    pushes = [_norm(force) for entry in step.contacts.values() for force in np.atleast_2d(entry["force"])]
+    return max([*loads, *reactions, *pushes, 1e-10 * step.model.scales.force])
 
 
 def _sketch_load(sketch: _Sketch, name: str, load: Load, largest: float) -> None:
@@ -625,6 +629,36 @@ def _sketch_reaction(sketch: _Sketch, name: str, largest: float) -> None:
         _sketch_force(sketch, point, force, largest, ink, pushing=True)
     if _norm(moment) > 1e-6 * max(moments):
         _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
+
+
+def _sketch_contact(sketch: _Sketch, name: str, stop: Obstacle, largest: float) -> None:
+    """An obstacle as far as it is near the structure, in the plane, and what it pushes with."""
+    unit, everything = sketch.course.unit, sketch.course.everything
+    middle, reach = everything.mean(axis=0), 0.6 * sketch.size
+    if stop.kind == "flat":
+        foot = middle - ((middle - stop.place / unit) @ stop.normal) * stop.normal
+        along = np.cross([0.0, 0.0, 1.0], stop.normal)
+        outline = foot + np.linspace(-reach, reach, 41)[:, None] * along
+    elif stop.kind == "round":
+        angle = np.linspace(0.0, 2.0 * math.pi, 181)
+        turns = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        outline = (stop.place + stop.radius * turns) / unit
+    else:
+        outline = stop.place[None, :] / unit
+    if not sketch.step.model.space:
+        if len(outline) == 1:
+            sketch.dot(outline[0], f"contact-{name}", SUPPORT)
+        near = np.linalg.norm(outline - middle, axis=1) <= 1.3 * reach
+        if near.sum() > 1:
+            sketch.line(np.where(near[:, None], outline, np.nan), f"contact-{name}")
+    entry = sketch.step.contacts[name]
+    several = isinstance(entry["member"], list)
+    for member, at, force in zip(
+        *([entry[k]] if not several else entry[k] for k in ("member", "at", "force")), strict=True
+    ):
+        if at is not None and _norm(force) > 1e-6 * largest:
+            point = sketch.along(member, np.array([np.mean(at)]))[0]
+            _sketch_force(sketch, point, force, largest, _Ink(f"push-{name}", REACTION, 1.1), pushing=True)
 
 
 def _sketch_force(

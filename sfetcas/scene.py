@@ -23,7 +23,7 @@ from .records import Fraction, Named, Number, Numbers, Vector, number, say, unkn
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .springs import Spring
-from .structure import Member, Node, released, unit
+from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 
 __all__ = ["Analysis", "Contact", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
@@ -292,7 +292,7 @@ def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> No
 
 def _check_axes(scene: Scene) -> None:
     hinges, slides, universals = (
-        released(scene.nodes, scene.members, ends) for ends in (("hinge",), ("slider", "cylindrical"), ("universal",))
+        released(scene.nodes, scene.members, ends) for ends in (("hinge",), SLIDING, ("universal",))
     )
     for name, node in scene.nodes.items():
         used = name in hinges or name in universals or node.has_hinge
@@ -414,6 +414,10 @@ def _check_supports(scene: Scene) -> None:
 
 def _check_contacts(scene: Scene) -> None:
     space = scene.resolved_dimension == "space"
+    for name, spring in scene.springs.items():
+        if spring.stop is not None and scene.analysis.type == "path":
+            message = "found a stop on a path, accepted: with analysis.type = 'static' and steps"
+            raise SceneError(message, ("springs", name, "stop"))
     if scene.contacts and scene.analysis.type == "path":
         message = "found 'path' with contacts, accepted: 'static' with steps of a motion, which pass limit loads too"
         raise SceneError(message, ("analysis", "type"))

@@ -17,6 +17,7 @@ from .arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
 from .scene import Scene
+from .structure import SLIDING
 
 __all__ = ["Segment", "Segments", "cut_members"]
 
@@ -106,7 +107,7 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     for name, member in scene.members.items():
         for i, (node, joint) in enumerate(end_joints(scene, member)):
             ends[name, i] = node
-            if joint in ("slider", "cylindrical"):
+            if joint in SLIDING:
                 ends[name, i] = f"{node} at {name}"
                 places.append(ends[name, i])
                 kept |= {node, ends[name, i]}

@@ -28,6 +28,14 @@ def _parties(value: Any) -> tuple[Any, ...]:
     return entries
 
 
+def _stop(value: Any) -> tuple[float, float]:
+    accepted = "[low, high] with zero, the undeformed scene, between them or at one end"
+    entries = tuple(number(entry) for entry in listed(value, accepted))
+    if len(entries) != 2 or not entries[0] <= 0.0 <= entries[1] or entries[0] == entries[1]:
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return entries[0], entries[1]
+
+
 class Spring(Staged):
     """A rotational spring at a node, or a translational one between two nodes or a node and the ground.
 
@@ -44,6 +52,7 @@ class Spring(Staged):
     anchor : (3,), m - where it is fixed to the ground; left out: the place of the node in the undeformed scene
     length : m - free length of a translational spring; left out: the distance in the undeformed scene
     direction : (3,), fixed axes - a translational spring that acts along this direction only
+    stop : [low, high], rad, or m of a spring with a direction - the angle or travel goes no further; statics only
     """
 
     type: Literal["rotational", "translational"] = "rotational"
@@ -56,6 +65,7 @@ class Spring(Staged):
     anchor: Vector | None = None
     length: Annotated[float, BeforeValidator(_stiffness)] | None = None
     direction: Direction | None = None
+    stop: Annotated[tuple[float, float], BeforeValidator(_stop)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Spring:
@@ -72,6 +82,8 @@ class Spring(Staged):
             raise SceneError(f"found {self.between[0]!r} twice, accepted: two parties", ("between",))
         if not turning and self.direction is None and "rest" in self.model_fields_set:
             raise SceneError("accepted with a direction only; the free length is the key 'length'", ("rest",))
+        if self.stop is not None and not turning and self.direction is None:
+            raise SceneError("accepted with a rotational spring, or with a direction", ("stop",))
         if self.direction is not None and self.length is not None:
             raise SceneError("accepted without a direction only; with one it is the key 'rest'", ("length",))
         return self

@@ -253,12 +253,20 @@ class StabilityTest:
         entries, diagonal = point.entries.copy(), equations.diagonal
         entries[diagonal[self._chosen]] -= shift * self._weights
         size = float(np.abs(entries[diagonal[: equations.turning_unknowns]]).max(initial=1.0))
-        rest = np.setdiff1d(np.arange(equations.unknowns), self._chosen)
-        entries[diagonal[rest]] += SOFT * self._softest
+        entries[diagonal[equations.turning_unknowns : equations.unknowns]] += SOFT * self._softest
         entries[diagonal[equations.unknowns :]] -= SOFT / size
         matrix = ca.DM(self._bordered_pattern, entries)
         self._bordered.nfact(matrix)
+        # Without pivots the factors break down where displacements hang between two slides: then they solve nothing.
+        ones = ca.DM.ones(equations.total)
+        gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
+        if not np.abs(gap).max() < BROKEN:
+            return self._below_dense(point, shift)
         return int(self._bordered.neig(matrix)) - equations.rows
+
+    def _below_dense(self, point: Point, shift: float) -> int:
+        values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
+        return int((values < shift).sum())
 
     @functools.cached_property
     def _bordered_pattern(self) -> ca.Sparsity:
@@ -353,6 +361,9 @@ LIGHT = 1e-3
 
 SOFT = 1e-9
 """Softness of closings in the bordered matrix, and stiffness of displacements, beside the rest."""
+
+BROKEN = 1e-2
+"""Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
 
 RANK = 1e-10
 """Singular values below this, relative to the largest, are zero."""

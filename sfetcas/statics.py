@@ -31,12 +31,12 @@ from .model import Model, assemble
 from .newton import Corrected, loose_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
 from .scene import Scene
+from .settling import Held
 from .several import Search, long_elements, missing, same, search
 from .solution import Equilibrium, Solution, equilibrium
 from .stability import Stability
 from .threads import single_threaded
 from .touches import Touched
-from .touching import Held
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
 
@@ -174,7 +174,9 @@ def _finished(
 
 
 @single_threaded
-def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution:
+def solve(
+    scene: Scene, settings: Settings | None = None, *, stops: tuple[tuple[str, str], ...] = (), **changes: Any
+) -> Solution:
     """Equilibria of a scene for the load factors of its analysis.
 
     Parameters
@@ -182,6 +184,8 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     scene : Scene
     settings : Settings, optional
         Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
+    stops : tuple of (str, str)
+        Springs that stand at a stop, ``low`` or ``high``; others pass theirs (see :mod:`~sfetcas.stops`).
 
     Raises
     ------
@@ -196,7 +200,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
-    return _Run(scene, settings).solution()
+    return _Run(scene, settings, stops).solution()
 
 
 def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
@@ -219,8 +223,8 @@ class _Found:
 class _Run:
     """One run over the load factors of a scene."""
 
-    def __init__(self, scene: Scene, settings: Settings) -> None:
-        self.scene, self.settings = scene, settings
+    def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
+        self.scene, self.settings, self.stops = scene, settings, stops
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
         self.seconds = {"model": 0.0, "solve": 0.0}
@@ -250,11 +254,11 @@ class _Run:
         self.fixed = {n for n, count in counts.items() if count is not None}
         equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
         cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
-        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid)
+        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops)
         if order >= PILOT_ORDER and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
             self.pilot_mesh = self.target
         else:
-            self.pilot_mesh = first_mesh(scene, max(order, PILOT_ORDER), turning=1.0)
+            self.pilot_mesh = replace(first_mesh(scene, max(order, PILOT_ORDER), turning=1.0), stops=self.stops)
 
     @property
     def _prescribed(self) -> bool:
@@ -491,7 +495,8 @@ class _Run:
             if free is not None:
                 there = self._onto(base, free, factor)
                 held, notes = _as_held(there, factor), there.notes
-                if contact.toucher.wrong(held, contact.at(factor)) is None:
+                free_way = contact.reviser.wrong(held, contact.at(factor)) is None
+                if free_way and not contact.reviser.ran_over(None, held):
                     answer = self._refined(free, factor)
                     if contact.clear(answer.fields):
                         contact.last = (factor, held)
@@ -572,7 +577,7 @@ class _Run:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.target
         if mesh.elements > HUGE:
-            half = Mesh(mesh.order, {n: every_other(c) for n, c in mesh.cuts.items()}, mesh.gauss, mesh.rigid)
+            half = replace(mesh, cuts={n: every_other(c) for n, c in mesh.cuts.items()})
             coarse = self._onto(half, pilot, factor)
             now = self._onto(mesh, coarse, factor)
             # The error falls by 4^p a halving; twice that share for not being there yet.

@@ -14,7 +14,7 @@ from .matrices import Mass, Stiffness, check_mass, check_stiffness
 from .records import Direction, NotNegative, Vector, listed, say
 from .shapes import Shape, Straight
 
-__all__ = ["Member", "Node", "released", "unit"]
+__all__ = ["SLIDING", "Member", "Node", "released", "unit"]
 
 
 def unit(direction: Iterable[float]) -> tuple[float, float, float]:
@@ -53,7 +53,10 @@ def _welds(value: Any) -> tuple[Any, ...]:
 
 
 Turning = Annotated[Literal["rigid", "hinge", "ball", "universal"], BeforeValidator(_weld)]
-Release = Literal["rigid", "hinge", "ball", "universal", "slider", "cylindrical"]
+Release = Literal["rigid", "hinge", "ball", "universal", "slider", "cylindrical", "slot"]
+
+SLIDING = ("slider", "cylindrical", "slot")
+"""Releases whose end slides along its node."""
 Count = Annotated[int, BeforeValidator(_count)]
 
 
@@ -145,7 +148,7 @@ class Member(Staged):
     element : SFET2 to SFET9, by the nodes of an element; left out: chosen by the accuracy
     elements : number of elements, 1 to 1000000; left out: chosen by the accuracy
     release : how each end is joined to its node: rigid (or weld), hinge (about the node's axis), ball, universal,
-        slider (along the node's direction) or cylindrical (along and about it)
+        slider (along the node's direction), cylindrical (along and about it) or slot (along it, turning freely)
     stiffness : (6 n, 6 n), N/m, N, N m - of a small member: forces and moments at its n nodes by displacements
         and rotations (x, y, z, about x, y, z at the first node, then at the next), along the section's axes b1,
         b2, b3 at its start; or the name of a file, .npz (array ``stiffness``, or the only one) or Matrix Market;

@@ -11,7 +11,7 @@ from .errors import SceneError
 from .loads import Motion
 from .records import say
 from .springs import Spring
-from .structure import Member, Node, unit
+from .structure import SLIDING, Member, Node, unit
 
 __all__ = ["check_driven_joint", "check_floating", "check_motion", "check_motions_once", "drives"]
 
@@ -179,7 +179,7 @@ def check_driven_joint(motion: Motion, node: Node, members: Mapping[str, Member]
             f"found {say(motion.rotation)} where they are joined {' and '.join(how)}, accepted: {accepted}",
             ("rotation",),
         )
-    if motion.displacement is not None and how[1] not in ("slider", "cylindrical"):
+    if motion.displacement is not None and how[1] not in SLIDING:
         raise SceneError(
-            f"the second member is joined as {how[1]}, accepted: as slider or cylindrical", ("displacement",)
+            f"the second member is joined as {how[1]}, accepted: as slider, cylindrical or slot", ("displacement",)
         )

@@ -336,6 +336,10 @@ class Touched:
         positions, tangents = (lambda x: fields.positions(member, x)), (lambda x: fields.tangents(member, x))
         return nearest(self.obstacles[contact], positions, tangents, self.samples(member))
 
+    def course(self, member: str) -> Array:
+        """Places (n, 3) along a member, m, near enough to each other to be joined by lines."""
+        return self.fields.positions(member, self.samples(member))
+
     def smallest_gap(self, contact: str, way: Mapping[tuple[str, str], float]) -> float:
         """Smallest gap of all members that an obstacle stops, m; infinite where none passes an edge."""
         found = [np.inf]

@@ -24,7 +24,7 @@ from scenes import (
     tripod,
     turned_about,
 )
-from systems import EVERY, PLANE_SYSTEMS
+from systems import EVERY, PLANE_SYSTEMS, SYSTEMS
 
 import sfetcas
 from sfetcas import quaternion as quat
@@ -210,9 +210,9 @@ def test_member_split_in_two_gives_the_same_answer(name, member):
 
 
 @pytest.mark.parametrize(("length", "force"), [(1e-9, 1e9), (1e9, 1e-9), (1e-6, 1e-3), (1e3, 1e9), (1e-9, 1e-9)])
-@pytest.mark.parametrize("name", ["plane_loads", "four_bar", "guided", "hinged_space", "helix"])
+@pytest.mark.parametrize("name", ["plane_loads", "four_bar", "guided", "hinged_space", "helix", *SYSTEMS])
 def test_units_do_not_matter(name, length, force):
-    table = ZOO[name]()
+    table = EVERY[name]()
     step, other = answer(table), answer(transformed(table, length=length, force=force))
     compare(step, other, length=length, force=force, tolerance=1e-10)
 

@@ -341,6 +341,17 @@ def test_energy_does_not_see_a_rigid_motion(name):
     np.testing.assert_allclose(other_rows, rows, atol=1e-14 * 10)
 
 
+@pytest.mark.parametrize("name", [n for n in CASES if "driven" not in n])
+def test_undeformed_scene_has_no_energy_and_no_gap(name):
+    case, kind = CASES[name], CASES[name].kind
+    q = [np.array([1.0, 0, 0, 0]) if kind.space else np.zeros(1)] * kind.sizes[0]
+    load = np.random.default_rng(0).normal(size=kind.sizes[4])
+    found = evaluated(kind, q, [np.zeros(kind.axes)] * kind.sizes[1], case.data, load, np.zeros(kind.sizes[2]))
+    assert found[0] == pytest.approx(0.0, abs=1e-15)
+    assert found[1] == pytest.approx(0.0, abs=1e-15)
+    np.testing.assert_allclose(found[2], 0.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("name", BODIES)
 def test_body_does_not_see_the_order_of_its_nodes(name):
     """Nodes backwards, with rest places, matrix and rows in the same order: the same energy and moments."""

@@ -333,6 +333,45 @@ def test_small_is_flexible_for_small_loads(kind, load):
     assert gaps[0] < 0.05 * moved[0]
 
 
+@pytest.mark.parametrize("load", ["force", "spread", "inside", "gravity"])
+@pytest.mark.parametrize("kind", ["arc", "varying", "arc, space", "varying, space"])
+def test_small_turned_far_is_flexible_turned_far(kind, load):
+    """The same with the foot turned by a radian and more: loads keep their directions while the body turns."""
+    table = beam(kind, load, True)
+    table["motions"] = {
+        "turn": {"node": "A", "rotation": [0.5, -0.9, 0.7] if KINDS[kind][3] else 1.2, "history": "all"}
+    }
+    table["histories"] = {"all": {"t": [0, 1], "value": [1, 1]}}
+    flexible = copy.deepcopy(table)
+    flexible["members"]["m"]["type"] = "flexible"
+    small, whole = (sfetcas.Prepared(model_of(t, 8, 6)) for t in (table, flexible))
+    gaps = []
+    for factor in (1e-2, 1e-3):
+        one, two = (solve_model(p, factor) for p in (small, whole))
+        gaps.append(np.linalg.norm(one.position("B") - two.position("B")))
+        np.testing.assert_allclose(one.reaction("A")[0], two.reaction("A")[0], atol=1e-12)
+    assert np.log10(gaps[0] / gaps[1]) > 1.85
+    assert gaps[0] < 1e-3
+
+
+def test_stiff_body_turned_far_is_solved_to_its_rounding():
+    """Axially 1e9 times as stiff as in bending, at the end of a flexible member that turns by a radian."""
+    table = condensed(matrix_of_unlike(1e9).tolist())
+    table["sections"] = {"s": UNLIKE}
+    table["nodes"]["root"] = {"position": [-1, 0.2, 0], "support": "clamped"}
+    del table["nodes"]["A"]["support"]
+    table["members"]["beam"] = {"nodes": ["root", "A"], "section": "s"}
+    table["loads"]["f"]["value"] = [-1.0, 4.0, -3.0]
+    step = sfetcas.solve(made(table)).last
+    assert 2 * np.arccos(abs(step.quaternion("A")[0])) > 1.0
+    # Rounding of places of the size of one times the stiffness, 1e-16 x 1e9.
+    np.testing.assert_allclose(step.reaction("root")[0], [1.0, -4.0, 3.0], atol=1e-6)
+    section = copy.deepcopy(table)
+    section["members"]["m"] = {"nodes": ["A", "B"], "type": "small", "section": "s"}
+    other = sfetcas.solve(made(section)).last
+    np.testing.assert_allclose(step.position("B"), other.position("B"), atol=1e-6)
+
+
 def test_deflection_across_a_straight_beam_is_right_to_the_third_order():
     """By symmetry the second order is along the beam only."""
     tables = [beam("straight", "force", small) for small in (True, False)]

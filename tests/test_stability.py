@@ -1,12 +1,18 @@
 """Stability against Euler's columns, closed forms and a second route."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import SOFT, ZOO, cantilever, made, model_of
+from systems import EVERY, SYSTEMS
 
 import sfetcas
+from sfetcas import newton
 from sfetcas import stability as stability_module
+from sfetcas.equations import Equations
 from sfetcas.prepared import Prepared
+from sfetcas.stability import StabilityTest
 from sfetcas.statics import solve_model
 
 EI = SOFT["EI3"]
@@ -138,11 +144,11 @@ def test_straight_column_in_space_buckles_about_both_axes():
     assert straight(column(guided=False, space=True), 2.0)[0].negative == 0
 
 
-@pytest.mark.parametrize("name", [*ZOO, "pinned", "fixed"])
+@pytest.mark.parametrize("name", [*EVERY, "pinned", "fixed"])
 @pytest.mark.parametrize("assembly", ["closing", "nodal"])
 def test_sparse_count_is_the_dense_count(name, assembly, monkeypatch):
     """LDL^T and Schur complement against all eigenvalues on the null space, also far from stable."""
-    table = {"pinned": column("hinge"), "fixed": column(slider="fixed")}.get(name) or ZOO[name]()
+    table = {"pinned": column("hinge"), "fixed": column(slider="fixed")}.get(name) or EVERY[name]()
     factor = 90.0 if name in ("pinned", "fixed") else 1.0
     prepared = Prepared(model_of(table, 2, 4, assembly=assembly))
     loading = prepared.model.loading(factor)
@@ -154,8 +160,10 @@ def test_sparse_count_is_the_dense_count(name, assembly, monkeypatch):
         points.append(prepared.equations.at(state, loading.scaled(-6.0)))
     for point in points:
         monkeypatch.setattr(stability_module, "DENSE", 10_000)
+        monkeypatch.setattr(stability_module, "DENSE_WITH_TRAVEL", 10_000)
         dense = prepared._test.test(point)
         monkeypatch.setattr(stability_module, "DENSE", 0)
+        monkeypatch.setattr(stability_module, "DENSE_WITH_TRAVEL", 0)
         sparse = prepared._test.test(point)
         assert (sparse.stable, sparse.negative) == (dense.stable, dense.negative)
         # Inverse iteration stops when a step gains 1e-8; what is left where it converges slowly is a thousand steps.
@@ -165,10 +173,10 @@ def test_sparse_count_is_the_dense_count(name, assembly, monkeypatch):
         assert dense.negative >= 2
 
 
-@pytest.mark.parametrize("name", ZOO)
+@pytest.mark.parametrize("name", EVERY)
 def test_count_is_that_of_the_bordered_matrix(name):
     """Inertia of [[H, A^T], [A, 0]] has one negative value a row more: another way to count."""
-    prepared = Prepared(model_of(ZOO[name](), 2, 4, assembly="nodal"))
+    prepared = Prepared(model_of(EVERY[name](), 2, 4, assembly="nodal"))
     state, equations = solve_model(prepared).state, prepared.equations
     for factor in (1.0, -8.0):
         point = equations.at(state, prepared.model.loading(1.0).scaled(factor))
@@ -224,3 +232,144 @@ def test_leaving_goes_to_the_side_of_less_energy(side):
     found = prepared._test.test(prepared.equations.at(straight_state, loading))
     nudged = prepared._nudged(straight_state, found, loading, 0.2)
     assert side * nudged.q[prepared.model.chain("m")[-1], 0] > 0.1
+
+
+# -- springs and bodies ---------------------------------------------------------------------------------------
+
+
+def sprung(stiffness=2.0, kind="flexible", space=False):
+    """A column on a hinge with a rotational spring at its foot, its top free."""
+    table = column("hinge", guided=False, space=space)
+    table["members"]["m"]["type"] = kind
+    table["springs"] = {"foot": {"node": "A", "stiffness": stiffness}}
+    return table
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_column_on_a_spring_buckles_at_its_critical_load(space):
+    """k/(EI) = x tan(x), x^2 = P/EI (Timoshenko and Gere 1961, ch. 2); a rigid one at k/L."""
+    critical = 1.15965758239507
+    x = np.sqrt(critical)
+    assert x * np.tan(x) == pytest.approx(2.0, abs=1e-12)
+    for share, negative in ((1 - 1e-6, 0), (1 + 1e-6, 1)):
+        found, _ = straight(sprung(space=space), share * critical)
+        assert found.negative == negative
+        assert (found.smallest > 0.0) == (negative == 0)
+        assert straight(sprung(kind="rigid"), share * 2.0)[0].negative == negative
+
+
+def test_small_column_on_a_spring():
+    """A body linear in its frame, turned by the mean rotation: its own critical load by two unknowns, by hand.
+
+    Foot a, top b, deflection v of the top: U = k a^2/2 + the energy of a beam without loads between, and the force
+    works on the shortening that the body has: that of a rigid bar at the frame (a + b)/2, and of v against it.
+    """
+
+    frame, way = np.array([0.5, 0.5, 0.0]), np.array([0.0, 0.0, 1.0])
+    bent = way - frame
+    # Ends turned against the frame by -r and r with r = (b - a)/2, the top moved by v - frame.
+    half = np.array([-0.5, 0.5, 0.0])
+    beam = np.array([[12, -6, -6], [-6, 4, 2], [-6, 2, 4]])
+    e = np.array([bent, -half, half])
+    elastic = 2.0 * np.outer([1, 0, 0], [1, 0, 0]) + e.T @ beam @ e
+    shortening = np.outer(frame, frame) + np.outer(frame, bent) + np.outer(bent, frame)
+    loads = np.linalg.eigvals(np.linalg.solve(elastic, shortening)).real
+    critical = 1.0 / loads.max()
+    assert 1.15965758239507 < critical < 1.4
+    for share, negative in ((1 - 1e-6, 0), (1 + 1e-6, 1)):
+        assert straight(sprung(kind="small"), share * critical)[0].negative == negative
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
+    """Grids with many closings and loads of any sign, with springs or without, at states that need not be stable."""
+    rng = np.random.default_rng(seed)
+    columns, levels = int(rng.integers(2, 4)), int(rng.integers(2, 4))
+    nodes, members = {}, {}
+    for i in range(columns):
+        for j in range(levels):
+            held = {"support": "clamped"} if j == 0 else {}
+            place = [float(i + 0.1 * rng.normal()), float(j + 0.1 * rng.normal())]
+            nodes[f"n{i}{j}"] = {"position": place, **held}
+            if j:
+                members[f"c{i}{j}"] = {"nodes": [f"n{i}{j - 1}", f"n{i}{j}"], "section": "s"}
+            if i and j:
+                members[f"b{i}{j}"] = {"nodes": [f"n{i - 1}{j}", f"n{i}{j}"], "section": "s",
+                                       "shape": {"type": "arc", "angle": 0.5}}  # fmt: skip
+    top = f"n0{levels - 1}"
+    table = {"sections": {"s": SOFT}, "nodes": nodes, "members": members, "dimension": ("plane", "space")[seed % 2],
+             "loads": {"f": {"type": "force", "node": top, "value": [float(rng.normal()), -5.0]}}}  # fmt: skip
+    if seed % 3 == 0:
+        table["springs"] = {"k": {"type": "translational", "node": top, "stiffness": 3.0},
+                            "r": {"node": "n11", "stiffness": 2.0}}  # fmt: skip
+    prepared = Prepared(model_of(table, 2, 3))
+    start = prepared.equations.start(prepared.model.loading(0.0))
+    step = rng.normal(size=prepared.equations.total)
+    # Internal forces of a hundred times EI/L^2, with any sign.
+    step[: prepared.equations.unknowns] *= 0.2
+    step[prepared.equations.unknowns :] *= 100.0
+    state = prepared.equations.moved(start, step)
+    counts = set()
+    monkeypatch.setattr(StabilityTest, "_below_dense", None)  # the bordered matrix alone is meant
+    for factor in (0.0, 30.0, -100.0, 200.0):
+        point = prepared.equations.at(state, prepared.model.loading(factor))
+        monkeypatch.setattr(stability_module, "DENSE", 10_000)
+        monkeypatch.setattr(stability_module, "DENSE_WITH_TRAVEL", 10_000)
+        dense = prepared._test.negative(point)
+        entries = prepared._test._weighted(point)
+        limit = stability_module.NEUTRAL + stability_module.ROUNDING * float(np.abs(entries).max())
+        assert prepared._test._below_bordered(point, -limit) == dense
+        counts.add(dense)
+    assert max(counts) > 0
+
+
+def redundant():
+    """Two four-bars of parallel hinges in space, rigid but for one member."""
+    hinge = {"joint": "hinge"}
+    return {
+        "dimension": "space",
+        "sections": {"s": SOFT},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [0, 1]} | hinge,
+            "C": {"position": [1.2, 1.1]} | hinge,
+            "D": {"position": [1.2, 0], "support": "hinge"},
+            "E": {"position": [2.2, 1.0]} | hinge,
+            "F": {"position": [2.2, 0], "support": "hinge"},
+        },
+        "members": {n: {"nodes": list(n), "type": "rigid"} for n in ("BC", "CD", "CE", "EF")}
+        | {"AB": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"f": {"type": "force", "node": "C", "value": [1.0, -0.5]}},
+    }
+
+
+def test_bordered_count_with_redundant_rows():
+    """Rows that depend on others count as rows all the same, at states far from stable too."""
+    prepared = Prepared(model_of(redundant(), 2, 3))
+    rng, counts = np.random.default_rng(5), set()
+    start = prepared.equations.start(prepared.model.loading(0.0))
+    for size in (0.0, 30.0, 100.0, 300.0):
+        lam = size * rng.normal(size=prepared.equations.rows)
+        point = prepared.equations.at(replace(start, lam=lam), prepared.model.loading(1.0))
+        counts.add(count := prepared._test._below_dense(point, -1e-6))
+        assert prepared._test._below_bordered(point, -1e-6) == count
+    assert len(counts) > 1
+
+
+@pytest.mark.parametrize("name", [*SYSTEMS, "four_bar", "hinged_space", "redundant"])
+def test_loose_rows_by_inverse_iteration_are_those_of_all_singular_values(name):
+    """Four-bars of parallel hinges in space have rows that depend on others: both ways find as many, and the same."""
+    table = redundant() if name == "redundant" else EVERY[name]()
+    equations = Equations(model_of(table, 2, 3))
+    state = equations.start(equations.model.loading(0.0))
+    point = equations.at(state, equations.model.loading(1.0))
+    if not equations.rows:
+        return
+    all_squares, all_left, largest = newton._all_singular(equations, point)
+    squares, left, _ = newton._smallest(equations, point)
+    limit = newton.SLACK**2 * largest
+    loose, few = all_left[:, all_squares < limit], left[:, squares < limit]
+    assert loose.shape == few.shape
+    assert (name == "redundant") == bool(loose.shape[1])
+    # The same space: projections onto it are equal, to the twelve digits by which it stands out.
+    np.testing.assert_allclose(few @ few.T, loose @ loose.T, atol=1e-6)

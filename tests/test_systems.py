@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from scenes import SOFT, cantilever, gauss_points, made, model_of, three
+from scenes import SOFT, UNLIKE, arc_across, cantilever, gauss_points, made, model_of, three
 from systems import EVERY, EVERYTHING, PLANE_SYSTEMS, SYSTEMS, linked, linked_space, sliding_plane, sliding_space
 
 import sfetcas
@@ -392,6 +392,31 @@ def test_universal_support_and_joint_keep_their_axes_normal():
     assert moment @ b == pytest.approx(0.0, abs=1e-10)
 
 
+def test_universal_support_of_a_flexible_member():
+    """Its moment is normal to the axis in the ground and to the one that the member carries; a ball holds the rest."""
+    table = {
+        "sections": {"s": UNLIKE},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "universal", "axis": [0, 0.2, 1], "axis2": [0, 1, -0.2]},
+            "B": {"position": [1, 0.4, 0.3], "support": "ball"},
+        },
+        "members": {
+            "m": {"nodes": ["A", "B"], "section": "s", "shape": arc_across([0] * 3, [1, 0.4, 0.3], 1.2, [0, 0, 1])}
+        },
+        "loads": {"f": {"type": "force", "member": "m", "at": 0.4, "value": [0.5, -1.0, 4.0]}},
+    }
+    step = answer(table)
+    (force, moment), node = step.reaction("A"), step.model.scene.nodes["A"]
+    a, b = np.asarray(node.axis), quat.rotate(step.quaternion("A"), np.asarray(node.axis2))
+    assert a @ b == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(moment) > 1e-2
+    assert moment @ a == pytest.approx(0.0, abs=1e-10)
+    assert moment @ b == pytest.approx(0.0, abs=1e-10)
+    start = step.along("m", 0.0)
+    np.testing.assert_allclose(start["moment"][0] + moment, 0.0, atol=1e-10)
+    np.testing.assert_allclose(start["force"][0] + force, 0.0, atol=1e-10)
+
+
 def test_cylindrical_support_holds_neither_along_nor_about_its_line():
     step = answer(SYSTEMS["small_space"]())
     line = np.asarray(step.model.scene.nodes["D"].direction)
@@ -423,3 +448,36 @@ def test_scenes_are_what_they_say():
     assert len(EVERY) == len(SYSTEMS) + len(set(EVERY) - set(SYSTEMS))
     assert linked()["springs"].keys() >= {"foot", "pin", "rope", "push"}
     assert sliding_plane()["motions"]
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+@pytest.mark.parametrize("type_", ["rigid", "flexible"])
+def test_pin_in_a_slot_stays_on_its_line_and_pushes_across_it(type_, dimension):
+    """A slotted lever on a spring, driven by the pin of a crank: its angle points to the pin."""
+    table = {
+        "dimension": dimension,
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "hinge"},
+            "P": {"position": [1, 0], "direction": [1, 2]},
+            "O": {"position": [0, -2], "support": "hinge"},
+        },
+        "members": {
+            "lever": {"nodes": ["O", "P"], "type": "rigid"},
+            "crank": {"nodes": ["A", "P"], "section": "s", "type": type_, "release": ["rigid", "slot"]},
+        },
+        "springs": {"k": {"node": "O", "stiffness": 0.5}},
+        "motions": {"drive": {"node": "A", "rotation": 1.0}},
+        "analysis": {"steps": [0.3, 1.0, -0.8], "accuracy": 1e-8},
+    }
+    for step in sfetcas.solve(made(table)).steps:
+        tip = step.along("crank", [1.0])
+        x, y = tip["position"][0][:2]
+        turned = np.arctan2(y + 2.0, x) - np.arctan2(2.0, 1.0)
+        # Closings are closed to rounding.
+        assert step.spring("k").travel == pytest.approx(turned, abs=1e-12)
+        along = np.array([x, y + 2.0, 0.0]) / np.hypot(x, y + 2.0)
+        force = tip["force"][0]
+        assert force @ along == pytest.approx(0.0, abs=1e-12)
+        # The lever in balance: the pin's moment about its hinge is that of the spring.
+        assert np.cross([x, y + 2.0, 0.0], force)[2] == pytest.approx(step.spring("k").effort, abs=1e-12)

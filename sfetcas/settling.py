@@ -1,0 +1,270 @@
+"""Equilibria with given touches, and the places of contact that follow from their conditions.
+
+Each place is held while the equilibrium is solved; the places then follow by Newton's method on their conditions,
+with differences once and Broyden's updates.  The mesh moves with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import Array
+from .equations import Equations, State
+from .fields import transferred
+from .loading import Loading
+from .mesh import Mesh, Touch, breaks_of
+from .model import Model
+from .newton import Corrected
+from .prepared import Prepared
+from .scene import Scene
+from .touches import Touched
+
+__all__ = ["APART", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed"]
+
+NEAR = 0.35
+"""Cuts nearer to a place of contact than this share of their element make way for it."""
+
+APART = 1e-7
+"""Places nearer to each other, or to the end of a member, are the same: fractions of the length."""
+
+SETTLED = 1e-11
+"""Steps of places shorter than this have arrived: fractions of the length."""
+
+MOST_STEPS = 40
+"""Steps of places before giving up."""
+
+PATIENCE = 8
+"""Steps in a row in which a place may want beyond its room, before it counts as having got there."""
+
+MOST_TURN = 0.8
+"""A step along the way is too long when its corrections turn a node by more, rad."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """An equilibrium in contact; ``slopes`` is the derivative of the conditions by the places."""
+
+    prepared: Prepared
+    corrected: Corrected
+    loading: Loading
+    touched: Touched
+    slopes: Array | None = None
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh with its touches."""
+        return self.prepared.model.mesh
+
+
+@dataclass(frozen=True)
+class Way:
+    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m."""
+
+    loading: Callable[[Model], Loading]
+    offsets: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A place (0 or 1) of a touch that ran to the end of its member, or into the other place of its stretch."""
+
+    touches: tuple[Touch, ...]
+    touch: int
+    place: int
+    collapsed: bool
+
+
+def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
+    """A mesh with an element border at each place of contact; cuts that are too near make way."""
+    cuts = dict(base.cuts)
+    for name in {touch.member for touch in touches}:
+        places = sorted({x for touch in touches if touch.member == name for x in touch.places if 0.0 < x < 1.0})
+        old, breaks = cuts[name], breaks_of(scene, name)
+        keep = np.ones(len(old), bool)
+        for x in places:
+            e = int(np.clip(np.searchsorted(old, x) - 1, 0, len(old) - 2))
+            keep &= np.abs(old - x) > NEAR * (old[e + 1] - old[e])
+        keep |= np.isin(old, breaks)
+        far = [x for x in places if np.abs(breaks - x).min() > APART]
+        cuts[name] = np.unique(np.concatenate([old[keep], far]))
+    return replace(base, cuts=cuts, touches=touches)
+
+
+def free_places(touches: tuple[Touch, ...]) -> list[tuple[int, int]]:
+    """(touch, 0 or 1 for the begin or end) of each place within a member."""
+    return [(i, k) for i, touch in enumerate(touches) for k, x in enumerate(touch.places) if 0.0 < x < 1.0]
+
+
+def moved(touch: Touch, k: int, x: float) -> Touch:
+    """The touch with its begin (0) or end (1) at another place."""
+    return replace(touch, at=x) if k == 0 else replace(touch, to=x)
+
+
+def _stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
+    """The mesh with its places of contact moved and the cuts between them in proportion; None where they cross."""
+    cuts = dict(mesh.cuts)
+    for name in {touch.member for touch in touches}:
+        pairs = {x: x for x in breaks_of(scene, name)}
+        for old, new in zip(mesh.touches, touches, strict=True):
+            if old.member == name:
+                pairs |= dict(zip(old.places, new.places, strict=True))
+        before = np.array(sorted(pairs))
+        after = np.array([pairs[x] for x in before])
+        if (np.diff(after) < 0.2 * APART).any():
+            return None
+        cuts[name] = np.interp(cuts[name], before, after)
+    return replace(mesh, cuts=cuts, touches=touches)
+
+
+def balanced(equations: Equations, state: State, loading: Loading) -> State:
+    """The state with the multipliers that leave the least out of balance."""
+    n = equations.unknowns
+    if not equations.rows or equations.rows * n > 4_000_000:
+        return state
+    nothing = replace(state, lam=np.zeros(equations.rows))
+    point = equations.at(nothing, loading)
+    chosen = (equations.row >= n) & (equations.column < n)
+    rows = np.zeros((equations.rows, n))
+    rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
+    return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
+
+
+class Settler:
+    """Equilibria of one scene with given touches.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+
+    Attributes
+    ----------
+    solves : int
+        Equilibria with places held that were solved so far.
+    """
+
+    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared]) -> None:
+        self.scene, self.prepare = scene, prepare
+        self.solves = 0
+
+    def solved(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way, *, same: bool = False) -> Held | None:
+        """The equilibrium with places held; None where Newton's method does not get there."""
+        touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in mesh.touches)
+        self.solves += 1
+        prepared = self.prepare(replace(mesh, touches=touches))
+        loading = way.loading(prepared.model)
+        if source is None:
+            state = prepared.equations.start(loading)
+        elif same:
+            state = source[1]
+        else:
+            state = transferred(source[0], source[1], prepared.model)
+            state = balanced(prepared.equations, prepared.equations.holding(state, loading), loading)
+        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
+        if not corrected.converged and corrected.residual > 1e-9:
+            return None
+        return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+
+    def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | Ran | None:
+        """The equilibrium with the places of contact where their conditions hold."""
+        held = self.solved(mesh, source, way)
+        if held is None:
+            return None
+        slopes: Array | None = None
+        last, crowded = np.inf, 0
+        for _ in range(MOST_STEPS):
+            free = free_places(held.mesh.touches)
+            if not free:
+                return held
+            here = held.touched.conditions
+            slopes = self.slopes(held, way) if slopes is None else slopes
+            if slopes is None:
+                return None
+            step = -np.linalg.lstsq(slopes, here, rcond=1e-14)[0]
+            if not np.isfinite(step).all():
+                return None
+            step, ran, room = _shortened(held.mesh.touches, free, step)
+            crowded = 0 if ran is None else crowded + 1
+            if ran is not None and (room < 10.0 * APART or crowded > PATIENCE):
+                return ran
+            if np.abs(step).max() < SETTLED:
+                return replace(held, slopes=slopes)
+            there = self._stepped(held, free, step, way)
+            if there is None:
+                return ran
+            change = there.touched.conditions - here
+            taken = _places(there.mesh.touches, free) - _places(held.mesh.touches, free)
+            slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), 1e-300)
+            now = float(np.abs(there.touched.conditions).max())
+            if now > 0.5 * last:
+                slopes = None
+            held, last = there, now
+        return None
+
+    def _stepped(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
+        for share in (1.0, 0.3, 0.1, 0.03):
+            there = self._at_places(held, free, share * step, way)
+            if there is not None:
+                return there
+        return None
+
+    def _at_places(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
+        touches = list(held.mesh.touches)
+        for (i, k), change in zip(free, step, strict=True):
+            touches[i] = moved(touches[i], k, touches[i].places[k] + float(change))
+        mesh = _stretched(self.scene, held.mesh, tuple(touches))
+        source = held.prepared.model, held.corrected.state
+        if mesh is None:
+            if any(min(x, 1.0 - x) < APART for i, k in free for x in [touches[i].places[k]]):
+                return None
+            if any(touch.to is not None and touch.to - touch.at < APART for touch in touches):
+                return None
+            mesh = placed(self.scene, replace(held.mesh, touches=()), tuple(touches))
+            return self.solved(mesh, source, way)
+        return self.solved(mesh, source, way, same=True)
+
+    def slopes(self, held: Held, way: Way) -> Array | None:
+        """Derivative of the conditions by the places, by differences."""
+        free, here = free_places(held.mesh.touches), held.touched.conditions
+        columns = []
+        for j, (i, k) in enumerate(free):
+            touch = held.mesh.touches[i]
+            x = touch.places[k]
+            size = min(1e-6, 0.1 * min(x, 1.0 - x), 1.0 if touch.to is None else 0.1 * (touch.to - touch.at))
+            for sign in (1.0, -1.0):
+                step = np.zeros(len(free))
+                step[j] = sign * size
+                there = self._at_places(held, free, step, way)
+                if there is not None:
+                    break
+            if there is None:
+                return None
+            columns.append((there.touched.conditions - here) / step[j])
+        return np.column_stack(columns) if columns else np.zeros((0, 0))
+
+
+def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
+    return np.array([touches[i].places[k] for i, k in free])
+
+
+def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array) -> tuple[Array, Ran | None, float]:
+    """The step, shortened so that places keep their order; the place that wants beyond what is next to it; its room."""
+    factor, ran, least = 1.0, None, np.inf
+    for (i, k), change in zip(free, step, strict=True):
+        if abs(change) < SETTLED:
+            continue
+        touch, x = touches[i], touches[i].places[k]
+        room, collapsed = 1.0 - x if change > 0.0 else x, False
+        # Towards the other place of its stretch, unless that is an end of the member on the same side.
+        if touch.to is not None and (touch.places[1 - k] > x) == (change > 0.0):
+            room, collapsed = abs(touch.places[1 - k] - x), True
+        # Half of the room again and again: a double root at its end, as of a weight that hangs over.
+        if (abs(change) > 0.4 * room or room < 10.0 * APART) and room < least:
+            ran, least = Ran(touches, i, k, collapsed), room
+        # Two places of a stretch may both move towards each other.
+        factor = min(factor, 0.45 * room / abs(change))
+    return factor * step, ran, least

@@ -1,0 +1,106 @@
+"""Springs with stops: against held angles, complementarity, and what is refused."""
+
+import numpy as np
+import pytest
+from scenes import SOFT, made
+
+from sfetcas import SceneError, solve
+
+STOP = (-0.2, 0.5)
+
+
+def lever(steps, *, dimension="plane", stop=STOP, **more):
+    """A rod on a hinge with a spring that has stops, under a force across its tip."""
+    return {
+        "dimension": dimension,
+        "sections": {"s": SOFT},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "springs": {"k": {"node": "A", "stiffness": 2.0, "stop": list(stop)}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, SOFT["EI3"]]}},
+        "analysis": {"steps": steps, "accuracy": 1e-8},
+        **more,
+    }
+
+
+def clamped(angle, force):
+    """The same rod held at an angle."""
+    table = lever([1.0])
+    del table["springs"]
+    table["nodes"]["A"]["support"] = "clamped"
+    table["motions"] = {"turn": {"node": "A", "rotation": angle}}
+    table["loads"]["f"]["value"] = [0, force]
+    return solve(made(table)).last
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_at_a_stop_it_is_a_rod_held_at_that_angle(dimension):
+    table = lever([0.1, 5.0, -5.0, 0.1], dimension=dimension)
+    free, high, low, again = solve(made(table)).steps
+    assert free.spring("k").stop == again.spring("k").stop == 0.0
+    np.testing.assert_allclose(free.position("B"), again.position("B"), atol=1e-8)  # twice the accuracy asked for
+    for step, at in ((high, STOP[1]), (low, STOP[0])):
+        spring = step.spring("k")
+        held = clamped(at, step.factor * SOFT["EI3"])
+        assert spring.travel == pytest.approx(at, abs=1e-12)
+        np.testing.assert_allclose(step.position("B"), held.position("B"), atol=2e-8)
+        # Spring and stop together do what the clamp does; the hinge itself takes no moment.
+        moment = held.reaction("A")[1][2]
+        assert spring.effort + spring.stop == pytest.approx(moment, abs=1e-6 * abs(moment))
+        np.testing.assert_allclose(step.reaction("A")[1], 0.0, atol=1e-9 * abs(moment))
+        assert spring.stop * at < 0.0  # it pushes back
+
+
+@pytest.mark.parametrize("force", np.linspace(-3.0, 3.0, 7).tolist())
+def test_angle_within_the_stops_and_stops_only_push(force):
+    spring = solve(made(lever([force]))).last.spring("k")
+    assert STOP[0] - 1e-12 <= spring.travel <= STOP[1] + 1e-12
+    inside = STOP[0] < spring.travel < STOP[1] and spring.stop == 0.0
+    pushes = (spring.travel == pytest.approx(STOP[1]) and spring.stop <= 0.0) or (
+        spring.travel == pytest.approx(STOP[0]) and spring.stop >= 0.0
+    )
+    assert inside or pushes
+
+
+def test_stop_along_a_direction_takes_what_the_tip_cannot():
+    table = lever([1.0, 8.0])
+    table["nodes"]["A"]["support"] = "clamped"
+    table["springs"] = {
+        "k": {"type": "translational", "node": "B", "stiffness": 0.0, "direction": [0, 1], "stop": [0, 0.1]}
+    }
+    small, large = solve(made(table)).steps
+    for step in (small, large):
+        assert step.position("B")[1] == pytest.approx(0.1, abs=1e-12)
+    # Whatever is added to the force at the stop goes into the stop.
+    added = 7.0 * SOFT["EI3"]
+    assert large.spring("k").stop - small.spring("k").stop == pytest.approx(-added, rel=1e-9)
+    np.testing.assert_allclose(small.position("B"), large.position("B"), atol=1e-9)
+    assert small.to_dict()["springs"]["k"]["stop"] == small.spring("k").stop
+
+
+@pytest.mark.parametrize(
+    ("spring", "sentence"),
+    [
+        ({"stop": [0.1, 0.5]}, r"^springs\.k\.stop: found \[0\.1, 0\.5\], accepted: \[low, high\] with zero"),
+        ({"stop": [0, 0]}, r"^springs\.k\.stop: found \[0, 0\], accepted: "),
+        ({"stop": 0.5}, r"^springs\.k\.stop: found 0\.5, accepted: "),
+        ({"stop": [0, 1], "type": "translational"}, r"^springs\.k\.stop: accepted with a rotational spring, or with a"),
+    ],
+)
+def test_wrong_stops_are_refused(spring, sentence):
+    table = lever([1.0])
+    table["springs"]["k"] |= spring
+    with pytest.raises(SceneError, match=sentence):
+        made(table)
+
+
+@pytest.mark.parametrize(
+    ("analysis", "sentence"),
+    [
+        ({"type": "path", "range": [0, 1]}, r"^springs\.k\.stop: found a stop on a path"),
+        ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with stops of springs"),
+    ],
+)
+def test_searches_that_know_no_stops_are_refused(analysis, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        solve(made(lever([1.0]) | {"analysis": analysis}))
