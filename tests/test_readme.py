@@ -1,0 +1,163 @@
+"""The README's table of keys is that of the records, and its scenes are scenes."""
+
+import json
+import re
+import sys
+import typing
+from pathlib import Path
+
+import pytest
+
+from sfetcas import Scene, solve
+from sfetcas.records import Record, plain
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+README = Path(__file__).parent.parent / "README.md"
+
+TABLES = {
+    "top": "Scene",
+    "section": "CrossSection",
+    "varying, by values": "Table",
+    "varying, polynomial": "Polynomial",
+    "node": "Node",
+    "member": "Member",
+    "shape, arc": "Arc",
+    "shape, helix": "Helix",
+    "shape, curvature": "Curvature",
+    "shape, spline": "Spline",
+    "spring": "Spring",
+    "load": "Load",
+    "motion": "Motion",
+    "history": "History",
+    "contact": "Contact",
+    "analysis": "Analysis",
+    "expect": "Expect",
+}
+"""What the README calls the records."""
+
+
+def within(annotation, found):
+    """Records in an annotation and in the fields of these, by name."""
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        if annotation.__name__ not in found:
+            found[annotation.__name__] = annotation
+            for field in annotation.model_fields.values():
+                within(field.annotation, found)
+    else:
+        for part in typing.get_args(annotation):
+            within(part, found)
+    return found
+
+
+def choices(annotation):
+    """Words that an annotation allows."""
+    if typing.get_origin(annotation) is typing.Literal:
+        return set(typing.get_args(annotation))
+    return set().union(*(choices(part) for part in typing.get_args(annotation)), set())
+
+
+RECORDS = within(Scene, {})
+
+
+def rows():
+    """Meaning and default by table and key, in the order of the README."""
+    section = README.read_text(encoding="utf-8").partition("## All keys of a scene")[2]
+    found = {}
+    for line in section.splitlines():
+        if line.startswith("| ") and not line.startswith("| table "):
+            table, key, meaning, default = (cell.strip() for cell in line.strip("|").split("|"))
+            assert (table, key.strip("`")) not in found, line
+            found[table, key.strip("`")] = meaning, default
+    return found
+
+
+ROWS = rows()
+
+
+def field_of(table, key):
+    return RECORDS[TABLES[table]].model_fields[key]
+
+
+each = pytest.mark.parametrize(("table", "key"), list(ROWS), ids=[f"{table}-{key}" for table, key in ROWS])
+
+
+def test_table_has_each_key_of_each_record_in_their_order():
+    tables = {name: table for table, name in TABLES.items()}
+    wanted = []
+    for name, record in RECORDS.items():
+        # The type of a shape stands in the row of the shape and in the name of its table.
+        keys = [key for key, field in record.model_fields.items() if not shape_type(key, field)]
+        wanted += [(tables[name], key) for key in keys]
+    assert list(ROWS) == sorted(wanted, key=lambda row: list(TABLES).index(row[0]))
+
+
+def shape_type(key, field):
+    return key == "type" and choices(field.annotation) == {field.default}
+
+
+@each
+def test_row_gives_the_default(table, key):
+    field, (_, cell) = field_of(table, key), ROWS[table, key]
+    default = None if field.is_required() else plain(field.get_default(call_default_factory=True))
+    if field.is_required():
+        assert cell == "needed"
+    elif default in (None, {}, []):
+        # Nothing that could be written down: words say what is done without.
+        assert cell not in ("", "needed")
+        assert "`" not in cell
+    else:
+        assert re.fullmatch("`.*`", cell)
+        assert json.loads(cell.strip("`")) == default
+
+
+@each
+def test_row_says_in_a_line_what_is_meant_and_all_that_is_accepted(table, key):
+    meaning, _ = ROWS[table, key]
+    words = set(re.findall(r"`\"?(\w+)", meaning))
+    assert meaning
+    assert choices(field_of(table, key).annotation) <= words
+
+
+def test_rows_of_shapes_are_those_of_the_types():
+    types = {table.removeprefix("shape, ") for table in TABLES if table.startswith("shape, ")}
+    known = {choices(record.model_fields["type"].annotation).pop() for record in shapes()}
+    assert types == known - {"straight"}
+    assert known <= set(re.findall(r"`(\w+)`", ROWS["member", "shape"][0]))
+
+
+def shapes():
+    return typing.get_args(RECORDS["Member"].model_fields["shape"].annotation)
+
+
+def blocks():
+    return [tomllib.loads(block) for block in re.findall(r"```toml\n(.*?)```", README.read_text("utf-8"), re.DOTALL)]
+
+
+def test_scene_of_the_readme_is_solved_as_said():
+    x, y, _ = solve(Scene.from_dict(blocks()[0])).last.position("tip")
+    # the digits printed there; the accuracy asked for is 1e-6
+    assert (x, y) == pytest.approx((0.44500, 0.81060), abs=1e-5)
+
+
+def test_system_of_the_readme_drives_its_joint():
+    (system,) = (block for block in blocks() if "springs" in block)
+    nodes = {
+        "A": {"position": [0, 0], "support": "hinge"},
+        "B": {"position": [0, 1], "joint": "hinge"},
+        "C": {"position": [1, 1], "support": "clamped"},
+    }
+    members = {**system["members"], "beam": {"nodes": ["B", "C"], "section": "strip"}}
+    step = solve(
+        Scene.from_dict({**system, "nodes": nodes, "members": members, "sections": {"strip": {"EI3": 1.0}}})
+    ).last
+    # prescribed: right to rounding
+    assert step.spring("knee").to_dict() == pytest.approx({"angle": 0.5, "moment": -5.0}, abs=1e-9)
+
+
+def test_path_of_the_readme_is_an_analysis():
+    (path,) = (block["analysis"] for block in blocks() if block.get("analysis", {}).get("type") == "path")
+    assert RECORDS["Analysis"].from_dict(path).span == (-1.5, 2.5)
