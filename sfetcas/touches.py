@@ -33,6 +33,9 @@ COARSE = 1e-6
 NOISE = 1e-4
 """On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
 
+THIRDS = 40
+"""Times an interval is cut to two thirds: to a gap within rounding."""
+
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
 
@@ -319,6 +322,16 @@ class Touched:
                     return True
         return False
 
+    def _nearest(self, contact: str, member: str, x: Array) -> Array:
+        """The place of the smallest gap, by thirds of the interval round the smallest of the samples."""
+        i = int(np.argmin(self.gaps(contact, member, x, 0.0)))
+        low, high = x[max(i - 1, 0)], x[min(i + 1, len(x) - 1)]
+        for _ in range(THIRDS):
+            inner = low + np.array([0.0, 1.0, 2.0, 3.0]) / 3.0 * (high - low)
+            k = int(np.argmin(self.gaps(contact, member, inner, 0.0)))
+            low, high = inner[max(k - 1, 0)], inner[min(k + 1, 3)]
+        return np.array([0.5 * (low + high)])
+
     def _over_edge(self, contact: str, member: str, offset: float, way: float, limit: float) -> list[Gap]:
         if any(t.contact == contact and t.member == member for t in self.model.mesh.touches):
             return []
@@ -346,6 +359,8 @@ class Touched:
         for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
             sharp = self.obstacles[contact].kind == "sharp"
             x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
+            if not sharp:
+                x = self._nearest(contact, member, x)
             if len(x):
                 gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
                 found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
