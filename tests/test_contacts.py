@@ -155,6 +155,9 @@ def test_wrapping_a_drum_takes_the_curvature_of_the_drum():
     x = np.linspace(begin, end, 9)[1:-1]
     found = step.along("beam", x)
     np.testing.assert_allclose(found["moment"][:, 2], -1.0 / 0.6, rtol=1e-12)
+    # Nothing bends suddenly where it begins and ends.
+    outside = step.along("beam", [np.nextafter(begin, 0.0), np.nextafter(end, 1.0)])["moment"][:, 2]
+    np.testing.assert_allclose(outside, -1.0 / 0.6, rtol=1e-8)
     # Frictionless: the pull along the stretch is the same everywhere.
     pull = np.linalg.norm(found["force"], axis=1)
     np.testing.assert_allclose(pull, pull[0], rtol=1e-9)
@@ -309,6 +312,17 @@ def test_loads_may_come_and_go():
     np.testing.assert_allclose(up.contacts["floor"]["force"], down.contacts["floor"]["force"], atol=1e-7)
     assert off.contacts["floor"]["at"] is None
     assert off.contacts["floor"]["gap"] == pytest.approx(off.position("B")[1], abs=1e-9)
+
+
+def test_obstacle_does_not_hold_what_rises_again():
+    """The weight grows and falls while the factor grows: the way leads from contact out of it."""
+    table = above(0.2, loads={"w": {**weight(1.0)["w"], "history": "w"}})
+    table["histories"] = {"w": {"t": [0, 1, 2], "value": [0, 6, 1]}}
+    table["analysis"] = {"accuracy": 1e-8, "steps": [1.0, 2.0]}
+    down, up = solve(made(table)).steps
+    assert down.contacts["floor"]["at"] == 1.0
+    assert up.contacts["floor"]["at"] is None
+    assert up.position("B")[1] > 0.01
 
 
 def test_obstacle_out_of_reach_changes_nothing():
