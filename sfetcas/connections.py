@@ -268,6 +268,7 @@ class _Toucher:
             stop = obstacles[touch.contact]
             if touch.to is None:
                 yield self._on(touch, stop)
+                yield from self._lying(touch, stop, covered) if touch.flat else ()
                 continue
             ends = [(touch.contact, self.place(touch, at)) for at in touch.places if at in (0.0, 1.0)]
             if anchored(self.scene, touch, stop) and not covered & set(ends):

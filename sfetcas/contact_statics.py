@@ -270,7 +270,8 @@ class ContactRun:
             idle = np.abs(pressed).max() < IDLE * float(np.linalg.norm(held.touched.force(touch)))
             if idle and all(0.0 < x < 1.0 or held.touched.goes_on(touch, x) for x in touch.places):
                 inner = [x for x in touch.places if 0.0 < x < 1.0]
-                touches += [replace(touch, at=x, to=None, number=touch.number + 50 * i) for i, x in enumerate(inner)]
+                ends = (replace(touch, at=x, to=None, flat=True) for x in inner)
+                touches += [replace(end, number=touch.number + 50 * i) for i, end in enumerate(ends)]
             else:
                 touches.append(touch)
         if [t.to for t in touches] == [t.to for t in held.mesh.touches]:
@@ -283,18 +284,24 @@ class ContactRun:
         if self.scene.analysis.unstable != "leave" or not can_leave(held) or self._judged(held, way).negative <= 0:
             return held, ()
         pressing = self._pressing(held, way)
-        prepared, loading = pressing.prepared, pressing.loading
-        touches = pressing.mesh.touches
+        loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
+        source = pressing.prepared.model, pressing.corrected.state
+        for start in (pressing, self.settler.solved(replace(pressing.mesh, touches=loose), source, way)):
+            found = None if start is None else self._downhill(start, loose, way)
+            if found is not None and self._judged(found, way).negative <= 0:
+                return found, ("left an unstable equilibrium in contact along its escape shape",)
+        return held, ("unstable, and no stable equilibrium was found along its escape shape",)
+
+    def _downhill(self, start: Held, touches: tuple[Touch, ...], way: Way) -> Held | None:
+        """From an unstable state along its escape shape, then what touches is looked at again."""
+        prepared = start.prepared
         try:
-            stability = prepared.stability(pressing.corrected)
-            corrected, _ = prepared.leave(pressing.corrected.state, stability, loading)
-            there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
-            found = self.toucher.resolved(replace(pressing.mesh, touches=()), there, touches, way)
+            corrected, _ = prepared.leave(start.corrected.state, prepared.stability(start.corrected), start.loading)
+            touched = Touched(prepared.equations, corrected.state, start.loading)
+            there = Held(prepared, corrected, start.loading, touched)
+            return self.toucher.resolved(replace(start.mesh, touches=()), there, touches, way)
         except SolveError:
-            found = None
-        if found is None or self._judged(found, way).negative > 0:
-            return held, ("unstable, and no stable equilibrium was found along its escape shape",)
-        return found, ("left an unstable equilibrium in contact along its escape shape",)
+            return None
 
     def _freed(self, held: Held, way: Way) -> int:
         """How many more ways out there are when places of contact may slide along their members.
@@ -304,7 +311,7 @@ class ContactRun:
         """
         touched, touches = held.touched, held.mesh.touches
         free = [(i, k) for i, t in enumerate(touches) for k, x in enumerate(t.places) if 0.0 < x < 1.0]
-        single = [j for j, (i, _) in enumerate(free) if touches[i].to is None]
+        single = [j for j, (i, _) in enumerate(free) if touches[i].to is None and not touches[i].flat]
         if not single:
             return 0
         slopes = self.settler.slopes(held, way)

@@ -33,6 +33,9 @@ class Touch:
     way : float
         1 or -1: on which side of the member an edge is (1: the member's normal is the edge times the tangent), or
         to which side a circle bends the member.
+    flat : bool
+        The section at a single place keeps lying on the obstacle: the end of a stretch without pressure, for the
+        test of stability.
     """
 
     contact: str
@@ -42,6 +45,7 @@ class Touch:
     number: int = 0
     offset: float = 0.0
     way: float = 1.0
+    flat: bool = False
 
     @property
     def name(self) -> str:

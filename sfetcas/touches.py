@@ -33,6 +33,9 @@ COARSE = 1e-6
 NOISE = 1e-4
 """On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
 
+THIRDS = 40
+"""Times an interval is cut to two thirds: to a gap within rounding."""
+
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
 
@@ -276,7 +279,7 @@ class Touched:
         return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
 
     def _runs(self, contact: str, member: str, offset: float, limit: float) -> list[Gap]:
-        x = self.samples(member)
+        x = self._with_smallest(contact, member, self.samples(member), offset)
         keep = np.ones(len(x), bool)
         keep[0], keep[-1] = (self.takes_part(contact, node) for node in self.model.scene.members[member].nodes)
         for touch in self.model.mesh.touches:
@@ -319,6 +322,30 @@ class Touched:
                     return True
         return False
 
+    def _with_smallest(self, contact: str, member: str, x: Array, offset: float) -> Array:
+        """The samples, and between them where an obstacle that is smaller than their spacing may be entered."""
+        stop = self.obstacles[contact]
+        length = self.model.scene.center_lines[member].length
+        if stop.kind != "round" or stop.radius > 4.0 * length * np.diff(x).max():
+            return x
+        gaps = self.gaps(contact, member, x, offset)
+        inner = (gaps[1:-1] <= gaps[:-2]) & (gaps[1:-1] <= gaps[2:]) & (gaps[1:-1] < length * np.diff(x).max())
+        found = [self._smallest(contact, member, float(x[i]), float(x[i + 2])) for i in np.flatnonzero(inner)]
+        return np.unique(np.append(x, found))
+
+    def _nearest(self, contact: str, member: str, x: Array) -> Array:
+        """The place of the smallest gap, from the smallest of samples."""
+        i = int(np.argmin(self.gaps(contact, member, x, 0.0)))
+        return np.array([self._smallest(contact, member, float(x[max(i - 1, 0)]), float(x[min(i + 1, len(x) - 1)]))])
+
+    def _smallest(self, contact: str, member: str, low: float, high: float) -> float:
+        """The place of the smallest gap between two places, by thirds."""
+        for _ in range(THIRDS):
+            inner = low + np.array([0.0, 1.0, 2.0, 3.0]) / 3.0 * (high - low)
+            k = int(np.argmin(self.gaps(contact, member, inner, 0.0)))
+            low, high = float(inner[max(k - 1, 0)]), float(inner[min(k + 1, 3)])
+        return 0.5 * (low + high)
+
     def _over_edge(self, contact: str, member: str, offset: float, way: float, limit: float) -> list[Gap]:
         if any(t.contact == contact and t.member == member for t in self.model.mesh.touches):
             return []
@@ -346,6 +373,8 @@ class Touched:
         for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
             sharp = self.obstacles[contact].kind == "sharp"
             x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
+            if not sharp:
+                x = self._nearest(contact, member, x)
             if len(x):
                 gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
                 found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))

@@ -132,7 +132,8 @@ class Toucher:
         except SolveError:
             return None
         there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
-        return self.resolved(base, there, touches, way)
+        found = self.resolved(base, there, touches, way)
+        return None if found is None or self.reviser.ran_over(now, found) else found
 
 
 def can_leave(held: Held) -> bool:

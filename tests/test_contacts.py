@@ -155,6 +155,9 @@ def test_wrapping_a_drum_takes_the_curvature_of_the_drum():
     x = np.linspace(begin, end, 9)[1:-1]
     found = step.along("beam", x)
     np.testing.assert_allclose(found["moment"][:, 2], -1.0 / 0.6, rtol=1e-12)
+    # Nothing bends suddenly where it begins and ends.
+    outside = step.along("beam", [np.nextafter(begin, 0.0), np.nextafter(end, 1.0)])["moment"][:, 2]
+    np.testing.assert_allclose(outside, -1.0 / 0.6, rtol=1e-8)
     # Frictionless: the pull along the stretch is the same everywhere.
     pull = np.linalg.norm(found["force"], axis=1)
     np.testing.assert_allclose(pull, pull[0], rtol=1e-9)
@@ -309,6 +312,17 @@ def test_loads_may_come_and_go():
     np.testing.assert_allclose(up.contacts["floor"]["force"], down.contacts["floor"]["force"], atol=1e-7)
     assert off.contacts["floor"]["at"] is None
     assert off.contacts["floor"]["gap"] == pytest.approx(off.position("B")[1], abs=1e-9)
+
+
+def test_obstacle_does_not_hold_what_rises_again():
+    """The weight grows and falls while the factor grows: the way leads from contact out of it."""
+    table = above(0.2, loads={"w": {**weight(1.0)["w"], "history": "w"}})
+    table["histories"] = {"w": {"t": [0, 1, 2], "value": [0, 6, 1]}}
+    table["analysis"] = {"accuracy": 1e-8, "steps": [1.0, 2.0]}
+    down, up = solve(made(table)).steps
+    assert down.contacts["floor"]["at"] == 1.0
+    assert up.contacts["floor"]["at"] is None
+    assert up.position("B")[1] > 0.01
 
 
 def test_obstacle_out_of_reach_changes_nothing():
@@ -479,3 +493,64 @@ def test_plane_may_be_given_by_its_other_normal():
 def test_searches_that_know_no_contact_are_refused(analysis, sentence):
     with pytest.raises(SceneError, match=sentence):
         made(above(0.2, loads=weight(3), analysis=analysis))
+
+
+# -- ways to a state in contact -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["knife_edge_half_beam", "drum_cantilever_tip_force", "floor_rod_lifted_by_one_end"])
+def test_one_factor_alone_gives_what_steps_give(name):
+    """No load step is needed, and no obstacle is jumped over on the way."""
+    scene = load(f"problems/{name}.toml")
+    last = scene.analysis.steps[-1]
+    alone = solve(scene.replace(analysis=scene.analysis.replace(steps=(last,)), expect=())).last
+    steps = solve(scene).last
+    for contact, entry in steps.contacts.items():
+        np.testing.assert_allclose(alone.contacts[contact]["at"], entry["at"], atol=1e-7)
+
+
+def test_small_peg_is_not_jumped_over():
+    """The state without the peg lies far below it, and free of it."""
+    peg = {"type": "circle", "center": [0.8, -0.05], "radius": 0.01, "member": "m"}
+    table = above(0.0, contact=peg, loads=tip(10.0), analysis={"accuracy": 1e-6})
+    step = solve(made(table)).last
+    at = step.contacts["floor"]["at"]
+    assert isinstance(at, float)
+    assert step.along("m", [at])["position"][0][1] > -0.05
+    free = solve(made({**table, "contacts": {}})).last
+    assert np.interp(0.8, *free.along("m", np.linspace(0, 1, 200))["position"][:, :2].T) < -0.3
+
+
+def test_ring_is_flattened_on_a_floor():
+    """Half a ring between sleeves pressed down: along the flat part the moment takes the curvature away."""
+    table = {
+        "sections": {"s": SOFT},
+        "nodes": {
+            "T": {"position": [0, 2], "support": "slider", "direction": [0, 1]},
+            "B": {"position": [0, 0], "support": "slider", "direction": [0, 1]},
+        },
+        "members": {"m": {"nodes": ["B", "T"], "section": "s", "shape": {"type": "arc", "angle": math.pi}}},
+        "contacts": {"floor": FLOOR},
+        "motions": {"press": {"node": "T", "displacement": [0, -1]}},
+        "analysis": {"accuracy": 1e-8, "steps": [0.2, 1.0]},
+    }
+    table["members"]["m"]["shape"] |= {"start": [1, 0, 0], "normal": [0, 0, 1]}
+    point, flat = solve(made(table)).steps
+    assert point.contacts["floor"]["at"] == 0.0
+    begin, end = flat.contacts["floor"]["at"]
+    assert begin == 0.0
+    x = np.linspace(0.0, end, 7)
+    np.testing.assert_allclose(flat.along("m", x)["moment"][:, 2], -SOFT["EI3"], rtol=1e-12)
+    np.testing.assert_allclose(flat.along("m", x)["position"][:, 1], 0.0, atol=1e-9)
+    # The force stands where the flat part ends: at its lever the press and the sleeves balance.
+    force = flat.contacts["floor"]["force"][1]
+    np.testing.assert_allclose(balance(flat), 0.0, atol=1e-10)
+    assert force > point.contacts["floor"]["force"][1]
+
+
+@pytest.mark.parametrize(("element", "elements", "tolerance"), [("SFET2", 200, 2e-4), ("SFET3", 40, 1e-5)])
+def test_coarse_elements_know_contact_as_well(element, elements, tolerance):
+    one = solve(made(CASES["wrapped"])).last.contacts["floor"]
+    other = solve(made(CASES["wrapped"]), element=element, elements=elements).last.contacts["floor"]
+    # Of order 2 and 4 in the length of the elements.
+    np.testing.assert_allclose(other["at"], one["at"], atol=tolerance)
