@@ -19,6 +19,7 @@ from .arrays import Array, Index
 from .beams import Beams, Scales, beams_of, scales_of
 from .connections import Group, connect
 from .elements import Element, element_by_name
+from .errors import SceneError
 from .loading import Followers, Loading, find_followers, unit_loadings
 from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
@@ -123,6 +124,23 @@ class Model:
         """Whether the energy of the nonlinear program is complete: moments in space are not in it."""
         turning = self.space and any(group.moment.any() for group in self.groups.values())
         return self.has_potential and not turning
+
+    def check_complete(self) -> None:
+        """Refuse to be solved by itself where the scene says more than the model holds.
+
+        Raises
+        ------
+        SceneError
+            Contacts, or stops of springs: which of them act is found by :func:`sfetcas.solve` only.
+        """
+        scene = self.scene
+        if scene.contacts and not self.mesh.touches:
+            message = "a model by itself knows no contact, accepted: the scene without contacts, or solve(scene)"
+            raise SceneError(message, ("contacts",))
+        stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
+        if stopped and not self.mesh.stops:
+            message = "a model by itself knows no stops, accepted: the spring without stop, or solve(scene)"
+            raise SceneError(message, ("springs", stopped[0], "stop"))
 
     @functools.cached_property
     def members(self) -> tuple[str, ...]:

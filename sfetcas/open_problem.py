@@ -28,6 +28,11 @@ __all__ = ["OpenAnswer", "OpenProblem", "equilibrium_nlp"]
 def equilibrium_nlp(model: Model | Prepared, factor: float = 1.0) -> OpenProblem:
     """The equilibrium of a model at a load factor as a nonlinear program that can be extended.
 
+    Raises
+    ------
+    SceneError
+        The scene has loads without potential, contacts, or stops of springs.
+
     Example
     -------
     >>> problem = equilibrium_nlp(assemble(scene, uniform_mesh(scene, 4, 8)))      # doctest: +SKIP
@@ -35,6 +40,9 @@ def equilibrium_nlp(model: Model | Prepared, factor: float = 1.0) -> OpenProblem
     >>> answer = problem.with_row("tip on the line", y - 0.2, unit=1.0).solve()   # doctest: +SKIP
     """
     prepared = model if isinstance(model, Prepared) else Prepared(model)
+    prepared.model.check_complete()
+    if not prepared.model.minimisable:
+        raise SceneError("loads that follow and moments in space have no energy, which a program to be extended needs")
     loading = prepared.model.loading(factor)
     guess, _ = prepared.guess(loading)
     return OpenProblem(prepared, factor, EquilibriumProblem(prepared.model, loading, guess, kernels="interpreted"))

@@ -121,10 +121,13 @@ def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = 
 
     Raises
     ------
+    SceneError
+        The scene has contacts or stops of springs, which only :func:`solve` looks for.
     SolveError
         No equilibrium was found.
     """
     prepared = model if isinstance(model, Prepared) else Prepared(model)
+    prepared.model.check_complete()
     loading = prepared.model.loading(factor)
     found, iterations = _warm(prepared, start, loading) if start is not None else None, 0
     if found is None:
@@ -138,6 +141,12 @@ def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected
 
 
 def _cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
+    if not prepared.model.minimisable:
+        start = prepared.equations.start(prepared.model.loading(0.0, 0.0))
+        followed = follow(prepared, loading.scaled, start, leave=False)
+        if not followed.reached:
+            raise SolveError(Status.FAILED, "the loads could not be followed from zero", followed.state)
+        return prepared.correct(followed.state, loading), 0
     state, gap = prepared.guess(loading)
     if gap > 0.2:
         equations = prepared.equations

@@ -9,6 +9,7 @@ from systems import EVERYTHING, FOLLOWING, following, following_space
 from test_equations import full, trial, unit
 
 import sfetcas
+from sfetcas import SceneError, equilibrium_nlp
 from sfetcas import quaternion as quat
 from sfetcas.fields import Fields
 from sfetcas.statics import solve_model
@@ -313,3 +314,26 @@ def test_moment_about_the_axis_of_a_held_hinge_has_a_potential():
     other = solved(table)
     np.testing.assert_allclose(other.position("B"), step.position("B"), atol=1e-9)
     np.testing.assert_allclose(other.reaction("B")[1] - step.reaction("B")[1], -across, atol=1e-7)
+
+
+def test_models_by_themselves_follow_what_cannot_be_minimised():
+    table = cantilever((0.0, 10.0))
+    table["loads"] = {"f": {"type": "force", "node": "B", "value": [0, 10], "frame": "follower"}}
+    model = model_of(table, 8, 5)
+    step = solve_model(model)
+    np.testing.assert_allclose(step.position("B")[:2], [-0.0921231811893664, 0.546983264593714], atol=1e-6)
+    with pytest.raises(SceneError, match="loads that follow and moments in space have no energy"):
+        equilibrium_nlp(model)
+
+
+@pytest.mark.parametrize("key", ["contacts", "springs"])
+def test_models_by_themselves_refuse_what_only_a_whole_run_finds(key):
+    table = cantilever((0.0, 1.0))
+    more = {
+        "contacts": {"c": {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "m"}},
+        "springs": {"k": {"node": "B", "stiffness": 1.0, "stop": [-0.1, 0.1]}},
+    }
+    table[key] = more[key]
+    for attempt in (solve_model, equilibrium_nlp):
+        with pytest.raises(SceneError, match="a model by itself knows no"):
+            attempt(model_of(table, 2, 4))
