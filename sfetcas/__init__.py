@@ -28,9 +28,10 @@ from .paths import switch
 from .prepared import Prepared
 from .scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
 from .scenefile import dump, load
-from .sections import CrossSection
+from .sections import CrossSection, Polynomial, Table
 from .shapes import Arc, Curvature, Helix, Spline, Straight
 from .solution import Certificate, Equilibrium, Solution
+from .springs import Spring
 from .statics import Settings, solve_model
 
 __version__ = "0.1.0"
@@ -60,6 +61,7 @@ __all__ = [
     "OpenProblem",
     "Path",
     "PathPoint",
+    "Polynomial",
     "Prepared",
     "Scene",
     "SceneError",
@@ -68,8 +70,10 @@ __all__ = [
     "SolveError",
     "Solver",
     "Spline",
+    "Spring",
     "Status",
     "Straight",
+    "Table",
     "assemble",
     "check",
     "dump",

@@ -17,6 +17,7 @@ from .arrays import Array
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .equations import Equations, State
+from .joints import OnPlane, OnRound
 from .loading import Loading
 from .mesh import Touch
 
@@ -63,7 +64,27 @@ class Fields:
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
         force, moment = self.balance.reaction(node)
+        more_force, more_moment = self._pressed_at(node)
+        force, moment = force + more_force, moment + more_moment
         return force * self.model.scales.force, moment * self.model.scales.moment
+
+    def _pressed_at(self, node: str) -> tuple[Array, Array]:
+        """What an obstacle along a member takes over from a support at its end, dimensionless."""
+        force, moment = np.zeros(3), np.zeros(3)
+        place = self.model.segments.place(node)
+        # Where the obstacle has a row of its own for the node its share is told apart already.
+        if any(place in group.places for group in self.model.connections if isinstance(group.kind, (OnPlane, OnRound))):
+            return force, moment
+        for touch in self.model.mesh.touches:
+            nodes = self.model.scene.members[touch.member].nodes
+            for i, at in enumerate((0.0, 1.0)):
+                if touch.to is None or nodes[i] != node or at not in touch.places:
+                    continue
+                raw, laid = (self._along(touch.member, np.array([at]), pressed=pressed) for pressed in (False, True))
+                sign = 2.0 * i - 1.0
+                force = force + sign * (laid["force"][0] - raw["force"][0])
+                moment = moment + sign * (laid["moment"][0] - raw["moment"][0])
+        return force, moment
 
     def spring(self, name: str) -> SpringState:
         """A spring of the scene."""
@@ -81,10 +102,28 @@ class Fields:
             and ``moment`` (n, 3) N m of what is beyond on what is before, ``curvature`` (n, 3) 1/m about the
             section's axes b1, b2, b3.
         """
-        model, element = self.model, self.model.element
-        x = np.asarray(x, dtype=float)
-        if model.scene.members[member].type == "small":
+        model, x = self.model, np.asarray(x, dtype=float)
+        record, line = model.scene.members[member], model.scene.center_lines[member]
+        if record.type == "small":
             return self._along_body(member, x)
+        result = self._along(member, x)
+        if dimensionless:
+            return result
+        frames = self._frames(member, x, result["rotation"])
+        result["force"] = result["force"] * model.scales.force
+        result["moment"] = result["moment"] * model.scales.moment
+        strain = np.einsum("nij,ni->nj", frames, result["moment"])
+        if record.type == "rigid":
+            return {**result, "curvature": line.curvatures(x)}
+        stiffness = model.scene.sections[str(record.section)].stiffness(x)
+        with np.errstate(invalid="ignore"):
+            strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
+        result["curvature"] = line.curvatures(x) + strain
+        return result
+
+    def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
+        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
+        model, element = self.model, self.model.element
         part, cuts = model.elements_of(member), model.mesh.cuts[member]
         e, xi = _located(cuts, x)
         to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
@@ -99,24 +138,10 @@ class Fields:
         couple = _cross(turned, self._pull[part])
         moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
         rotation = rotations_along(model, self.state.q, member, x)
-        for touch in model.mesh.touches:
+        for touch in model.mesh.touches if pressed else ():
             if touch.member == member and touch.to is not None:
                 self._lay(touch, x, rotation, force, moment)
-        frames = self._frames(member, x, rotation)
-        result = {"position": position, "rotation": rotation, "force": force, "moment": moment}
-        if dimensionless:
-            return result
-        result["force"] = force * model.scales.force
-        result["moment"] = moment * model.scales.moment
-        strain = np.einsum("nij,ni->nj", frames, result["moment"])
-        record = model.scene.members[member]
-        if record.type == "rigid":
-            return {**result, "curvature": line.curvatures(x)}
-        stiffness = model.scene.sections[str(record.section)].stiffness(x)
-        with np.errstate(invalid="ignore"):
-            strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
-        result["curvature"] = line.curvatures(x) + strain
-        return result
+        return {"position": position, "rotation": rotation, "force": force, "moment": moment}
 
     def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
         """Force and moment along a stretch that lies on an obstacle, in place, dimensionless.
@@ -159,10 +184,10 @@ class Fields:
         element = model.element
         to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
         gained = sums[e] - sums[first] + np.einsum("nk,nk->n", to_x, pushed[e])
-        start = self.along(touch.member, np.array([np.nextafter(touch.at, 0.0)]), dimensionless=True)
         if first == 0:
             begin = float(_three(self._start_forces(part)[0]) @ self._tangent_at(touch.member, 0.0))
         else:
+            start = self.along(touch.member, np.array([np.nextafter(touch.at, 0.0)]), dimensionless=True)
             begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
         bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
         return np.asarray(begin - bent * model.scales.length - gained)
@@ -176,13 +201,18 @@ class Fields:
         return np.asarray(self._loading.couple[self.model.segments.place(node)])
 
     def load_before(self, member: str, x: Array) -> Array:
-        """Distributed load (n, 3) from the start of a member to fractions of its length, dimensionless."""
+        """Load (n, 3) within a member from its start to fractions of its length, dimensionless."""
         model, element = self.model, self.model.element
-        spread = self._loading.spread[model.elements_of(member)]
+        part, cuts = model.elements_of(member), model.mesh.cuts[member]
+        spread, starts = self._loading.spread[part], self._start_forces(part)
+        # What the force loses from element to element is a load there, but where an obstacle has a place.
+        lost = starts[:-1] - spread[:-1].sum(axis=1) - starts[1:]
+        lost[np.isin(cuts[1:-1], [at for t in model.mesh.touches if t.member == member for at in t.places])] = 0.0
+        points = np.where(x[:, None] >= cuts[None, 1:-1], 1.0, 0.0) @ lost
         sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
         e, xi = _located(model.mesh.cuts[member], x)
         to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
-        return _three(sums[e] + np.einsum("nk,nka->na", to_x, spread[e]))
+        return _three(sums[e] + points + np.einsum("nk,nka->na", to_x, spread[e]))
 
     def stiffness(self, member: str, x: float) -> float:
         """Smallest bending stiffness of the section at a place, dimensionless."""

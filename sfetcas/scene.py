@@ -290,6 +290,17 @@ def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> No
         raise SceneError(unknown(word, table, kind), where)
 
 
+def _check_releases(scene: Scene) -> None:
+    for name, member in scene.members.items():
+        for node, release in zip(member.nodes, member.release, strict=True):
+            joint = scene.nodes[node].joint
+            if release not in ("rigid", joint) and joint != "rigid":
+                message = (
+                    f"found {release!r} at node {node!r}, whose joint is {joint!r}, accepted: with a rigid joint only"
+                )
+                raise SceneError(message, ("members", name, "release"))
+
+
 def _check_axes(scene: Scene) -> None:
     hinges, slides, universals = (
         released(scene.nodes, scene.members, ends) for ends in (("hinge",), SLIDING, ("universal",))
@@ -475,6 +486,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_axes,
     _check_dimension,
     _check_sections,
+    _check_releases,
     _check_bodies,
     _check_loads,
     _check_springs,

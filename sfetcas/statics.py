@@ -226,6 +226,7 @@ class _Found:
     stability: Stability
     notes: tuple[str, ...] = ()
     iterations: int = 0
+    left: tuple[float, ...] = ()
     kept: bool = False
 
 
@@ -239,6 +240,7 @@ class _Run:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.leave = scene.analysis.unstable == "leave"
+        self.creeping = False
         self.started = any(node.start is not None for node in scene.nodes.values())
         self.others: list[tuple[Model, State]] = []
         self._choose_meshes()
@@ -438,7 +440,7 @@ class _Run:
             f"left an unstable equilibrium along its escape shape at {100.0 * part:.3g} % of the way to these loads"
             for part in result.left
         )
-        return _Found(pilot, corrected, pilot.stability(corrected), notes)
+        return _Found(pilot, corrected, pilot.stability(corrected), notes, left=result.left)
 
     # -- several equilibria ---------------------------------------------------------------------
 
@@ -498,8 +500,16 @@ class _Run:
         base = self.pilot_mesh.refined()
         notes: tuple[str, ...] = ()
         held = contact.continued(base, factor)
+        if held is None and pilot.diagnosis.mobility and not contact.first_touches(base):
+            motion = pilot.diagnosis.motions[0]
+            message = (
+                f"nothing but obstacles holds a motion ({motion}), accepted: with a spring, or on an obstacle at first"
+            )
+            raise SceneError(message, ("contacts",))
         if held is None or not held.mesh.touches:
             free, failure = self._unstopped(pilot, factor)
+            if free is not None and free.left and not self.creeping and not self.scene.histories:
+                return self._crept(contact, pilot, factor, free.left[0])
             held = None
             if free is not None:
                 there = self._onto(base, free, factor)
@@ -515,6 +525,20 @@ class _Run:
                 detail = "no state in contact was found on the way of the loads from zero, nor by obstacles coming back"
                 raise SolveError(Status.FAILED, f"{detail}: {', '.join(contact.named(failure))}")
         return self._pressed(contact.answered(held, factor, self.target, notes), factor)
+
+    def _crept(self, contact: ContactRun, pilot: Prepared, factor: float, unstable: float) -> Equilibrium:
+        """The same by small steps from where the loads would make it jump: nothing jumps over an obstacle."""
+        self.creeping = True
+        try:
+            beyond = unstable
+            for growth in CREEP:
+                beyond *= growth
+                if beyond >= 1.0:
+                    break
+                self._in_contact(contact, pilot, beyond * factor)
+            return self._in_contact(contact, pilot, factor)
+        finally:
+            self.creeping = False
 
     def _unstopped(self, pilot: Prepared, factor: float) -> tuple[_Found | None, SolveError | None]:
         """The answer as if there were no obstacles; None where nothing else holds the structure."""
@@ -685,6 +709,9 @@ NO_POTENTIAL = (
     "loads without potential: no energy tells whether this is stable; the static tangent is regular all the way "
     "from zero load, and flutter would only show in dynamics"
 )
+
+CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
+"""Growth of the loads from step to step where a structure between obstacles becomes unstable."""
 
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
