@@ -200,6 +200,10 @@ class Balance:
                     moment = moment + self._moment_of(group, links, number, side)
         return moment
 
+    def spring_moment(self, node: str) -> Array:
+        """Moment that rotational springs at a node take from its surroundings."""
+        return self._connected(node)
+
     def _gain(self, member: str) -> Array:
         """Moment on the second end of a rigid member plus that on the first: what its forces leave."""
         part = self.model.elements_of(member)

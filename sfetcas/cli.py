@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SolveError as error:
         print(f"sfetcas: no solution: {error}", file=sys.stderr)
         return NO_SOLUTION
-    except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError, RuntimeError) as error:
         print(f"sfetcas: no solution: the numbers of this scene leave what can be computed ({error})", file=sys.stderr)
         return NO_SOLUTION
     except KeyboardInterrupt:

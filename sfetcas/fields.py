@@ -20,6 +20,7 @@ from .equations import Equations, State
 from .joints import OnPlane, OnRound
 from .loading import Loading
 from .mesh import Touch
+from .obstacles import obstacle
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -191,6 +192,27 @@ class Fields:
             begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
         bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
         return np.asarray(begin - bent * model.scales.length - gained)
+
+    @property
+    def largest_load(self) -> float:
+        """Largest force or moment on a place or a rotation, dimensionless."""
+        return max(float(np.abs(part).max(initial=0.0)) for part in (self._loading.force, self._loading.moment))
+
+    @property
+    def total_load(self) -> Array:
+        """Sum of all forces that act as loads, (3,) N."""
+        return _three(self._loading.force.sum(axis=0)) * self.model.scales.force
+
+    def moment_on(self, turn: int) -> float:
+        """Moment that acts on a rotation from outside, dimensionless."""
+        return float(np.linalg.norm(self._loading.moment[turn]))
+
+    def obstacle_normal(self, touch: Touch, at: float) -> Array:
+        """Unit vector (3,) from an obstacle to the member that lies on it."""
+        place = np.array([at])
+        position, tangent = self.positions(touch.member, place), self.tangents(touch.member, place)
+        stop = obstacle(self.model.scene.contacts[touch.contact], self.model.space)
+        return np.asarray(stop.normals(position, tangent, touch.way)[0])
 
     def own_force(self, node: str) -> Array:
         """Load (3,) on a node itself, N."""

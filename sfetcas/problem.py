@@ -283,9 +283,10 @@ class EquilibriumProblem:
         if not len(self.model.rotations.turns):
             return ca.mtimes(_dm(self.model.positions.W), self.x[self._reduction.unknowns :]) + self._offset
         reach = self._map("reach")(self._q_elements, self._tangent)
-        turning = self._reduction.unknowns
-        kept = ca.mtimes(_dm(self.model.positions.W), self.x[turning:])
-        return ca.mtimes(self._to_rows, ca.vec(reach)) + kept + self._offset
+        found = ca.mtimes(self._to_rows, ca.vec(reach)) + self._offset
+        if self.model.positions.unknowns:
+            found += ca.mtimes(_dm(self.model.positions.W), self.x[self._reduction.unknowns :])
+        return found
 
     def _norms(self) -> ca.MX:
         rows, columns = self._norm_parts
@@ -404,8 +405,10 @@ class EquilibriumProblem:
             return ca.densify(self.kept_displacements[rows.tolist()])
         reach = self._map("reach")(self._q_elements, self._tangent)
         constant = ca.DM(-(e @ self._rest)) + ca.mtimes(_dm(positions.B.rows(rows)), self._b)
-        kept = ca.mtimes(_dm(positions.Y.rows(rows)), self.x[self._reduction.unknowns :])
-        return ca.densify(ca.mtimes(self._by_elements(e), ca.vec(reach)) + kept + constant)
+        found = ca.mtimes(self._by_elements(e), ca.vec(reach)) + constant
+        if positions.unknowns:
+            found += ca.mtimes(_dm(positions.Y.rows(rows)), self.x[self._reduction.unknowns :])
+        return ca.densify(found)
 
     @functools.cached_property
     def _rest(self) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 
 from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
+from .contact_balance import refuse_lost_forces, refuse_unbalanced
 from .contact_statics import ContactRun, Pressed
 from .continuation import follow
 from .deflation import deflated
@@ -549,7 +550,8 @@ class _Run:
 
     def _pressed(self, found: Pressed, factor: float) -> Equilibrium:
         held = found.held
-        return _finished(
+        refuse_unbalanced(held.touched.fields)
+        answer = _finished(
             held.prepared,
             held.corrected,
             held.loading,
@@ -558,6 +560,8 @@ class _Run:
             estimate=found.error,
             notes=found.notes,
         )
+        refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
+        return answer
 
     # -- accuracy -------------------------------------------------------------------------------
 

@@ -71,6 +71,7 @@ ORDER = [
     "solution",
     "accuracy",
     "several",
+    "contact_balance",
     "contact_statics",
     "statics",
     "stops",

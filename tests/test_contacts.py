@@ -554,3 +554,85 @@ def test_coarse_elements_know_contact_as_well(element, elements, tolerance):
     other = solve(made(CASES["wrapped"]), element=element, elements=elements).last.contacts["floor"]
     # Of order 2 and 4 in the length of the elements.
     np.testing.assert_allclose(other["at"], one["at"], atol=tolerance)
+
+
+# -- what acts on stretches, and jumps ------------------------------------------------------------
+
+
+def test_column_that_buckles_between_walls_stays_between_them():
+    """In one step it must not jump through a wall: the same as in steps from below its critical load."""
+    table = between_walls(0.05, [1.0], nodes=False)
+    table["nodes"]["B"] |= {"support": "slider", "direction": [1, 0], "rotation": "hinge"}
+    del table["motions"]
+    table["loads"] = {"f": {"type": "force", "node": "B", "value": [-45 * SOFT["EI3"], 0]}}
+    once = solve(made(table)).last
+    slowly = solve(made(table | {"analysis": {"accuracy": 1e-8, "steps": [0.2, 0.25, 0.4, 0.7, 1.0]}})).last
+    assert once.position("B")[0] > 0.98
+    pushed = [max(abs(step.contacts[name]["force"][1]) for name in ("upper", "lower")) for step in (once, slowly)]
+    assert pushed[0] == pytest.approx(pushed[1], rel=1e-5)
+    stretch = next(entry["at"] for entry in once.contacts.values() if entry["at"] is not None)
+    # The part beyond the flat one buckles at that load: a little more than half a wave of it, which is slightly bent.
+    assert stretch[0] == pytest.approx(math.pi / math.sqrt(45.0), rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        {"type": "force", "node": "B", "value": [0, -1]},
+        {"type": "force", "member": "m", "at": 0.5, "value": [0, -1]},
+        {"type": "distributed", "member": "m", "value": [0, -2]},
+    ],
+)
+def test_clamp_on_the_floor_shares_no_force_with_it(load):
+    step = solve(made(above(0.0, loads={"f": load}))).last
+    total = 2.0 if load["type"] == "distributed" else 1.0
+    np.testing.assert_allclose(step.contacts["floor"]["force"], [0.0, total, 0.0], atol=1e-9)
+    np.testing.assert_allclose(step.reaction("A")[0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(step.reaction("A")[1], 0.0, atol=1e-9)
+
+
+def test_beam_lifts_off_around_a_force_that_pulls():
+    loads = weight(20.0) | {"up": {"type": "force", "member": "m", "at": 0.7, "value": [0, 12]}}
+    table = above(0.1, length=2.0, loads=loads)
+    step = solve(made(table)).last
+    entry = step.contacts["floor"]
+    assert len(entry["at"]) == 2
+    assert step.along("m", [0.7])["position"][0][1] > 0.01
+    carried = np.sum(entry["force"], axis=0)[1] + step.reaction("A")[0][1]
+    assert carried == pytest.approx(40.0 - 12.0, rel=1e-6)  # the accuracy of contact places
+
+
+def lying_in_two(**loads):
+    table = above(0.0, loads=loads)
+    table["nodes"]["C"] = {"position": [2, 0]}
+    table["members"]["n"] = {"nodes": ["B", "C"], "section": "s"}
+    table["contacts"]["floor"] = {key: value for key, value in FLOOR.items() if key != "member"} | {"members": "all"}
+    for name in ("m", "n"):
+        table["loads"][name] = {"type": "distributed", "member": name, "value": [0, -8]}
+    return table
+
+
+@pytest.mark.parametrize(
+    ("load", "sentence"),
+    [
+        (
+            {"type": "moment", "member": "m", "at": 0.5, "value": 1.0},
+            "hold a moment of 1 N m at 0.5 within the stretch",
+        ),
+        ({"type": "moment", "node": "B", "value": 1.5}, "hold a moment of 1.5 N m at node B within the stretch"),
+        ({"type": "force", "node": "B", "value": [0, 1.5]}, "was not brought into balance"),
+    ],
+)
+def test_what_an_obstacle_cannot_hold_is_no_answer(load, sentence):
+    with pytest.raises(SolveError, match=sentence):
+        solve(made(lying_in_two(extra=load)))
+
+
+def test_falling_onto_an_obstacle_is_refused_and_lying_on_it_is_not():
+    table = above(0.1, loads=weight(1.0))
+    table["nodes"]["A"]["support"] = "hinge"
+    with pytest.raises(SceneError, match="nothing but obstacles holds a motion"):
+        solve(made(table))
+    table = above(0.0, loads=weight(1.0))
+    table["nodes"]["A"]["support"] = "hinge"
+    np.testing.assert_allclose(solve(made(table)).last.position("B"), [1.0, 0.0, 0.0], atol=1e-9)

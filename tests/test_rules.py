@@ -7,6 +7,7 @@ import pytest
 from scenes import SOFT, cantilever, made
 
 import sfetcas
+from sfetcas import SceneError, solve
 
 BAR = {
     "sections": {"s": SOFT},
@@ -201,3 +202,38 @@ def test_part_held_by_a_translational_spring_needs_no_support(support):
         del table["springs"]
         with pytest.raises(sfetcas.SceneError, match="nothing holds nodes A, B"):
             made(table)
+
+
+def test_release_at_a_joint_is_refused():
+    table = cantilever()
+    table["nodes"]["C"] = {"position": [2, 0]}
+    table["nodes"]["B"] |= {"joint": "hinge", "direction": [1, 0]}
+    table["members"]["n"] = {"nodes": ["B", "C"], "section": "s", "release": ["slider", "rigid"]}
+    with pytest.raises(SceneError, match=r"^members\.n\.release: found 'slider' at node 'B', whose joint is 'hinge'"):
+        made(table)
+
+
+def test_springs_in_space_turn_less_than_once():
+    table = cantilever() | {"dimension": "space", "springs": {"k": {"node": "A", "stiffness": 1.0}}}
+    table["nodes"]["A"]["support"] = "hinge"
+    with pytest.raises(SceneError, match=r"^springs\.k\.rest: found 7, accepted in space: up to 6 rad"):
+        made(table | {"springs": {"k": {"node": "A", "stiffness": 1.0, "rest": 7.0}}})
+    with pytest.raises(SceneError, match=r"^motions\.t\.rotation: turns springs\.k by 7 rad, accepted in space"):
+        made(table | {"motions": {"t": {"node": "A", "rotation": 7.0}}})
+
+
+def test_driven_slider_crank_of_rigid_links():
+    """A closing without any displacement kept as an unknown."""
+    table = {
+        "nodes": {
+            "O": {"position": [0, 0], "support": "hinge"},
+            "P": {"position": [0.8, 0.6], "joint": "hinge"},
+            "Q": {"position": [3, 0], "support": "slider", "direction": [1, 0], "rotation": "hinge"},
+        },
+        "members": {"crank": {"nodes": ["O", "P"], "type": "rigid"}, "rod": {"nodes": ["P", "Q"], "type": "rigid"}},
+        "motions": {"drive": {"node": "O", "rotation": 1.2}},
+    }
+    step = solve(made(table)).last
+    angle, rod = np.arctan2(0.6, 0.8) + 1.2, np.hypot(2.2, 0.6)
+    x = np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
+    np.testing.assert_allclose(step.position("Q"), [x, 0.0, 0.0], atol=1e-12)
