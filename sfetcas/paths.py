@@ -350,6 +350,7 @@ class _Run:
         return {
             "range": f"the factor leaves the range at {factor:g}",
             "points": f"{count} points",
+            "closed": "it closes on itself",
             "lost": f"it could not be followed beyond factor {factor:.6g}",
         }[traced.end]
 

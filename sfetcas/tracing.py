@@ -108,9 +108,23 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
         points += [*(event.standing for event in met), there]
         if left:
             return Traced(points, events, "range")
+        if len(points) > LOOP and _closes(curve, start, now, there):
+            return Traced(points, events, "closed")
         length = used * _growth(curve, now, there)
         before, now = now, there
     return Traced(points, events, "points")
+
+
+def _closes(curve: Curve, start: Standing, now: Standing, there: Standing) -> bool:
+    """Whether the curve has come back to where it began, in the same direction."""
+    step = 1.2 * curve.prepared.distance(now.state, there.state)
+    near = curve.prepared.distance(start.state, there.state) < step
+    level = abs(there.factor - start.factor) <= 1.2 * abs(there.factor - now.factor) + 1e-9 * curve.unit
+    return near and level and curve.inner(start.tangent, there.tangent) > 0.9
+
+
+LOOP = 8
+"""Points before a curve may close: fewer make no loop."""
 
 
 def _longest(curve: Curve, now: Standing, stride: float) -> float:

@@ -677,3 +677,30 @@ def test_path_scenes_survive_their_files(tmp_path):
     dump(scene, tmp_path / "again.json")
     assert load(tmp_path / "again.json") == scene
     assert scene.analysis.span == (0.0, 23.0)
+
+
+def test_branch_that_is_a_loop_is_followed_once():
+    """From the bifurcation of a shallow arch the leaning branch meets the other end of the path and comes back."""
+    left, right = [[-1, 0], [-0.5, 0.25], [0, 0.35]], [[0, 0.35], [0.5, 0.25], [1, 0]]
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "a": {"position": [-1, 0], "support": "hinge"},
+            "t": {"position": [0, 0.35]},
+            "b": {"position": [1, 0], "support": "hinge"},
+        },
+        "members": {
+            "l": {"nodes": ["a", "t"], "section": "s", "shape": {"type": "spline", "points": left}},
+            "r": {"nodes": ["t", "b"], "section": "s", "shape": {"type": "spline", "points": right}},
+        },
+        "loads": {"f": {"type": "force", "node": "t", "value": [0, -1]}},
+        "analysis": {"type": "path", "range": [-5, 40], "branches": 1},
+    }
+    path = solve(made(table))
+    first = path.bifurcations[0].factor
+    for branch in path.branches[1:]:
+        assert branch.end == "it closes on itself"
+        assert branch.factors.max() <= first * (1.0 + 1e-6)  # the loop hangs from the bifurcation
+        # Back at the bifurcation the arch stands upright again: within a step of where the loop began.
+        assert abs(branch.factors[-1] - first) < 0.05 * first
+        assert len(branch.bifurcations) == 1
