@@ -141,6 +141,8 @@ class Prepared:
             found = self.correct(state, loading, iterations=50)
             if not found.converged:
                 detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
+                motions = [f"motions.{name}" for name in self.model.scene.motions]
+                detail += f"; {' and '.join(motions)} may contradict each other" if len(motions) > 1 else ""
                 raise SolveError(Status.FAILED, detail, state)
             return found, 0
         problem = self._problem
