@@ -478,7 +478,7 @@ class _Run:
     def _searched(self, found: _Found, factor: float) -> Search:
         """The search, on a mesh fine enough for what is strongly curled, but for elements that are prescribed."""
         first = found
-        if self.fixed != set(self.scene.members):
+        if not self._prescribed:
             first = self._onto(self._halved(found), found, factor)
         elif self.pilot_mesh is not self.target:
             first = self._onto(found.prepared.model.mesh.refined(), found, factor)
