@@ -16,7 +16,7 @@ def largest_difference(coarse: Fields, fine: Fields) -> float:
     largest = 0.0
     for name, cuts in coarse.model.mesh.cuts.items():
         x = np.sort(np.concatenate([cuts, 0.5 * (cuts[1:] + cuts[:-1])]))
-        a, b = (side.along(name, x, dimensionless=True)["position"] for side in (coarse, fine))
+        a, b = (side.positions(name, x) for side in (coarse, fine))
         largest = max(largest, float(np.linalg.norm(a - b, axis=1).max()))
     return largest / coarse.model.scene.size
 

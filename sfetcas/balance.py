@@ -133,6 +133,10 @@ class Balance:
         ends = self.model.rotations.ends
         return [ends[name][m.nodes.index(node)] for name, m in self.model.scene.members.items() if node in m.nodes]
 
+    def starting_moments(self, elements: slice) -> Array:
+        """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
+        return np.asarray(self._moments[elements, 0])
+
     # -- rigid members ----------------------------------------------------------------------------
 
     def _shared(self, number: int) -> bool:

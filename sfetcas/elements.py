@@ -30,13 +30,13 @@ import numpy as np
 
 from . import interpolation
 from .arrays import Array
-from .quaternion import product, turned
+from .quaternion import Components, product, turned
 
 __all__ = ["ELEMENTS", "Element", "element_by_name"]
 
 
 @dataclass(frozen=True)
-class Element:
+class Element(Components):
     """One element type: order, integration and dimension; everything else follows and is made once.
 
     Attributes
@@ -57,21 +57,6 @@ class Element:
     def name(self) -> str:
         """The name of scene files: SFET2, SFET3, ..."""
         return f"SFET{self.order + 1}"
-
-    @property
-    def components(self) -> int:
-        """Numbers a node: 4 (quaternion) or 1 (angle)."""
-        return 4 if self.space else 1
-
-    @property
-    def turns(self) -> int:
-        """Independent rotations a node: 3 or 1."""
-        return 3 if self.space else 1
-
-    @property
-    def axes(self) -> int:
-        """Components of a position: 3 or 2."""
-        return 3 if self.space else 2
 
     @property
     def stiffnesses(self) -> int:

@@ -329,15 +329,6 @@ class Equations:
         pairs = zip(self._linked, loading.loads, strict=True)
         return three, [link.evaluated(self, state, nodal, load)[3].copy() for link, load in pairs]
 
-    def starting_moments(self, state: State, loading: Loading) -> Array:
-        """Moments (elements, 3) about the fixed axes that the surroundings exert on the first node of each element."""
-        model, loading = self.model, self.effective(state, loading)
-        self._kernel.set(0, state.q[model.rotations.turns])
-        constant = self.segment_pulls(state.lam, loading)[self._owner]
-        self._kernel.set(3, loading.pull + constant[:, None, :])
-        first = self._kernel()[2][:, : model.element.turns]
-        return first.copy() if model.space else np.pad(first, ((0, 0), (2, 0)))
-
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
         model, positions = self.model, self.model.positions
@@ -424,11 +415,7 @@ class Equations:
     def _turn_bases(self, moments: Array, stiffness: Array, spin: Array) -> None:
         """Turn the components of rotations about a held axis, in place, so that the first is about it."""
         for e, k in self._on_axes:
-            basis, part = self._basis[int(self.model.rotations.turns[e, k])], slice(3 * k, 3 * k + 3)
-            moments[e, part] = moments[e, part] @ basis
-            stiffness[e, part] = basis.T @ stiffness[e, part]
-            stiffness[e, :, part] = stiffness[e, :, part] @ basis
-            spin[e, part] = basis.T @ spin[e, part]
+            _to_basis(self._basis[int(self.model.rotations.turns[e, k])], k, moments[e], stiffness[e], spin[e])
 
     def _closing_parts(self, spin: Array) -> list[Array]:
         parts = []
@@ -476,7 +463,6 @@ class _Linked:
         moves = np.vstack([equations.place_number, np.full((1, model.element.axes), -1)])
         turning, moving = numbers[group.turns].reshape(n, -1), moves[group.places].reshape(n, -1)
         self.cells = np.concatenate([turning, moving], axis=1)
-        self._width = width
         self._batch = Batch(by_turning(group.kind), n)
         self._batch.set(2, group.data)
         self._about = np.argwhere(np.isin(group.turns, list(equations._basis))).tolist()
@@ -509,12 +495,7 @@ class _Linked:
         gradient = gradient.copy()
         stiffness, spin = stiffness.reshape(n, width, width).copy(), spin.reshape(n, width, self.rows).copy()
         for h, side in self._about:
-            basis = equations._basis[int(group.turns[h, side])]
-            part = slice(self._width * side, self._width * (side + 1))
-            gradient[h, part] = gradient[h, part] @ basis
-            stiffness[h, part] = basis.T @ stiffness[h, part]
-            stiffness[h, :, part] = stiffness[h, :, part] @ basis
-            spin[h, part] = basis.T @ spin[h, part]
+            _to_basis(equations._basis[int(group.turns[h, side])], side, gradient[h], stiffness[h], spin[h])
         if convex and not self.rows:
             stiffness = _positive_part(stiffness)
         used = self.cells >= 0
@@ -542,6 +523,15 @@ class _Linked:
 
 FEW_ROWS = 12
 """Up to this many closings csparse is faster than MUMPS, beyond it can be ten times slower (measured)."""
+
+
+def _to_basis(basis: Array, number: int, moments: Array, stiffness: Array, spin: Array) -> None:
+    """Turn the components of one rotation of several, in place, to a basis; rotations about held axes are in space."""
+    part = slice(3 * number, 3 * number + 3)
+    moments[part] = moments[part] @ basis
+    stiffness[part] = basis.T @ stiffness[part]
+    stiffness[:, part] = stiffness[:, part] @ basis
+    spin[part] = basis.T @ spin[part]
 
 
 def _positive_part(matrices: Array) -> Array:

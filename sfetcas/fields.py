@@ -124,16 +124,11 @@ class Fields:
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
-        model, element = self.model, self.model.element
-        part, cuts = model.elements_of(member), model.mesh.cuts[member]
-        e, xi = _located(cuts, x)
-        to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
+        model = self.model
+        part = model.elements_of(member)
+        e, to_x = self._located(member, x)
         turned, spread = self.turned[part], self._loading.spread[part]
-        rest = model.beams.tangent[part]
-        here = np.einsum("nk,nka->na", to_x, (turned - rest)[e])
-        start, moments = self._element_starts(member)
-        line = model.scene.center_lines[member]
-        position = line.positions(x) + _three(start[e] + here) * model.scales.length
+        position, moments = self.positions(member, x), self._element_moments(member)
         force = _three(self._start_forces(part)[e] - np.einsum("nk,nka->na", to_x, spread[e]))
         # m' = -r' x n; the pull at the points is minus the force there.
         couple = _cross(turned, self._pull[part])
@@ -176,14 +171,12 @@ class Fields:
     def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
         """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""
         model = self.model
-        part, cuts = model.elements_of(touch.member), model.mesh.cuts[touch.member]
+        part = model.elements_of(touch.member)
         first = model.mesh.cut_at(touch.member, touch.at)
         spread, turned = self._loading.spread[part], self.turned[part]
         pushed = np.einsum("eka,eka->ek", spread, turned) / np.linalg.norm(turned, axis=2)
         sums = np.concatenate([[0.0], np.cumsum(pushed.sum(axis=1))])
-        e, xi = _located(cuts, x)
-        element = model.element
-        to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
+        e, to_x = self._located(touch.member, x)
         gained = sums[e] - sums[first] + np.einsum("nk,nk->n", to_x, pushed[e])
         if first == 0:
             begin = float(_three(self._start_forces(part)[0]) @ self._tangent_at(touch.member, 0.0))
@@ -232,8 +225,7 @@ class Fields:
         lost[np.isin(cuts[1:-1], [at for t in model.mesh.touches if t.member == member for at in t.places])] = 0.0
         points = np.where(x[:, None] >= cuts[None, 1:-1], 1.0, 0.0) @ lost
         sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
-        e, xi = _located(model.mesh.cuts[member], x)
-        to_x = _per_place(xi, lambda at: interpolation.integration(element.points, at)) / element.weights
+        e, to_x = self._located(member, x)
         return _three(sums[e] + points + np.einsum("nk,nka->na", to_x, spread[e]))
 
     def stiffness(self, member: str, x: float) -> float:
@@ -260,13 +252,19 @@ class Fields:
 
     def positions(self, member: str, x: Array) -> Array:
         """Positions (n, 3) at fractions of the length, m."""
-        model, element = self.model, self.model.element
+        model = self.model
         part = model.elements_of(member)
-        e, xi = _located(model.mesh.cuts[member], x)
-        to_x = _per_place(xi, lambda places: interpolation.integration(element.points, places)) / element.weights
+        e, to_x = self._located(member, x)
         moved = np.einsum("nk,nka->na", to_x, (self.turned[part] - model.beams.tangent[part])[e])
-        start = self._element_starts(member)[0]
+        start = self._element_starts(member)
         return model.scene.center_lines[member].positions(x) + _three(start[e] + moved) * model.scales.length
+
+    def _located(self, member: str, x: Array) -> tuple[Any, Array]:
+        """Element of each fraction of a member's length, and weights that integrate in it up to there."""
+        element = self.model.element
+        e, xi = _located(self.model.mesh.cuts[member], x)
+        rows = _per_place(xi, lambda places: interpolation.integration(element.points, places))
+        return e, rows / element.weights
 
     def _curvature(self, touch: Touch) -> float:
         """Signed curvature that an obstacle gives to a stretch, 1/m."""
@@ -364,28 +362,31 @@ class Fields:
         return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)
 
     @functools.cache  # noqa: B019 - lives as long as the fields
-    def _element_starts(self, member: str) -> tuple[Array, Array]:
-        """Displacement and moment at the start of each element of a member (and its end)."""
+    def _element_starts(self, member: str) -> Array:
+        """Displacement at the start of each element of a member (and its end)."""
         model = self.model
         part = model.elements_of(member)
-        turned = self.turned[part]
         first = self._nodal[model.segments.place(model.segments.ends[member, 0])]
-        steps = (turned - model.beams.tangent[part]).sum(axis=1)
-        starts = first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-        gains = _cross(turned, self._pull[part]).sum(axis=1)
+        steps = (self.turned[part] - model.beams.tangent[part]).sum(axis=1)
+        return np.asarray(first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)]))
+
+    @functools.cache  # noqa: B019 - lives as long as the fields
+    def _element_moments(self, member: str) -> Array:
+        """Moment at the start of each element of a member (and its end)."""
+        model = self.model
+        part = model.elements_of(member)
+        gains = _cross(self.turned[part], self._pull[part]).sum(axis=1)
         chain = model.rotations.turns[part]
         # A couple at a cut is a jump of the moment.
         if model.scene.members[member].type == "rigid":
             gains[:-1] -= self._loading.jump[part][1:]
         else:
             gains[:-1] -= self._loading.moment[chain[1:, 0]]
-        start = self.balance.start_moment(member)
-        moment = -start
-        moments = moment + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
+        moments = -self.balance.start_moment(member) + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
         if any(touch.to is not None for touch in model.mesh.touches):
             # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
-            moments[:-1] = -self._equations.starting_moments(self.state, self._applied)[part]
-        return starts, moments
+            moments[:-1] = -self.balance.starting_moments(part)
+        return np.asarray(moments)
 
 
 def _located(cuts: Array, x: Array) -> tuple[Any, Array]:

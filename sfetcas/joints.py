@@ -18,7 +18,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from .quaternion import product, turned
+from .quaternion import Components, product, turned
 
 __all__ = [
     "Along",
@@ -48,7 +48,7 @@ Side = list[ca.SX]
 
 
 @dataclass(frozen=True)
-class Connection(abc.ABC):
+class Connection(Components, abc.ABC):
     """A kind of connection; what it says stands in the methods that a new kind gives.
 
     Attributes
@@ -71,21 +71,6 @@ class Connection(abc.ABC):
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """What has to be zero: angles (rad) and displacements, dimensionless."""
         return []
-
-    @property
-    def axes(self) -> int:
-        """Components of a position."""
-        return 3 if self.space else 2
-
-    @property
-    def components(self) -> int:
-        """Numbers of a rotation."""
-        return 4 if self.space else 1
-
-    @property
-    def turns(self) -> int:
-        """Independent rotations of a side."""
-        return 3 if self.space else 1
 
     # -- what the sides say to each other --------------------------------------------------------
 

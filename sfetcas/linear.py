@@ -14,7 +14,7 @@ import numpy as np
 from .arrays import Array
 from .kernels import Batch
 
-__all__ = ["SparseMap", "SparseSolver"]
+__all__ = ["SparseMap", "SparseSolver", "inertia_solver", "pattern"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
@@ -91,7 +91,7 @@ class SparseSolver:
         self.n = n
         self._places = row * n + column if n <= DENSE else None
         if self._places is None:
-            self._sparsity = ca.Sparsity(n, n, _pointers(n, column), row.tolist())
+            self._sparsity = pattern(n, row, column)
             self._plugin = plugin
             if plugin == "mumps":
                 self._solver = ca.Linsol("newton", plugin, self._sparsity)
@@ -136,5 +136,13 @@ class SparseSolver:
         return Batch(ca.Function("solve", [entries, b], [x]), 1)
 
 
-def _pointers(n: int, column: Array) -> list[int]:
-    return np.searchsorted(column, np.arange(n + 1)).tolist()
+def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:
+    """Sparsity of a square matrix by the places of its entries, column by column."""
+    return ca.Sparsity(n, n, np.searchsorted(column, np.arange(n + 1)).tolist(), row.tolist())
+
+
+def inertia_solver(name: str, sparsity: ca.Sparsity) -> ca.Linsol:
+    """Factors that count negative eigenvalues of symmetric matrices of one pattern."""
+    solver = ca.Linsol(name, "ldl", sparsity)
+    solver.sfact(ca.DM(sparsity, 1.0))
+    return solver

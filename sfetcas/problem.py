@@ -280,13 +280,20 @@ class EquilibriumProblem:
     def _closings(self) -> ca.MX:
         if not self.model.positions.rows:
             return ca.MX(0, 1)
+        return self._by_reaches(self.model.positions.Z) + self._by_kept(self.model.positions.W) + self._offset
+
+    def _by_reaches(self, z: SparseMap) -> ca.MX:
+        """A map of the reaches of segments times these."""
         if not len(self.model.rotations.turns):
-            return ca.mtimes(_dm(self.model.positions.W), self.x[self._reduction.unknowns :]) + self._offset
+            return ca.MX.zeros(z.shape[0])
         reach = self._map("reach")(self._q_elements, self._tangent)
-        found = ca.mtimes(self._to_rows, ca.vec(reach)) + self._offset
-        if self.model.positions.unknowns:
-            found += ca.mtimes(_dm(self.model.positions.W), self.x[self._reduction.unknowns :])
-        return found
+        return ca.mtimes(self._by_elements(z), ca.vec(reach))
+
+    def _by_kept(self, w: SparseMap) -> ca.MX:
+        """A map of the displacements kept as unknowns times these; without any of them x has no such slice."""
+        if not w.shape[1]:
+            return ca.MX.zeros(w.shape[0])
+        return ca.mtimes(_dm(w), self.x[self._reduction.unknowns :])
 
     def _norms(self) -> ca.MX:
         rows, columns = self._norm_parts
@@ -334,12 +341,18 @@ class EquilibriumProblem:
 
     def _closing_jacobian(self) -> ca.MX:
         model, positions = self.model, self.model.positions
-        axes, turning = model.element.axes, self._reduction.unknowns
-        if not len(model.rotations.turns):
-            w_map = positions.W
-            ones = ca.MX.ones(len(w_map.row))
-            part = (w_map.row, turning + w_map.column, w_map.value, ones)
-            return self._scattered([part], (len(positions.rows), self.x.numel()))
+        turning = self._reduction.unknowns
+        parts: list[tuple[Array, Array, Array, ca.MX]] = []
+        if len(model.rotations.turns):
+            parts.append(self._reach_jacobian())
+        w_map = positions.W
+        if len(w_map.row):
+            parts.append((w_map.row, turning + w_map.column, w_map.value, ca.MX.ones(len(w_map.row))))
+        return self._scattered(parts, (len(positions.rows), self.x.numel()))
+
+    def _reach_jacobian(self) -> tuple[Array, Array, Array, ca.MX]:
+        """Rows, unknowns, weights and values of the closings' derivative through the reaches."""
+        model, positions, axes = self.model, self.model.positions, self.model.element.axes
         jacobian = self._map("reach_jacobian")(self._q_elements, self._tangent)[1]
         n, width = model.rotations.turns.shape[0], model.rotations.turns.shape[1] * model.element.components
         cells = self._cells.reshape(n, width)
@@ -357,11 +370,7 @@ class EquilibriumProblem:
         r = np.broadcast_to(rows[:, None, :, :, None], shape)
         c = np.broadcast_to(index[:, :, None, None, :], shape)
         w = values[:, None, :, :, None] * weight[:, :, None, None, :]
-        parts = [(r, c, w, jacobian)]
-        w_map = positions.W
-        if len(w_map.row):
-            parts.append((w_map.row, turning + w_map.column, w_map.value, ca.MX.ones(len(w_map.row))))
-        return self._scattered(parts, (len(positions.rows), self.x.numel()))
+        return r, c, w, jacobian
 
     def _hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
         model, element = self.model, self.model.element
@@ -390,25 +399,18 @@ class EquilibriumProblem:
     @functools.cached_property
     def kept_displacements(self) -> ca.MX:
         """Displacements of all places whose components are unknowns or prescribed, (places * axes,); others wrong."""
-        positions, turning = self.model.positions, self._reduction.unknowns
-        prescribed = ca.mtimes(_dm(positions.B), self._b)
-        return ca.mtimes(_dm(positions.Y), self.x[turning:]) + prescribed if positions.unknowns else prescribed
+        positions = self.model.positions
+        return self._by_kept(positions.Y) + ca.mtimes(_dm(positions.B), self._b)
 
     # -- expressions by place ---------------------------------------------------------------------
 
     def displacement(self, node: int) -> ca.MX:
         """Displacement of a node, dimensionless."""
-        model, positions, axes = self.model, self.model.positions, self.model.element.axes
+        positions, axes = self.model.positions, self.model.element.axes
         rows = np.arange(node * axes, (node + 1) * axes)
         e = positions.E.rows(rows)
-        if not len(model.rotations.turns):
-            return ca.densify(self.kept_displacements[rows.tolist()])
-        reach = self._map("reach")(self._q_elements, self._tangent)
         constant = ca.DM(-(e @ self._rest)) + ca.mtimes(_dm(positions.B.rows(rows)), self._b)
-        found = ca.mtimes(self._by_elements(e), ca.vec(reach)) + constant
-        if positions.unknowns:
-            found += ca.mtimes(_dm(positions.Y.rows(rows)), self.x[self._reduction.unknowns :])
-        return ca.densify(found)
+        return ca.densify(self._by_reaches(e) + self._by_kept(positions.Y.rows(rows)) + constant)
 
     @functools.cached_property
     def _rest(self) -> Array:

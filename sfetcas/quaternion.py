@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from .arrays import Array
 
 __all__ = [
+    "Components",
     "angle_about",
     "conjugate",
     "from_rotation_vector",
@@ -28,6 +29,27 @@ __all__ = [
     "rotate",
     "turned",
 ]
+
+
+class Components:
+    """What a thing in the plane or in space counts; a class with a field ``space`` takes these from here."""
+
+    space: bool
+
+    @property
+    def components(self) -> int:
+        """Numbers of a rotation: 4 (quaternion) or 1 (angle)."""
+        return 4 if self.space else 1
+
+    @property
+    def turns(self) -> int:
+        """Independent rotations: 3 or 1."""
+        return 3 if self.space else 1
+
+    @property
+    def axes(self) -> int:
+        """Components of a position: 3 or 2."""
+        return 3 if self.space else 2
 
 
 def product(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:

@@ -19,6 +19,7 @@ import numpy as np
 
 from .arrays import Array
 from .equations import Equations, Point
+from .linear import inertia_solver, pattern
 
 __all__ = ["LIGHT", "Inertia", "Stability", "StabilityTest"]
 
@@ -270,26 +271,28 @@ class StabilityTest:
 
     @functools.cached_property
     def _bordered_pattern(self) -> ca.Sparsity:
-        equations = self.equations
-        pointers = np.searchsorted(equations.column, np.arange(equations.total + 1)).tolist()
-        return ca.Sparsity(equations.total, equations.total, pointers, equations.row.tolist())
+        return pattern(self.equations.total, self.equations.row, self.equations.column)
 
     @functools.cached_property
     def _bordered(self) -> ca.Linsol:
-        solver = ca.Linsol("bordered_inertia", "ldl", self._bordered_pattern)
-        solver.sfact(ca.DM(self._bordered_pattern, 1.0))
-        return solver
+        return inertia_solver("bordered_inertia", self._bordered_pattern)
 
     @functools.cached_property
     def _pattern(self) -> ca.Sparsity:
-        pointers = np.searchsorted(self._h_column, np.arange(self._n + 1)).tolist()
-        return ca.Sparsity(self._n, self._n, pointers, self._h_row.tolist())
+        return pattern(self._n, self._h_row, self._h_column)
 
     @functools.cached_property
     def _ldl(self) -> ca.Linsol:
-        solver = ca.Linsol("inertia", "ldl", self._pattern)
-        solver.sfact(ca.DM(self._pattern, 1.0))
-        return solver
+        return inertia_solver("inertia", self._pattern)
+
+    @functools.cached_property
+    def _starts(self) -> Array:
+        return np.searchsorted(self._h_column, np.arange(self._n))
+
+    def _times(self, entries: Array, block: Array) -> Array:
+        """The weighted matrix times a block of vectors."""
+        # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
+        return np.asarray(np.add.reduceat(entries[:, None] * block[self._h_row], self._starts, axis=0))
 
     def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
         """Smallest eigenvalues above the shift by inverse iteration of a small subspace.
@@ -300,7 +303,7 @@ class StabilityTest:
         root = np.sqrt(self._weights)[:, None]
         block = np.random.default_rng(0).standard_normal((n, min(4, n)))
         loads = np.zeros((equations.total, block.shape[1]))
-        smallest, starts = np.array([np.inf]), np.searchsorted(self._h_column, np.arange(n))
+        smallest = np.array([np.inf])
         for count in range(60):
             shifted = point.entries.copy()
             shifted[equations.diagonal[self._chosen]] -= shift * self._weights
@@ -310,8 +313,7 @@ class StabilityTest:
             loads[self._chosen] = root * block
             block = root * equations.solver.solve(loads)[self._chosen]
             block = np.linalg.qr(block)[0]
-            # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
-            product = np.add.reduceat(entries[:, None] * block[self._h_row], starts, axis=0)
+            product = self._times(entries, block)
             new, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
             if abs(new[0] - smallest[0]) <= 1e-7 * max(abs(new[0]), abs(shift)):
@@ -328,7 +330,6 @@ class StabilityTest:
         root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
         block = np.random.default_rng(0).standard_normal((n, width))
         loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
-        starts = np.searchsorted(self._h_column, np.arange(n))
         shifted = point.entries.copy()
         shifted[equations.diagonal[self._chosen]] += NEUTRAL**2 * self._weights
         shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
@@ -336,8 +337,7 @@ class StabilityTest:
         for _ in range(60):
             loads[self._chosen] = root * block
             block = np.linalg.qr(root * equations.solver.solve(loads)[self._chosen])[0]
-            # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
-            product = np.add.reduceat(entries[:, None] * block[self._h_row], starts, axis=0)
+            product = self._times(entries, block)
             values, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
             nearest = np.sort(np.argsort(np.abs(values))[:NEAREST])
