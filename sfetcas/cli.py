@@ -226,9 +226,10 @@ def _report_step(step: Equilibrium, place: str) -> None:
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
     for name in step.model.scene.springs:
         state = step.spring(name)
-        units = ("rad", "N m") if state.rotational else ("m", "N")
-        (travel, at), (effort, how) = state.to_dict().items()
-        print(f"  spring {name}: {travel} {at:.9g} {units[0]}, {effort} {how:.9g} {units[1]}")
+        travel, *efforts = state.to_dict().items()
+        unit, unit_of_effort = ("rad", "N m") if state.rotational else ("m", "N")
+        told = [f"{travel[0]} {travel[1]:.9g} {unit}", *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts)]
+        print(f"  spring {name}: {', '.join(told)}")
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scenes import SOFT, made
 
-from sfetcas import SceneError, solve
+from sfetcas import SceneError, dump, solve
+from sfetcas.cli import main
 
 STOP = (-0.2, 0.5)
 
@@ -104,3 +105,12 @@ def test_wrong_stops_are_refused(spring, sentence):
 def test_searches_that_know_no_stops_are_refused(analysis, sentence):
     with pytest.raises(SceneError, match=sentence):
         solve(made(lever([1.0]) | {"analysis": analysis}))
+
+
+def test_report_tells_what_the_stop_does(tmp_path, capsys):
+    file = tmp_path / "lever.json"
+    dump(made(lever([0.1, 5.0])), file)
+    assert main(["run", str(file)]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  spring k")]
+    assert "stop 0 N m" in lines[0]
+    assert "angle 0.5 rad, moment -1 N m, stop -" in lines[1]
