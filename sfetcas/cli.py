@@ -228,7 +228,10 @@ def _report_step(step: Equilibrium, place: str) -> None:
         state = step.spring(name)
         travel, *efforts = state.to_dict().items()
         unit, unit_of_effort = ("rad", "N m") if state.rotational else ("m", "N")
-        told = [f"{travel[0]} {travel[1]:.9g} {unit}", *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts)]
+        told = [
+            f"{travel[0]} {travel[1]:.9g} {unit}",
+            *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts),
+        ]
         print(f"  spring {name}: {', '.join(told)}")
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
