@@ -17,6 +17,8 @@ from .joints import (
     Bent,
     Body,
     Connection,
+    CushionedPlane,
+    CushionedRound,
     DrivenSlide,
     DrivenTurn,
     Hinge,
@@ -31,12 +33,12 @@ from .joints import (
     TurnStop,
     Universal,
 )
-from .mesh import Mesh, Touch
-from .obstacles import Obstacle, obstacle, takes_part
+from .mesh import Cushion, Mesh, Touch
+from .obstacles import Obstacle, obstacle, rounded, takes_part
 from .positions import normals
 from .rotations import Pin, Rotations, Turn, end_joints
 from .scene import Scene
-from .segments import Segments
+from .segments import Segments, cushioned
 from .structure import SLIDING
 
 __all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
@@ -275,6 +277,8 @@ class _Toucher:
                 yield self._on(touch, stop)
             yield from self._lying(touch, stop, covered)
             covered |= set(ends)
+        for cushion in self.mesh.cushions:
+            yield self._cushioned(cushion)
 
     def place(self, touch: Touch, at: float) -> int:
         """Number of the place of a touch."""
@@ -287,18 +291,47 @@ class _Toucher:
         start = self.scene.center_lines[touch.member].positions(np.array([touch.at]))[0] - stop.place
         places = (self.place(touch, touch.at),)
         if stop.kind == "flat":
-            gap = (start @ stop.normal + touch.offset) / unit
-            return _One(OnPlane(axes == 3), touch.name, "", np.append(stop.normal[:axes], gap), (), places, touch.name)
+            data = self._flat(stop, start, touch.offset)
+            return _One(OnPlane(axes == 3), touch.name, "", data, (), places, touch.name)
         if stop.kind == "round":
-            across = stop.across[:axes, :axes].T.ravel()
-            radius = stop.radius - stop.sign * touch.offset
-            data = np.concatenate([across, start[:axes] / unit, [radius / unit, stop.sign]])
+            data = self._round(stop, start, touch.offset)
             return _One(OnRound(axes == 3), touch.name, "", data, (), places, touch.name)
         turns, _ = self._chain(touch)
         tangent = self.scene.center_lines[touch.member].tangents(np.array([touch.at]))[0]
         start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
         data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
         return _One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
+
+    def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
+        """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""
+        return np.append(stop.normal[: self.element.axes], (start @ stop.normal + offset) / self.scales.length)
+
+    def _round(self, stop: Obstacle, start: Array, offset: float) -> Array:
+        """Data of a place on something round."""
+        axes, unit = self.element.axes, self.scales.length
+        across = stop.across[:axes, :axes].T.ravel()
+        return np.concatenate([across, start[:axes] / unit, [(stop.radius - stop.sign * offset) / unit, stop.sign]])
+
+    def _cushioned(self, cushion: Cushion) -> _One:
+        """A place that is pushed softly; an edge is rounded for that."""
+        space, unit = self.element.space, self.scales.length
+        stop = rounded(obstacle(self.scene.contacts[cushion.contact], space), cushion.edge)
+        start = self.scene.center_lines[cushion.member].positions(np.array([cushion.at]))[0] - stop.place
+        stiffness = cushion.stiffness * unit / self.scales.force
+        data = self._flat(stop, start, 0.0) if stop.kind == "flat" else self._round(stop, start, 0.0)
+        if cushion.at in (0.0, 1.0):
+            place = self.segments.place(self.segments.ends[cushion.member, int(cushion.at)])
+        else:
+            place = self.segments.place(cushioned(cushion.member, cushion.at))
+        kind = CushionedPlane(space) if stop.kind == "flat" else CushionedRound(space)
+        return _One(
+            kind,
+            f"cushion of {cushion.contact}",
+            "",
+            np.append(data, [stiffness, cushion.thickness / unit]),
+            (),
+            (place,),
+        )
 
     def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[_One]:
         """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from .accuracy import largest_difference, roughness
 from .arrays import Array
+from .cushions import Cushions
 from .errors import SolveError, Status
 from .fields import Fields
 from .mesh import Mesh, Touch
@@ -63,6 +64,7 @@ class ContactRun:
         self.scene, self.accuracy, self.fixed = scene, accuracy, fixed
         self.toucher = Toucher(scene, prepare, COARSE, edge_sides(scene))
         self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
+        self.cushions = Cushions(scene, prepare, self.reviser.sides)
         self.fine = max(INSIDE, 0.1 * accuracy)
         self.prepare = prepare
         self.last: tuple[float, Held] | None = None
@@ -85,10 +87,14 @@ class ContactRun:
             start = held
         return self._through(base, 0.0, factor, start)
 
-    def _through(self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...]) -> Held | None:
+    def _factors(self, begin: float, end: float) -> list[float]:
+        """Factors from one to another, where histories have knots."""
         low, high = min(begin, end), max(begin, end)
         knots = {t for history in self.scene.histories.values() for t in history.t if low < t < high}
-        stops = [begin, *sorted(knots, reverse=end < begin), end]
+        return [begin, *sorted(knots, reverse=end < begin), end]
+
+    def _through(self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...]) -> Held | None:
+        stops = self._factors(begin, end)
         held: Held | None = None
         for a, b in zip(stops, stops[1:], strict=False):
             way = _between(a, b)
@@ -109,6 +115,13 @@ class ContactRun:
             return Way(lambda model: model.loading(factor), {n: (1.0 - t) * depth for n, depth in depths.items()})
 
         return self.toucher.follow(base, way, free)
+
+    def cushioned(self, base: Mesh, factor: float) -> Held | None:
+        """From the state that the loads lead to where obstacles are cushions."""
+        found = self.cushions.found(base, self._factors(0.0, factor))
+        if found is None:
+            return None
+        return self.toucher.resolved(base, found.held, found.touches, self.at(factor))
 
     def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
         """What touches in the undeformed scene."""
@@ -157,12 +170,19 @@ class ContactRun:
         """Whether no obstacle is in the way of a state."""
         return not Touched.of(fields).inside({}, self.reviser.sides, self.fine * self.scene.size)
 
-    def reached(self, base: Mesh, factor: float, free: Held | None, *, nearer: bool) -> Held | None:
-        """A state in contact: by the loads growing from zero, or near the state without obstacles."""
-        ways: list[Callable[[], Held | None]] = [lambda: self.grown(base, factor)]
-        if free is not None:
-            ways.insert(0 if nearer else 1, lambda: self.retracted(base, factor, free))
-        return next((held for held in (way() for way in ways) if held is not None), None)
+    def reached(
+        self, base: Mesh, factor: float, free: Held | None, *, nearer: bool, falls: bool
+    ) -> Iterator[Held | None]:
+        """States in contact, one way after the other: the loads growing from zero, or near the state without obstacles.
+
+        What ``falls`` onto obstacles, as nothing else holds it, has no state under small loads to grow from.
+        """
+        ways: list[Callable[[], Held | None]] = [lambda: self.cushioned(base, factor)]
+        if not falls:
+            ways.insert(0, lambda: self.grown(base, factor))
+            if free is not None:
+                ways.insert(0 if nearer else 2, lambda: self.retracted(base, factor, free))
+        return (way() for way in ways)
 
     def named(self, failure: SolveError | None) -> list[str]:
         """What may be in the way, for a sentence."""

@@ -62,10 +62,18 @@ class Followed:
     left: tuple[float, ...]
 
 
-def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *, leave: bool = True) -> Followed:
+def follow(
+    prepared: Prepared,
+    way: Callable[[float], Loading],
+    state: State,
+    *,
+    leave: bool = True,
+    allowed: Callable[[State, State], bool] | None = None,
+) -> Followed:
     """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
-    With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.
+    With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A step
+    that is not ``allowed`` from one state to the next is too long.
     """
     # In space a whole turn of a held node looks like none: no step may turn one by more than a radian.
     turn = float(np.linalg.norm(way(1.0).turn - way(0.0).turn, axis=1).max(initial=0.0))
@@ -81,7 +89,8 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
         there = prepared.correct(
             now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
         )
-        if not there.converged:
+        good = there.converged and (allowed is None or allowed(now.state, there.state))
+        if not good:
             if step > max(SHORTEST * done, TINY):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
                 continue
@@ -89,7 +98,7 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
             snapped = _left(prepared, now, way(trial))
-            if snapped is None:
+            if snapped is None or not (allowed is None or allowed(now.state, snapped.state)):
                 break
             now = snapped
             left.append(done)
@@ -100,7 +109,7 @@ def follow(prepared: Prepared, way: Callable[[float], Loading], state: State, *,
                 step = 0.5 * (trial - done)
                 continue
             escaped = _left(prepared, there, way(trial))
-            if escaped is None:
+            if escaped is None or not (allowed is None or allowed(now.state, escaped.state)):
                 break
             there = escaped
             left.append(trial)

@@ -26,6 +26,8 @@ __all__ = [
     "Bent",
     "Body",
     "Connection",
+    "CushionedPlane",
+    "CushionedRound",
     "DrivenSlide",
     "DrivenTurn",
     "Hinge",
@@ -377,7 +379,7 @@ class OnPlane(Connection):
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The gap."""
-        return [ca.dot(data[: self.axes], ca.vertcat(*u[0])) + data[self.axes]]
+        return [_gap_of_plane(u[0], data)]
 
 
 @final
@@ -392,9 +394,56 @@ class OnRound(Connection):
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The gap."""
-        n = self.axes
-        out = ca.mtimes(ca.reshape(data[: n * n], n, n), ca.vertcat(*u[0]) + data[n * n : n * n + n])
-        return [data[n * n + n + 1] * (ca.norm_2(out) - data[n * n + n])]
+        return [_gap_of_round(u[0], data)]
+
+
+@final
+@dataclass(frozen=True)
+class CushionedPlane(Connection):
+    """A place that a cushion keeps off a plane; data: as of a place on it, stiffness, thickness."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 0, 1, 0, self.axes + 3, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """That of the cushion."""
+        return _cushion(_gap_of_plane(u[0], data), data[self.axes + 1 :])
+
+
+@final
+@dataclass(frozen=True)
+class CushionedRound(Connection):
+    """A place that a cushion keeps off something round; data: as of a place on it, stiffness, thickness."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 0, 1, 0, self.axes * self.axes + self.axes + 4, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """That of the cushion."""
+        return _cushion(_gap_of_round(u[0], data), data[self.axes * self.axes + self.axes + 2 :])
+
+
+def _gap_of_plane(u: Side, data: ca.SX) -> ca.SX:
+    return ca.dot(data[: len(u)], ca.vertcat(*u)) + data[len(u)]
+
+
+def _gap_of_round(u: Side, data: ca.SX) -> ca.SX:
+    n = len(u)
+    out = ca.mtimes(ca.reshape(data[: n * n], n, n), ca.vertcat(*u) + data[n * n : n * n + n])
+    return data[n * n + n + 1] * (ca.norm_2(out) - data[n * n + n])
+
+
+def _cushion(gap: ca.SX, data: ca.SX) -> ca.SX:
+    """Half the stiffness times the square of the depth, which begins smoothly within the thickness."""
+    stiffness, thickness = data[0], data[1]
+    root = ca.sqrt(gap**2 + thickness**2)
+    # Outside, the difference of two near numbers is written as a quotient.
+    depth = 0.5 * ca.if_else(gap > 0.0, thickness**2 / (root + ca.fmax(gap, 0.0)), root - gap)
+    return 0.5 * stiffness * depth**2
 
 
 @final

@@ -11,7 +11,7 @@ from .arrays import Array
 from .scene import Scene
 from .sections import breaks as kinks
 
-__all__ = ["SAME", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+__all__ = ["SAME", "Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 SAME = 1e-12
 """Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
@@ -59,6 +59,31 @@ class Touch:
 
 
 @dataclass(frozen=True)
+class Cushion:
+    """A place of a member that an obstacle pushes as a cushion would, on the way to a state in contact.
+
+    Attributes
+    ----------
+    contact, member : str
+    at : float
+        Fraction of the length; an element ends there.
+    stiffness : float
+        N/m.
+    thickness : float
+        m: within it the force begins.
+    edge : float
+        Radius of the thin rod that stands for an edge, m.
+    """
+
+    contact: str
+    member: str
+    at: float
+    stiffness: float
+    thickness: float
+    edge: float
+
+
+@dataclass(frozen=True)
 class Mesh:
     """Element type and cuts.
 
@@ -76,6 +101,8 @@ class Mesh:
         Where members touch obstacles; elements end there.
     stops : tuple of (str, str)
         Springs that stand at a stop: name, and ``low`` or ``high``.
+    cushions : tuple of Cushion
+        Places at which obstacles push softly, in the order of their members and fractions.
     """
 
     order: int
@@ -84,6 +111,7 @@ class Mesh:
     rigid: frozenset[str] = frozenset()
     touches: tuple[Touch, ...] = ()
     stops: tuple[tuple[str, str], ...] = ()
+    cushions: tuple[Cushion, ...] = ()
 
     @property
     def elements(self) -> int:

@@ -18,7 +18,17 @@ from .errors import SceneError
 from .loads import Motion
 from .structure import Node
 
-__all__ = ["Obstacle", "check_start", "edge_slopes", "members_of", "nearest", "obstacle", "swept", "takes_part"]
+__all__ = [
+    "Obstacle",
+    "check_start",
+    "edge_slopes",
+    "members_of",
+    "nearest",
+    "obstacle",
+    "rounded",
+    "swept",
+    "takes_part",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +86,14 @@ class Obstacle:
             return 0.0
         out = (point - self.place) / self.radius
         return float(-(out @ np.cross([0.0, 0.0, 1.0], tangent)) / self.radius)
+
+
+def rounded(stop: Obstacle, radius: float) -> Obstacle:
+    """The obstacle itself, or in the place of an edge something thin and round behind it."""
+    if stop.side is None:
+        return stop
+    side = stop.side / np.linalg.norm(stop.side)
+    return Obstacle("round", stop.place - radius * side, stop.across, np.zeros(3), radius)
 
 
 def _unit(vector: object) -> Array:

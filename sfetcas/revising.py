@@ -14,7 +14,7 @@ from .model import Model
 from .obstacles import members_of, obstacle, swept, takes_part
 from .scene import Scene
 from .settling import APART, Held, Ran, Way, moved
-from .touches import Gap, obstacles_of
+from .touches import Gap, Loose, obstacles_of
 
 __all__ = ["Reviser"]
 
@@ -22,6 +22,16 @@ Touches = tuple[Touch, ...]
 
 FLAT = 1e-7
 """Curvature of a gap (times the length of the scene) below minus this gets inside: rounding of moments is less."""
+
+
+ROUNDED = 1e-14
+"""Gaps above this share of the size of the scene are more than rounding."""
+
+LOADS = 1e-6
+"""Share of the largest force or moment from which a load may open a stretch."""
+
+CORNER = 1e-4
+"""Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
 
 
 class Reviser:
@@ -39,8 +49,11 @@ class Reviser:
     def __init__(self, scene: Scene, limit: float, sides: Mapping[tuple[str, str], float]) -> None:
         self.scene, self.limit, self.sides = scene, limit, sides
 
-    def ended(self, ran: Ran) -> Touches:
-        """What becomes of a touch one of whose places ran to the end of its member or met the other one."""
+    def ended(self, ran: Ran, crossed: set[str]) -> Touches:
+        """What becomes of a touch one of whose places ran to the end of its member or met the other one.
+
+        It goes on along the next member; at a node that was ``crossed`` before, to which it is added, it stays.
+        """
         touches, i, k = ran.touches, ran.touch, ran.place
         touch, rest = touches[i], touches[:i] + touches[i + 1 :]
         if ran.collapsed:
@@ -56,7 +69,9 @@ class Reviser:
         sharp = self.scene.contacts[touch.contact].type in ("point", "line")
         if not self._takes_part(touch.contact, node) or (sharp and not others):
             return _numbered(rest)
-        for other in others:
+        back = node in crossed
+        crossed.add(node)
+        for other in () if back else others:
             if self.scene.nodes[node].joint == "rigid" and self.scene.members[other].type == "flexible":
                 at = 1e-3 if self.scene.members[other].nodes[0] == node else 1.0 - 1e-3
                 return _numbered((*rest, replace(touch, member=other, at=at)))
@@ -124,17 +139,52 @@ class Reviser:
             i = min(pulls)[1]
             return _numbered(touches[:i] + touches[i + 1 :])
         for i, touch in enumerate(touches):
-            k = touched.loose_end(touch)
-            if k is not None:
-                inner = touch.places[k] + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at)
-                return _numbered((*touches[:i], moved(touch, k, inner), *touches[i + 1 :]))
-        flatter = self._flattened(held) or self._joined(held, way)
+            loose = touched.loose_end(touch)
+            if loose is not None:
+                return _numbered((*touches[:i], *self._loosened(held, touch, loose), *touches[i + 1 :]))
+        flatter = self._opened(held) or self._flattened(held) or self._joined(held, way)
         if flatter is not None:
             return flatter
         gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size)
         if not gaps:
             return self._lifted(held)
         return _numbered(self._with(held, min(gaps, key=lambda gap: gap.depth)))
+
+    def _loosened(self, held: Held, touch: Touch, loose: Loose) -> list[Touch]:
+        """A stretch with an end that cannot lie there: shorter, or longer where the next member is pressed as well."""
+        end, k = replace(touch, at=loose.at, to=None), int(loose.at)
+        if loose.stays:
+            beside = [
+                part for part in (self._laid(held, other) for other in self._across_node(end)) if part is not None
+            ]
+            if beside:
+                return [touch, *beside]
+        shorter = moved(touch, k, touch.places[k] + (1.0 - 2.0 * k) * loose.risen)
+        return [shorter, end] if loose.stays else [shorter]
+
+    def _opened(self, held: Held) -> Touches | None:
+        """A stretch that a load takes off its obstacle becomes two, at a node those of both members shorter."""
+        touches = held.mesh.touches
+        for i, touch in enumerate(touches):
+            opened = None if touch.to is None else held.touched.opened(touch, LOADS)
+            if opened is None:
+                continue
+            wide, rest = held.touched.hump(opened), touches[:i] + touches[i + 1 :]
+            if opened.node is None:
+                low = opened.at - min(wide, 0.9 * (opened.at - touch.at))
+                high = opened.at + min(wide, 0.9 * (float(touch.to or 0.0) - opened.at))
+                return _numbered((*rest, replace(touch, to=low), replace(touch, at=high)))
+            found = []
+            for other in touches:
+                nodes = self.scene.members[other.member].nodes
+                ends = [x for x in other.places if x in (0.0, 1.0) and nodes[int(x)] == opened.node]
+                if other.contact == touch.contact and other.to is not None and ends:
+                    scale = self.scene.center_lines[touch.member].length / self.scene.center_lines[other.member].length
+                    inwards = (1.0 - 2.0 * ends[0]) * min(scale * wide, 0.9 * (other.to - other.at))
+                    other = moved(other, int(ends[0]), ends[0] + inwards)
+                found.append(other)
+            return _numbered(tuple(found))
+        return None
 
     def _flattened(self, held: Held) -> Touches | None:
         """A place beside which the member curves into a plane or a round obstacle becomes a stretch."""
@@ -165,7 +215,7 @@ class Reviser:
         """The stretch that a place becomes; None where the member curves away from the obstacle."""
         scales = held.prepared.model.scales
         bent = held.touched.gap_curvature(touch) * scales.length
-        if bent > -FLAT:
+        if bent > -FLAT or self._leaves(held, touch):
             return None
         # The moment falls by half of the force to either side, down to what the obstacle's shape takes.
         push = max((held.touched.push(t) for t in held.mesh.touches if t.to is None), default=0.0) / scales.force
@@ -174,6 +224,15 @@ class Reviser:
         reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
         low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
         return replace(touch, at=low, to=high, way=self._bend(held, touch))
+
+    @staticmethod
+    def _leaves(held: Held, touch: Touch) -> bool:
+        """Whether a member leaves the obstacle from its end at an angle, as beside a corner that touches."""
+        if touch.at not in (0.0, 1.0):
+            return False
+        inwards = 1.0 - 2.0 * touch.at
+        tangent = held.touched.fields.tangents(touch.member, np.array([touch.at]))[0]
+        return bool(inwards * float(tangent @ held.touched.normal(touch, touch.at)) > CORNER)
 
     def _joined(self, held: Held, way: Way) -> Touches | None:
         """Between two places of one obstacle without any gap between them the member lies on it."""
@@ -195,7 +254,8 @@ class Reviser:
                     continue
                 x = np.linspace(here, there, 12)[1:]
                 gaps = held.touched.gaps(touch.contact, touch.member, x, way.offsets.get(touch.contact, 0.0))
-                if np.abs(gaps).max() > limit:
+                # A member that rises over so short a way is nowhere inside.
+                if np.abs(gaps).max() > limit or gaps[:-1].min() > ROUNDED * self.scene.size:
                     continue
                 gone = next((t for t, x in others if x == there), None)
                 low, high = min(*touch.places, there), max(*touch.places, there)
@@ -262,11 +322,15 @@ class Reviser:
 
 
 def _numbered(touches: Touches) -> Touches:
-    """Touches of the same two told apart by numbers, in the order of their places."""
+    """Touches of the same two told apart by numbers, in the order of their places; each place once."""
     count: dict[tuple[str, str], int] = {}
-    found = []
+    found: list[Touch] = []
+    lying = [(t.contact, t.member, x) for t in touches if t.to is not None for x in t.places]
     for touch in sorted(touches, key=lambda t: (t.contact, t.member, t.at)):
         key = (touch.contact, touch.member)
+        if touch.to is None and (*key, touch.at) in lying:
+            continue
+        lying += [(*key, touch.at)] if touch.to is None else []
         found.append(replace(touch, number=count.get(key, 0)))
         count[key] = count.get(key, 0) + 1
     return tuple(found)

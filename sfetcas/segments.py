@@ -19,7 +19,7 @@ from .rotations import end_joints
 from .scene import Scene
 from .structure import SLIDING
 
-__all__ = ["Segment", "Segments", "cut_members"]
+__all__ = ["Segment", "Segments", "cushioned", "cut_members"]
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,14 @@ class Segments:
 
 
 def _touched(mesh: Mesh, member: str) -> dict[int, str]:
-    """Cuts of a member where it touches obstacles, with the names of these places; its ends among them."""
-    return {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+    """Cuts of a member where obstacles push it, with the names of these places; its ends among them."""
+    soft = {mesh.cut_at(member, c.at): cushioned(member, c.at) for c in mesh.cushions if c.member == member}
+    return soft | {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+
+
+def cushioned(member: str, at: float) -> str:
+    """Name of a place of a member, within it, where obstacles push softly."""
+    return f"{member} cushioned at {at:.17g}"
 
 
 def _kept_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:

@@ -30,6 +30,9 @@ NEAR = 0.35
 APART = 1e-7
 """Places nearer to each other, or to the end of a member, are the same: fractions of the length."""
 
+CLOSE = 1e-4
+"""Fractions of the length beside an end of a member in which a double root is lost in rounding."""
+
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
 
@@ -145,14 +148,18 @@ class Settler:
     ----------
     solves : int
         Equilibria with places held that were solved so far.
+    limit : float
+        Number of them after which settling gives up.
     """
 
     def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared]) -> None:
         self.scene, self.prepare = scene, prepare
-        self.solves = 0
+        self.solves, self.limit = 0, np.inf
 
     def solved(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way, *, same: bool = False) -> Held | None:
         """The equilibrium with places held; None where Newton's method does not get there."""
+        if _meet(mesh):
+            return None
         touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in mesh.touches)
         self.solves += 1
         prepared = self.prepare(replace(mesh, touches=touches))
@@ -175,11 +182,14 @@ class Settler:
         if held is None:
             return None
         slopes: Array | None = None
+        end: Ran | None = None
         last, crowded = np.inf, 0
         for _ in range(MOST_STEPS):
             free = free_places(held.mesh.touches)
             if not free:
                 return held
+            if self.solves > self.limit:
+                return None
             here = held.touched.conditions
             slopes = self.slopes(held, way) if slopes is None else slopes
             if slopes is None:
@@ -188,9 +198,13 @@ class Settler:
             if not np.isfinite(step).all():
                 return None
             step, ran, room = _shortened(held.mesh.touches, free, step)
-            crowded = 0 if ran is None else crowded + 1
-            if ran is not None and (room < 10.0 * APART or crowded > PATIENCE):
-                return ran
+            if ran is not None:
+                crowded += 1
+            elif _roomy(held.mesh.touches, free):
+                crowded = 0
+            end = ran or end
+            if (ran is not None and room < 10.0 * APART) or (end is not None and crowded > PATIENCE):
+                return end
             if np.abs(step).max() < SETTLED:
                 return replace(held, slopes=slopes)
             there = self._stepped(held, free, step, way)
@@ -215,7 +229,7 @@ class Settler:
     def _at_places(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
         touches = list(held.mesh.touches)
         for (i, k), change in zip(free, step, strict=True):
-            touches[i] = moved(touches[i], k, touches[i].places[k] + float(change))
+            touches[i] = moved(touches[i], k, self._beside(touches[i], k, touches[i].places[k] + float(change)))
         mesh = _stretched(self.scene, held.mesh, tuple(touches))
         source = held.prepared.model, held.corrected.state
         if mesh is None:
@@ -226,6 +240,12 @@ class Settler:
             mesh = placed(self.scene, replace(held.mesh, touches=()), tuple(touches))
             return self.solved(mesh, source, way)
         return self.solved(mesh, source, way, same=True)
+
+    def _beside(self, touch: Touch, k: int, x: float) -> float:
+        """A place, not nearer to a load or a kink of the section than its cut may be: on the side it comes from."""
+        breaks = breaks_of(self.scene, touch.member)[1:-1]
+        near = breaks[np.abs(breaks - x) < 2.0 * APART]
+        return x if not len(near) else float(near[0] + np.copysign(2.0 * APART, touch.places[k] - near[0]))
 
     def slopes(self, held: Held, way: Way) -> Array | None:
         """Derivative of the conditions by the places, by differences."""
@@ -247,8 +267,20 @@ class Settler:
         return np.column_stack(columns) if columns else np.zeros((0, 0))
 
 
+def _meet(mesh: Mesh) -> bool:
+    """Whether places within members are so near to each other, or to an end, that they have no cut of their own."""
+    cuts = [(t.member, mesh.cut_at(t.member, x)) for t in mesh.touches for x in t.places if 0.0 < x < 1.0]
+    at_ends = any(cut in (0, len(mesh.cuts[member]) - 1) for member, cut in cuts)
+    return at_ends or len(set(cuts)) < len(cuts)
+
+
 def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
     return np.array([touches[i].places[k] for i, k in free])
+
+
+def _roomy(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> bool:
+    """Whether no place is so near to an end of its member that rounding may lead it to and fro there."""
+    return all(CLOSE < touches[i].places[k] < 1.0 - CLOSE for i, k in free)
 
 
 def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array) -> tuple[Array, Ran | None, float]:

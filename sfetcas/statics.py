@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -501,12 +502,7 @@ class _Run:
         base = self.pilot_mesh.refined()
         notes: tuple[str, ...] = ()
         held = contact.continued(base, factor)
-        if held is None and pilot.diagnosis.mobility and not contact.first_touches(base):
-            motion = pilot.diagnosis.motions[0]
-            message = (
-                f"nothing but obstacles holds a motion ({motion}), accepted: with a spring, or on an obstacle at first"
-            )
-            raise SceneError(message, ("contacts",))
+        falls = bool(pilot.diagnosis.mobility) and not contact.first_touches(base)
         if held is None or not held.mesh.touches:
             free, failure = self._unstopped(pilot, factor)
             if free is not None and free.left and not self.creeping and not self.scene.histories:
@@ -521,11 +517,31 @@ class _Run:
                     if contact.clear(answer.fields):
                         contact.last = (factor, held)
                         return answer
-            held = contact.reached(base, factor, held, nearer=self.started or bool(notes))
-            if held is None:
-                detail = "no state in contact was found on the way of the loads from zero, nor by obstacles coming back"
-                raise SolveError(Status.FAILED, f"{detail}: {', '.join(contact.named(failure))}")
+            ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
+            return self._first_pressed(contact, ways, factor, notes, failure)
         return self._pressed(contact.answered(held, factor, self.target, notes), factor)
+
+    def _first_pressed(
+        self,
+        contact: ContactRun,
+        ways: Iterator[Held | None],
+        factor: float,
+        notes: tuple[str, ...],
+        failure: SolveError | None,
+    ) -> Equilibrium:
+        """The first answer among states in contact that were found in different ways."""
+        refused: SolveError | None = None
+        for held in ways:
+            if held is None:
+                continue
+            try:
+                return self._pressed(contact.answered(held, factor, self.target, notes), factor)
+            except SolveError as error:
+                refused = refused or error
+        if refused is not None:
+            raise refused
+        detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
+        raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
 
     def _crept(self, contact: ContactRun, pilot: Prepared, factor: float, unstable: float) -> Equilibrium:
         """The same by small steps from where the loads would make it jump: nothing jumps over an obstacle."""

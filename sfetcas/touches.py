@@ -23,9 +23,10 @@ from .loading import Loading
 from .mesh import Touch
 from .model import Model
 from .obstacles import Obstacle, members_of, nearest, obstacle, takes_part
+from .rotations import STIFF, end_joints
 from .scene import Scene
 
-__all__ = ["COARSE", "Gap", "Touched", "answers", "edge_sides", "obstacles_of"]
+__all__ = ["COARSE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
 
 COARSE = 1e-6
 """Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
@@ -35,6 +36,9 @@ NOISE = 1e-4
 
 THIRDS = 40
 """Times an interval is cut to two thirds: to a gap within rounding."""
+
+FIRST_RISE, MOST_RISE = 0.05, 0.9
+"""Shares of a stretch: how much of it rises where nothing tells, and at most."""
 
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
@@ -62,6 +66,38 @@ class Gap:
     at: float
     depth: float
     way: float = 1.0
+
+
+@dataclass(frozen=True)
+class Loose:
+    """An end of a stretch, 0 or 1, that cannot lie there.
+
+    Attributes
+    ----------
+    at : float
+    risen : float
+        About how far the member rises from there, a fraction of its length.
+    stays : bool
+        Whether the end itself is pressed on the obstacle, and the member rises beside it.
+    """
+
+    at: float
+    risen: float
+    stays: bool
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A place of a stretch at which a load acts that an obstacle cannot hold: a pull (N) or a couple (N m).
+
+    ``node`` is the node there, or None.
+    """
+
+    touch: Touch
+    at: float
+    node: str | None
+    pull: float
+    couple: float
 
 
 def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
@@ -118,6 +154,7 @@ class Touched:
         """Force over a stretch by the balance of its forces, N."""
         before, after = self._beside(touch, touch.at, -1.0), self._beside(touch, float(touch.to or 0.0), 1.0)
         total = before - after - self._load_between(touch.member, touch.at, float(touch.to or 0.0))
+        total = total + sum((self._at_node(touch, at) for at in touch.places if at in (0.0, 1.0)), np.zeros(3))
         stop = self.obstacles[touch.contact]
         # What holds an end along a plane is not of the plane.
         return np.asarray(stop.across @ total if stop.kind == "flat" else total)
@@ -148,6 +185,19 @@ class Touched:
                     return True
         return False
 
+    def _at_node(self, touch: Touch, at: float) -> Array:
+        """Force on a node between two stretches, N, which counts with the first of them."""
+        node = self.model.scene.members[touch.member].nodes[int(at)]
+        if not self.takes_part(touch.contact, node) or not self.goes_on(touch, at):
+            return np.zeros(3)
+        here = [t for t in self.model.mesh.touches if t.contact == touch.contact and t.to is not None]
+        first = next(t for t in here if any(self._node_at(t, x) == node for x in t.places))
+        return self.left_over(node)[1] if first is touch else np.zeros(3)
+
+    def _node_at(self, touch: Touch, x: float) -> str | None:
+        """The node at a place of a touch; None within its member."""
+        return self.model.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
+
     def _load_between(self, member: str, begin: float, end: float) -> Array:
         """Distributed load between two places, N."""
         before = self.fields.load_before(member, np.array([begin, end]))
@@ -175,24 +225,116 @@ class Touched:
         middles = 0.5 * (x[1:] + x[:-1])
         return np.array([push @ self.normal(touch, at) for push, at in zip(pushed, middles, strict=True)])
 
-    def loose_end(self, touch: Touch) -> int | None:
-        """The end (0 or 1) of a stretch at a member's free end that the obstacle would have to pull or to clamp."""
+    # -- what obstacles cannot hold -------------------------------------------------------------
+
+    def loose_end(self, touch: Touch) -> Loose | None:
+        """The end of a stretch at a node that the obstacle would have to pull or to clamp; None where there is none."""
         model = self.model
-        for k, at in enumerate(touch.places if touch.to is not None else ()):
-            member = model.scene.members[touch.member]
-            node = member.nodes[int(at)] if at in (0.0, 1.0) else ""
-            alone = sum(node in other.nodes for other in model.scene.members.values()) == 1
-            if not node or not alone or not self.takes_part(touch.contact, node):
+        for at in touch.places if touch.to is not None else ():
+            node = model.scene.members[touch.member].nodes[int(at)] if at in (0.0, 1.0) else ""
+            if not node or not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
                 continue
-            way = 1.0 if k else -1.0
-            pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
-            couple = way * self.fields.own_moment(node) @ axes[0] - pressed[0]
-            inside = self.fields.along(touch.member, np.array([at]))["force"][0]
-            push = (way * inside - self.fields.own_force(node)) @ self.normal(touch, at)
+            axis = self.fields.pressed_moments(touch, np.array([at]))[1][0]
+            moment, force = self.left_over(node)
+            normal = self.normal(touch, at)
+            push = float(force @ normal)
+            # Positive where the moment at the end would bend the member away from the obstacle.
+            away = np.cross(axis, self._tangent(touch, at)) @ normal
+            bends = float((1.0 - 2.0 * at) * (moment @ axis) * away)
             held = model.scene.nodes[node].support != "free"
-            if push < -1e-9 * model.scales.force or (abs(couple) > 1e-8 and not held):
-                return k
+            if push < -1e-9 * model.scales.force or (abs(bends) > 1e-8 and not held):
+                stays = push > 0.0 and bends < 0.0
+                return Loose(at, self._risen(touch, push, bends * model.scales.moment, at), stays)
         return None
+
+    def left_over(self, node: str) -> tuple[Array, Array]:
+        """Moment (dimensionless) and force (N) on a node that neither its members, loads nor springs balance.
+
+        Members that lie on obstacles count with what their shape takes.
+        """
+        scene, fields = self.model.scene, self.fields
+        moment, force = -fields.own_moment(node) + fields.balance.spring_moment(node), -fields.own_force(node)
+        for name, member in scene.members.items():
+            for i, (at, joint) in enumerate(end_joints(scene, member)):
+                if at != node or name not in self.model.members:
+                    continue
+                found = fields.along(name, np.array([float(i)]))
+                force = force + (2.0 * i - 1.0) * found["force"][0]
+                if joint in STIFF:
+                    moment = moment + (2.0 * i - 1.0) * found["moment"][0] / self.model.scales.moment
+        return moment, force
+
+    def _risen(self, touch: Touch, push: float, bends: float, at: float) -> float:
+        """How far a heavy beam rises from a plane under a force and a couple at its end, as a fraction of the length.
+
+        Where ``bends - push d - pressure d^2 / 2`` vanishes; where the couple presses the end on the plane,
+        ``d = 2 sqrt(couple / pressure)``.
+        """
+        pressure, span, length = self._pressure(touch, at), float(touch.to or 0.0) - touch.at, self._length(touch)
+        if pressure <= 0.0:
+            return FIRST_RISE * span
+        inner = push**2 + 2.0 * bends * pressure
+        rise = 2.0 * np.sqrt(abs(bends) / pressure) if inner < 0.0 or push > 0.0 > bends else 0.0
+        rise = rise or (np.sqrt(inner) - push) / pressure
+        return float(np.clip(rise / length, 1e-3 * span, MOST_RISE * span))
+
+    def _length(self, touch: Touch) -> float:
+        return self.model.scene.center_lines[touch.member].length
+
+    def _pressure(self, touch: Touch, at: float) -> float:
+        """Pressure on a stretch beside a place of it, N/m."""
+        span = float(touch.to or 0.0) - touch.at
+        x = np.linspace(touch.at, float(touch.to or 0.0), 9)
+        i = int(np.clip(np.round((at - touch.at) / span * 8.0 - 0.5), 1, 6))
+        return float(self.pressures(touch, x)[i]) / (span / 8.0 * self._length(touch))
+
+    def opened(self, touch: Touch, share: float) -> Opened | None:
+        """A place within a stretch where a load pulls or turns the member off the obstacle; None where none does.
+
+        Loads that are smaller than a share of the largest force or moment do not count.
+        """
+        model, fields = self.model, self.fields
+        size, to = share * self._size, float(touch.to or 0.0)
+        cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
+        inner = cuts[1:-1][(cuts[1:-1] > touch.at) & (cuts[1:-1] < to)]
+        beside = np.stack([np.nextafter(inner, 0.0), inner], axis=1).ravel()
+        forces = np.diff(fields.load_before(touch.member, beside), axis=0)[::2] if len(inner) else np.zeros((0, 3))
+        turned = model.rotations.turns[part][1:, 0][(cuts[1:-1] > touch.at) & (cuts[1:-1] < to)]
+        for at, force, turn in zip(inner.tolist(), forces, turned.tolist(), strict=True):
+            pull, couple = float(force @ self.normal(touch, at)), fields.moment_on(turn)
+            if pull > size or couple > size:
+                return Opened(touch, at, None, max(pull, 0.0) * model.scales.force, couple * model.scales.moment)
+        for at in (x for x in touch.places if x in (0.0, 1.0)):
+            node = model.scene.members[touch.member].nodes[int(at)]
+            if not self.takes_part(touch.contact, node) or not self.goes_on(touch, at):
+                continue
+            moment, force = self.left_over(node)
+            pull = max(-float(force @ self.normal(touch, at)) / model.scales.force, 0.0)
+            couple = abs(float(moment @ fields.pressed_moments(touch, np.array([at]))[1][0]))
+            if pull > size or couple > size:
+                return Opened(touch, at, node, pull * model.scales.force, couple * model.scales.moment)
+        return None
+
+    @functools.cached_property
+    def _size(self) -> float:
+        """Largest force or moment of the scene, dimensionless."""
+        found = [1e-12]
+        for name in self.model.members:
+            along = self.fields.along(name, np.array([0.0, 0.5, 1.0]), dimensionless=True)
+            found += [float(np.abs(along["force"]).max()), float(np.abs(along["moment"]).max())]
+        return max([*found, self.fields.largest_load])
+
+    def hump(self, opened: Opened) -> float:
+        """Half of how far a heavy beam that lies on a plane rises around a load, as a fraction of the length.
+
+        A force P against the pressure p opens ``1.5 P / p``, a couple C about ``2 sqrt(C / p)`` to either side.
+        """
+        touch = opened.touch
+        pressure, span = self._pressure(touch, opened.at), float(touch.to or 0.0) - touch.at
+        if pressure <= 0.0:
+            return FIRST_RISE * span
+        wide = max(0.75 * opened.pull / pressure, np.sqrt(2.0 * opened.couple / pressure)) / self._length(touch)
+        return float(np.clip(wide, 1e-3 * span, MOST_RISE * span))
 
     def normal(self, touch: Touch, at: float) -> Array:
         """Normal (3,) of an obstacle at a place of a member."""

@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from .errors import SolveError
 from .mesh import Mesh, Touch
 from .prepared import Prepared
@@ -35,7 +37,7 @@ SNAP = 2e-3
 MOST_SNAPS = 4
 """Snaps on one way."""
 
-MOST_SOLVES = 800
+MOST_SOLVES = 200
 """Equilibria with places held that are solved on one way."""
 
 TRIES = 60
@@ -68,10 +70,20 @@ class Toucher:
         self.leave = scene.analysis.unstable == "leave"
         self.snapped: list[float] = []
 
-    def resolved(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> Held | None:
-        """The equilibrium at a point of the way with nothing wrong about its touches."""
+    def resolved(
+        self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way, most: int | None = None
+    ) -> Held | None:
+        """The equilibrium at a point of the way with nothing wrong about its touches; by ``most`` solves in all."""
+        self.settler.limit = self.settler.solves + MOST_SOLVES if most is None else most
+        try:
+            return self._resolved(base, now, touches, way)
+        finally:
+            self.settler.limit = np.inf
+
+    def _resolved(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> Held | None:
         source = None if now is None else (now.prepared.model, now.corrected.state)
         seen: list[tuple[Touch, ...]] = []
+        crossed: set[str] = set()
         for _ in range(CHANGES):
             if sum(_alike(touches, other) for other in seen) > 1:
                 return None
@@ -83,7 +95,7 @@ class Toucher:
             if found is None:
                 return None
             if isinstance(found, Ran):
-                touches = self.reviser.ended(found)
+                touches = self.reviser.ended(found, crossed)
                 continue
             wrong = self.reviser.wrong(found, way)
             if wrong is None:
@@ -104,7 +116,7 @@ class Toucher:
             if self.settler.solves > most:
                 return None
             trial = min(1.0, done + step)
-            there = self.resolved(base, now, touches, way(trial))
+            there = self.resolved(base, now, touches, way(trial), most)
             if there is None:
                 step *= 0.25
                 if step >= SHORTEST[done > 0.0]:

@@ -66,6 +66,7 @@ ORDER = [
     "mirrors",
     "touches",
     "settling",
+    "cushions",
     "revising",
     "touching",
     "solution",

@@ -1,0 +1,309 @@
+"""Obstacles as cushions: a first state in contact, wherever members touch, from which the touches are read.
+
+Cushions stand at many places of the members and push softly, so that the loads can be followed from zero as without
+obstacles: nothing begins or ends to touch, forces come and go smoothly.  They are then made thin and stiff, and where
+they push says which places touch and which stretches lie on what.  That state is no answer, it is the start for the
+equilibrium in which obstacles are what they are (see :mod:`~sfetcas.touching`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import Array
+from .continuation import follow
+from .equations import State
+from .errors import SolveError
+from .loading import Loading
+from .mesh import Cushion, Mesh, Touch
+from .model import Model
+from .newton import Corrected, descend
+from .obstacles import members_of, obstacle, swept, takes_part
+from .prepared import Prepared
+from .scene import Scene
+from .settling import Held
+from .touches import Touched
+
+__all__ = ["Cushioned", "Cushions"]
+
+PLACES, LEAST, MOST = 48, 12, 64
+"""Elements along the longest member, and fewest and most along a member: a cushion stands at each of their ends."""
+
+FINENESS = 0.25
+"""Cushions stand nearer to each other than this share of an obstacle's radius."""
+
+ORDER = 3
+"""Order of the elements."""
+
+THICKNESSES = (3e-3, 3e-4, 3e-5, 3e-6, 3e-7)
+"""Thickness of the cushions over the size of the scene, one stage after the other."""
+
+PUSHED = 1e-3
+"""Share of the largest force of a cushion from which a place counts as touching."""
+
+REACH = 30.0
+"""Gaps over the thickness from which a cushion hardly reaches a place."""
+
+FALLS, FALL = 60, (4, 0.1)
+"""What falls turns no node by more than 0.1 rad a step; every four steps it is asked whether it passed something."""
+
+BEGIN = 0.01
+"""Share of the loads under which a mechanism, which has no place of its own without loads, is looked for at first."""
+
+
+@dataclass(frozen=True)
+class Cushioned:
+    """A state on cushions: held as one without touches, and what touches in it."""
+
+    held: Held
+    touches: tuple[Touch, ...]
+
+
+class Cushions:
+    """Cushions for the obstacles of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    sides : mapping
+        Of each edge and member where it is allowed, see :func:`~sfetcas.touches.edge_sides`.
+    """
+
+    def __init__(
+        self, scene: Scene, prepare: Callable[[Mesh], Prepared], sides: Mapping[tuple[str, str], float]
+    ) -> None:
+        self.scene, self.prepare, self.sides = scene, prepare, sides
+        space = scene.resolved_dimension == "space"
+        self.obstacles = {name: obstacle(contact, space) for name, contact in scene.contacts.items()}
+
+    # -- the state ------------------------------------------------------------------------------
+
+    def found(self, base: Mesh, factors: Sequence[float]) -> Cushioned | None:
+        """The state that the loads lead to through these factors, and what touches in it."""
+        mesh = self._divided(base)
+        prepared = self.prepare(self._cushioned(mesh, THICKNESSES[0], factors[-1]))
+        found = self._grown(prepared, factors) or self._direct(prepared, factors[-1])
+        if found is None:
+            return None
+        for thickness in THICKNESSES[1:]:
+            stiffer = self.prepare(self._cushioned(mesh, thickness, factors[-1]))
+            loading = stiffer.model.loading(factors[-1])
+            there = self._settled(stiffer, found.state, loading)
+            if there is None:
+                break
+            prepared, found = stiffer, there
+        loading = prepared.model.loading(factors[-1])
+        held = Held(prepared, found, loading, Touched(prepared.equations, found.state, loading))
+        return Cushioned(held, self._touches(held))
+
+    def _grown(self, prepared: Prepared, factors: Sequence[float]) -> Corrected | None:
+        """Loads growing through the factors from the undeformed scene."""
+        model = prepared.model
+        state, first = prepared.equations.start(model.loading(0.0, 0.0)), factors[0]
+        if prepared.diagnosis.mobility or prepared.lacks_slack:
+            first = factors[0] + BEGIN * (factors[1] - factors[0])
+            begun = self._fallen(prepared, first)
+            if begun is None:
+                return None
+            state = begun.state
+        elif self.scene.histories:
+            began = self._followed(prepared, lambda t: model.loading(factors[0], t), state)
+            if began is None:
+                return None
+            state = began
+        for a, b in zip((first, *factors[1:]), factors[1:], strict=False):
+            reached = self._followed(prepared, _between(model, a, b), state)
+            if reached is None:
+                return None
+            state = reached
+        return self._settled(prepared, state, model.loading(factors[-1]))
+
+    def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
+        leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
+
+        def allowed(before: State, after: State) -> bool:
+            return self._passes(prepared, before, after, way(1.0))
+
+        result = follow(prepared, way, state, leave=leave, allowed=allowed)
+        return result.state if result.reached else None
+
+    def _passes(self, prepared: Prepared, before: State, after: State, loading: Loading) -> bool:
+        """Whether no member runs over an obstacle from one state to the next."""
+        courses = [self._courses(prepared, state, loading) for state in (before, after)]
+        return not any(
+            swept(stop, courses[0][member], courses[1][member])
+            for name, stop in self.obstacles.items()
+            for member in members_of(self.scene.contacts[name], self.scene.members)
+        )
+
+    def _courses(self, prepared: Prepared, state: State, loading: Loading) -> dict[str, Array]:
+        touched = Touched(prepared.equations, state, loading)
+        return {name: touched.course(name) for name in prepared.model.members}
+
+    def _fallen(self, prepared: Prepared, factor: float) -> Corrected | None:
+        """Downhill from the undeformed scene in short steps, to where obstacles and supports hold what falls."""
+        if not prepared.model.minimisable:
+            return None
+        loading = prepared.model.loading(factor)
+        state = prepared.equations.start(loading)
+        for _ in range(FALLS):
+            lower = descend(prepared.equations, state, loading, prepared.weight, iterations=FALL[0], most=FALL[1])
+            if not self._passes(prepared, state, lower, loading):
+                return None
+            near = prepared.distance(state, lower) < FALL[1]
+            state = lower
+            if near:
+                break
+        return self._settled(prepared, state, loading)
+
+    def _direct(self, prepared: Prepared, factor: float) -> Corrected | None:
+        """Downhill from the start guess."""
+        loading = prepared.model.loading(factor)
+        if not prepared.model.minimisable:
+            return None
+        try:
+            state, gap = prepared.guess(loading)
+            return prepared.minimise(loading, state)[0] if gap < 0.2 else None
+        except SolveError:
+            return None
+
+    def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
+        """The equilibrium near a state; downhill from there where Newton's method does not find it."""
+        found = prepared.correct(state, loading, iterations=25, most=0.8)
+        if found.converged:
+            return found
+        try:
+            return prepared.minimise(loading, state)[0]
+        except SolveError:
+            return None
+
+    # -- where cushions stand -------------------------------------------------------------------
+
+    def _divided(self, base: Mesh) -> Mesh:
+        """A mesh as fine as cushions have to be, with the borders of the one given."""
+        lines = {name: self.scene.center_lines[name] for name in base.cuts}
+        longest = max(line.length for line in lines.values())
+        radii = [stop.radius for stop in self.obstacles.values() if stop.kind == "round"]
+        cuts = {}
+        for name, old in base.cuts.items():
+            count = max(LEAST, PLACES * lines[name].length / longest)
+            count = max(count, *(lines[name].length / (FINENESS * radius) for radius in radii), 0.0)
+            each = np.ceil(np.diff(old) * min(count, MOST)).astype(int)
+            parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(old, old[1:], each, strict=False)]
+            cuts[name] = np.append(np.concatenate(parts), 1.0)
+        return replace(base, order=ORDER, cuts=cuts, touches=())
+
+    def _cushioned(self, mesh: Mesh, thickness: float, factor: float) -> Mesh:
+        """The mesh with its cushions."""
+        bare = self.prepare(mesh).model
+        thick = thickness * self.scene.size
+        stiffness = self._largest_force(bare, factor) * bare.scales.force / thick
+        found: list[Cushion] = []
+        for contact in self.obstacles:
+            seen: set[str] = set()
+            for member in members_of(self.scene.contacts[contact], self.scene.members):
+                cuts, nodes = mesh.cuts[member], self.scene.members[member].nodes
+                edge = float(np.diff(cuts).max()) * self.scene.center_lines[member].length
+                for at in cuts.tolist():
+                    node = nodes[int(at)] if at in (0.0, 1.0) else ""
+                    if node and (node in seen or not self._takes_part(node, contact)):
+                        continue
+                    seen |= {node} if node else set()
+                    found.append(Cushion(contact, member, at, stiffness, thick, edge))
+        return replace(mesh, cushions=tuple(found))
+
+    def _takes_part(self, node: str, contact: str) -> bool:
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), self.obstacles[contact])
+
+    @staticmethod
+    def _largest_force(model: Model, factor: float) -> float:
+        """Size of the forces that obstacles may have to take, dimensionless."""
+        loading = model.loading(factor)
+        loads = float(np.linalg.norm(loading.force.sum(axis=0))), float(np.abs(loading.force).max(initial=0.0))
+        return max(1.0, *loads, float(np.abs(loading.moment).max(initial=0.0)))
+
+    # -- what touches ---------------------------------------------------------------------------
+
+    def _touches(self, held: Held) -> tuple[Touch, ...]:
+        """Runs of places that are pushed."""
+        touched = held.touched
+        pushes = {c: self._push(touched, c) for c in held.mesh.cushions}
+        largest = max(pushes.values(), default=0.0)
+        found: list[Touch] = []
+        for contact, stop in self.obstacles.items():
+            pushed = {c: push for c, push in pushes.items() if c.contact == contact and push > PUSHED * largest}
+            if stop.kind == "sharp":
+                found += self._on_edge(held, contact, {c.member for c in pushed})
+                continue
+            runs = [
+                run
+                for member in members_of(self.scene.contacts[contact], self.scene.members)
+                for run in self._runs(held.mesh, contact, member, pushed)
+            ]
+            lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
+            for run in runs:
+                node = self._node(run, run.at)
+                if run.to is None and node in lying:
+                    continue
+                lying |= {node} if run.to is None and node else set()
+                found.append(replace(run, way=self._way(touched, run)))
+        return tuple(found)
+
+    def _node(self, touch: Touch, x: float) -> str | None:
+        """The node at a place of a touch."""
+        return self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
+
+    def _runs(self, mesh: Mesh, contact: str, member: str, pushed: Mapping[Cushion, float]) -> Iterator[Touch]:
+        """Places of a member next to each other that are pushed; a node counts for each member that ends there."""
+        at_nodes = {self._node(Touch(c.contact, c.member, c.at), c.at): push for c, push in pushed.items()}
+        inner = {c.at: push for c, push in pushed.items() if c.member == member}
+        cuts = mesh.cuts[member]
+        nodes = self.scene.members[member].nodes
+        push = np.array([inner.get(x, 0.0) for x in cuts.tolist()])
+        push[0], push[-1] = at_nodes.get(nodes[0], 0.0), at_nodes.get(nodes[-1], 0.0)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], push > 0.0, [False]]).astype(int)))
+        for number, (a, b) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+            if b - a <= 2:
+                yield Touch(contact, member, float(np.average(cuts[a:b], weights=push[a:b])), number=number)
+            else:
+                yield Touch(contact, member, float(cuts[a]), float(cuts[b - 1]), number=number)
+
+    def _on_edge(self, held: Held, contact: str, members: set[str]) -> list[Touch]:
+        """The place that is nearest to an edge, of the members that it pushes."""
+        touched, found = held.touched, []
+        for member in members:
+            way = self.sides[contact, member]
+            for x in touched.passing(contact, member):
+                gap = float(touched.gaps(contact, member, np.array([x]), 0.0, way)[0])
+                found.append((abs(gap), Touch(contact, member, x, way=way)))
+        return [min(found, key=lambda pair: pair[0])[1]] if found else []
+
+    def _push(self, touched: Touched, cushion: Cushion) -> float:
+        """Force of a cushion, N; zero where it only reaches a place from afar."""
+        gap = float(touched.gaps(cushion.contact, cushion.member, np.array([cushion.at]), 0.0)[0])
+        if self.obstacles[cushion.contact].kind == "sharp":
+            x = np.array([cushion.at])
+            out = touched.fields.positions(cushion.member, x)[0] - self.obstacles[cushion.contact].place
+            gap = float(np.linalg.norm(self.obstacles[cushion.contact].across @ out)) - cushion.edge
+        if gap > REACH * cushion.thickness:
+            return 0.0
+        root = float(np.hypot(gap, cushion.thickness))
+        depth = 0.5 * (root - gap)
+        return cushion.stiffness * depth**2 / root
+
+    @staticmethod
+    def _way(touched: Touched, touch: Touch) -> float:
+        """To which side something round bends what lies on it."""
+        x = np.array([touch.at])
+        stop = touched.obstacles[touch.contact]
+        point, tangent = touched.fields.positions(touch.member, x)[0], touched.fields.tangents(touch.member, x)[0]
+        return float(np.sign(stop.curvature(point, tangent))) or 1.0
+
+
+def _between(model: Model, a: float, b: float) -> Callable[[float], Loading]:
+    return lambda t: model.loading(a + t * (b - a))

@@ -1,0 +1,101 @@
+"""Cushions: first states in contact, wherever members touch."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scenes import SOFT, made
+from test_contacts import balance, smallest_gap
+
+from sfetcas import solve
+from sfetcas.contact_statics import ContactRun
+from sfetcas.cushions import Cushions
+from sfetcas.joints import CushionedPlane, CushionedRound, by_turning
+from sfetcas.statics import Settings, _Run
+
+FLAT, ROUND = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
+
+
+def push(kind, data, u):
+    """Force of a cushion on a place, by its energy."""
+    values = by_turning(kind)(ca.DM(1, 0), ca.DM(u), ca.DM(data), ca.DM(0, 1), ca.DM(0, 1))
+    return -np.array(values[3]).ravel()
+
+
+@pytest.mark.parametrize(("kind", "data", "base"), [(CushionedPlane, FLAT, 0.0), (CushionedRound, ROUND, 1.0)])
+def test_force_of_a_cushion_is_that_of_a_spring_inside_and_fades_outside(kind, data, base):
+    stiffness, thickness = 1e4, 1e-3
+    inside = push(kind(False), [*data, stiffness, thickness], [0.0, base - 0.1])
+    np.testing.assert_allclose(inside, [0, stiffness * 0.1], rtol=1e-3)  # (thickness / depth)^2, and its half
+    # Far outside depth is t^2 / (4 g), its slope t^2 / (4 g^2): the force falls with the third power.
+    for gap in (0.1, 0.2):
+        outside = push(kind(False), [*data, stiffness, thickness], [0.0, base + gap])
+        assert outside[1] == pytest.approx(stiffness * thickness**4 / (16.0 * gap**3), rel=1e-3)
+
+
+def chain(seed, kind):
+    """A heavy chain at random above a floor or a drum, with forces, couples and hinges here and there."""
+    rng = np.random.default_rng(seed)
+    count, height = int(rng.integers(1, 5)), rng.uniform(0.05, 0.5)
+    places = np.cumsum(np.vstack([[0.0, height], rng.uniform([0.2, -0.15], [0.6, 0.15], (count, 2))]), axis=0)
+    places[:, 1] = np.maximum(places[:, 1], 0.02)
+    nodes = {f"n{i}": {"position": p.tolist()} for i, p in enumerate(places)}
+    nodes["n0"]["support"] = "clamped" if kind != "hinged" else "hinge"
+    loads = {}
+    for i in range(1, count + 1):
+        loads[f"f{i}"] = {"type": "force", "node": f"n{i}", "value": rng.uniform([-1.5, -4], [1.5, 4]).tolist()}
+        if kind == "couples":
+            loads[f"c{i}"] = {"type": "moment", "node": f"n{i}", "value": float(rng.uniform(-2, 2))}
+    members = {f"m{i}": {"nodes": [f"n{i}", f"n{i + 1}"], "section": "s"} for i in range(count)}
+    for name in members:
+        loads[f"w{name}"] = {"type": "distributed", "member": name, "value": [0, -float(rng.uniform(2, 20))]}
+    if kind == "within":
+        for name in members:
+            lift = [0.0, float(rng.uniform(-6, 6))]
+            loads[f"p{name}"] = {"type": "force", "member": name, "at": float(rng.uniform(0.2, 0.8)), "value": lift}
+    floor = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
+    return {
+        "sections": {"s": SOFT},
+        "nodes": nodes,
+        "members": members,
+        "loads": loads,
+        "contacts": {"floor": floor},
+    }
+
+
+@pytest.mark.parametrize("kind", ["forces", "couples", "within", "hinged"])
+@pytest.mark.parametrize("seed", range(4))
+def test_heavy_chains_over_a_floor_are_solved(kind, seed):
+    """No matter how they come to lie: nothing inside, obstacles and supports carry the loads, stable."""
+    table = chain(seed, kind)
+    step = solve(made(table)).last
+    assert step.certificate.stable is True
+    assert smallest_gap(step) > -1e-5  # a tenth of the accuracy
+    loads = np.zeros(3)
+    for entry in table["loads"].values():
+        if entry["type"] != "moment":
+            ends = [
+                np.array(table["nodes"][n]["position"])
+                for n in table["members"].get(entry.get("member"), {}).get("nodes", ())
+            ]
+            length = np.linalg.norm(ends[1] - ends[0]) if entry["type"] == "distributed" else 1.0
+            loads[:2] += np.array(entry["value"]) * length
+    # The floor pushes across itself: what acts along it the support alone takes.
+    np.testing.assert_allclose(balance(step), -loads, atol=1e-5 * np.abs(loads).max())  # places of contact
+    for push_here in np.atleast_2d(step.contacts["floor"]["force"]):
+        assert push_here[1] >= 0.0
+
+
+def test_cushions_say_what_touches():
+    """A strip flat on the floor over a stretch: read within the spacing of the cushions."""
+    table = chain(0, "forces") | {"loads": {}}
+    table["nodes"] = {"n0": {"position": [0, 0.1], "support": "clamped"}, "n1": {"position": [2, 0.1]}}
+    table["members"] = {"m0": {"nodes": ["n0", "n1"], "section": "s"}}
+    table["loads"] = {"w": {"type": "distributed", "member": "m0", "value": [0, -20]}}
+    scene = made(table)
+    run = _Run(scene, Settings())
+    sides = ContactRun(scene, run._prepared, 1e-4, set()).reviser.sides
+    found = Cushions(scene, run._prepared, sides).found(run.pilot_mesh, [0.0, 1.0])
+    assert found is not None
+    (touch,) = found.touches
+    begin, end = solve(scene).last.contacts["floor"]["at"]
+    assert (touch.at, touch.to) == (pytest.approx(begin, abs=1.5 / 48), end)
