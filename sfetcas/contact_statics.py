@@ -32,6 +32,9 @@ WEAK = 1e-9
 IDLE = 1e-7
 """Share of the force on a stretch below which it is without pressure between its ends."""
 
+STAYS = "unstable, and no stable equilibrium was found along its escape shape"
+"""A note."""
+
 LEVELS, MOST_ELEMENTS = 40, 20_000
 """Most refinements of a mesh, and most elements."""
 
@@ -200,7 +203,6 @@ class ContactRun:
         """
         way = self.at(factor)
         held, left = self._left(held, way)
-        notes += left
         self.last = (factor, held)
         now = held
         if held.mesh.order != target.order or self.fixed:
@@ -221,7 +223,9 @@ class ContactRun:
                 now = self._onto(now.mesh.refined(marks), now, way)
         now = self._checked(now, way, error)
         stability, more = self._stability(now, way)
-        return Pressed(now, stability, error, (*notes, *more))
+        if stability.negative <= 0 and left == (STAYS,):
+            left = ()
+        return Pressed(now, stability, error, (*notes, *left, *more))
 
     def _checked(self, held: Held, way: Way, error: float) -> Held:
         """The state on its fine mesh with what touches looked at as finely as the error of positions allows."""
@@ -310,7 +314,7 @@ class ContactRun:
             found = None if start is None else self._downhill(start, loose, way)
             if found is not None and self._judged(found, way).negative <= 0:
                 return found, ("left an unstable equilibrium in contact along its escape shape",)
-        return held, ("unstable, and no stable equilibrium was found along its escape shape",)
+        return held, (STAYS,)
 
     def _downhill(self, start: Held, touches: tuple[Touch, ...], way: Way) -> Held | None:
         """From an unstable state along its escape shape, then what touches is looked at again."""

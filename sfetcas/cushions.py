@@ -38,11 +38,20 @@ FINENESS = 0.25
 ORDER = 3
 """Order of the elements."""
 
-THICKNESSES = (3e-3, 3e-4, 3e-5, 3e-6, 3e-7)
-"""Thickness of the cushions over the size of the scene, one stage after the other."""
+THICKEST, THINNEST = 3e-3, 3e-7
+"""Thickness of the cushions over the size of the scene, at first and in the end."""
+
+SHRINK, LEAST_SHRINK = 0.1, 0.8
+"""How cushions are made thinner from stage to stage, and the shrinkage at which that is given up."""
 
 PUSHED = 1e-3
 """Share of the largest force of a cushion from which a place counts as touching."""
+
+TINY = 1e-6
+"""Share of the largest push that stands for none where a member lies without pressure."""
+
+NEARBY = 0.5
+"""Largest turn, rad, to what counts as the same state on thinner cushions."""
 
 REACH = 30.0
 """Gaps over the thickness from which a cushion hardly reaches a place."""
@@ -86,26 +95,32 @@ class Cushions:
     def found(self, base: Mesh, factors: Sequence[float]) -> Cushioned | None:
         """The state that the loads lead to through these factors, and what touches in it."""
         mesh = self._divided(base)
-        prepared = self.prepare(self._cushioned(mesh, THICKNESSES[0], factors[-1]))
-        found = self._grown(prepared, factors) or self._direct(prepared, factors[-1])
+        # What is free to move without obstacles; cushions themselves count as springs.
+        bare = self.prepare(base)
+        falls = bool(bare.diagnosis.mobility) or bare.lacks_slack
+        prepared = self.prepare(self._cushioned(mesh, THICKEST, factors[-1]))
+        found = self._grown(prepared, factors, falls) or self._direct(prepared, factors[-1])
         if found is None:
             return None
-        for thickness in THICKNESSES[1:]:
-            stiffer = self.prepare(self._cushioned(mesh, thickness, factors[-1]))
-            loading = stiffer.model.loading(factors[-1])
-            there = self._settled(stiffer, found.state, loading)
+        thickness = THICKEST
+        shrink = SHRINK
+        while thickness > 1.01 * THINNEST and shrink < LEAST_SHRINK:
+            trial = max(shrink * thickness, THINNEST)
+            stiffer = self.prepare(self._cushioned(mesh, trial, factors[-1]))
+            there = self._settled(stiffer, found.state, stiffer.model.loading(factors[-1]))
             if there is None:
-                break
-            prepared, found = stiffer, there
+                shrink = np.sqrt(shrink)
+                continue
+            prepared, found, thickness = stiffer, there, trial
         loading = prepared.model.loading(factors[-1])
         held = Held(prepared, found, loading, Touched(prepared.equations, found.state, loading))
         return Cushioned(held, self._touches(held))
 
-    def _grown(self, prepared: Prepared, factors: Sequence[float]) -> Corrected | None:
+    def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Corrected | None:
         """Loads growing through the factors from the undeformed scene."""
         model = prepared.model
         state, first = prepared.equations.start(model.loading(0.0, 0.0)), factors[0]
-        if prepared.diagnosis.mobility or prepared.lacks_slack:
+        if falls:
             first = factors[0] + BEGIN * (factors[1] - factors[0])
             begun = self._fallen(prepared, first)
             if begun is None:
@@ -163,24 +178,28 @@ class Cushions:
 
     def _direct(self, prepared: Prepared, factor: float) -> Corrected | None:
         """Downhill from the start guess."""
-        loading = prepared.model.loading(factor)
+        model, loading = prepared.model, prepared.model.loading(factor)
         if not prepared.model.minimisable:
             return None
         try:
             state, gap = prepared.guess(loading)
-            return prepared.minimise(loading, state)[0] if gap < 0.2 else None
+            found = prepared.minimise(loading, state)[0] if gap < 0.2 else None
         except SolveError:
             return None
+        start = prepared.equations.start(model.loading(0.0, 0.0))
+        return found if found is not None and self._passes(prepared, start, found.state, loading) else None
 
     def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
-        """The equilibrium near a state; downhill from there where Newton's method does not find it."""
+        """The equilibrium near a state; downhill from there where Newton's method does not find it, if not far."""
         found = prepared.correct(state, loading, iterations=25, most=0.8)
         if found.converged:
             return found
         try:
-            return prepared.minimise(loading, state)[0]
+            found = prepared.minimise(loading, state)[0]
         except SolveError:
             return None
+        near = prepared.distance(state, found.state) < NEARBY and self._passes(prepared, state, found.state, loading)
+        return found if near else None
 
     # -- where cushions stand -------------------------------------------------------------------
 
@@ -243,7 +262,7 @@ class Cushions:
             runs = [
                 run
                 for member in members_of(self.scene.contacts[contact], self.scene.members)
-                for run in self._runs(held.mesh, contact, member, pushed)
+                for run in self._runs(held, contact, member, pushed)
             ]
             lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
             for run in runs:
@@ -258,20 +277,47 @@ class Cushions:
         """The node at a place of a touch."""
         return self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
 
-    def _runs(self, mesh: Mesh, contact: str, member: str, pushed: Mapping[Cushion, float]) -> Iterator[Touch]:
-        """Places of a member next to each other that are pushed; a node counts for each member that ends there."""
+    def _runs(self, held: Held, contact: str, member: str, pushed: Mapping[Cushion, float]) -> Iterator[Touch]:
+        """Places of a member next to each other that are pushed; a node counts for each member that ends there.
+
+        An end that a support holds on the obstacle has no cushion, and goes with what is beside it.
+        """
         at_nodes = {self._node(Touch(c.contact, c.member, c.at), c.at): push for c, push in pushed.items()}
         inner = {c.at: push for c, push in pushed.items() if c.member == member}
-        cuts = mesh.cuts[member]
+        cuts = held.mesh.cuts[member]
         nodes = self.scene.members[member].nodes
         push = np.array([inner.get(x, 0.0) for x in cuts.tolist()])
         push[0], push[-1] = at_nodes.get(nodes[0], 0.0), at_nodes.get(nodes[-1], 0.0)
+        reach = REACH * max((c.thickness for c in pushed), default=0.0)
+        for i, beside in ((0, 1), (-1, -2)):
+            gap = held.touched.gaps(contact, member, cuts[[i]], 0.0)[0]
+            if not self._takes_part(nodes[i], contact) and push[beside] > 0.0 and gap < reach:
+                push[i] = push[beside]
+        if self.obstacles[contact].kind == "round":
+            # Along something round a member may lie without pressure between the ends of the stretch.
+            near = held.touched.gaps(contact, member, cuts, 0.0) < reach
+            first, last = np.flatnonzero(push > 0.0)[[0, -1]] if push.any() else (0, 0)
+            if near[first : last + 1].all():
+                push[first : last + 1] = np.maximum(push[first : last + 1], push.max() * TINY)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], push > 0.0, [False]]).astype(int)))
         for number, (a, b) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-            if b - a <= 2:
+            if self.scene.members[member].type == "rigid":
+                yield from self._of_rigid(contact, member, cuts[a:b], push[a:b])
+            elif b - a <= 2:
                 yield Touch(contact, member, float(np.average(cuts[a:b], weights=push[a:b])), number=number)
             else:
                 yield Touch(contact, member, float(cuts[a]), float(cuts[b - 1]), number=number)
+
+    def _of_rigid(self, contact: str, member: str, x: Array, push: Array) -> Iterator[Touch]:
+        """A rigid member touches where it is pushed most, or at both ends of the run where it is straight."""
+        line = self.scene.center_lines[member]
+        straight = line.turning == 0.0 and self.obstacles[contact].kind == "flat"
+        if not straight:
+            yield Touch(contact, member, float(x[np.argmax(push)]))
+            return
+        spacing = float(np.diff(x).max(initial=0.0))
+        ends = [e for e in (0.0, 1.0) if np.abs(x - e).min() <= spacing]
+        yield from (Touch(contact, member, e, number=int(e)) for e in ends)
 
     def _on_edge(self, held: Held, contact: str, members: set[str]) -> list[Touch]:
         """The place that is nearest to an edge, of the members that it pushes."""

@@ -145,9 +145,10 @@ def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle)
 def swept(stop: Obstacle, before: Array, after: Array) -> bool:
     """Whether a curve that moves from some places (n, 3) to others (m, 3) runs over the middle of an obstacle.
 
-    The two curves and what joins their ends wind round it then.  A plane is nowhere run over, nor a sphere.
+    The two curves and what joins their ends wind round it then.  A plane is nowhere run over, nor a sphere, nor what
+    members are inside of.
     """
-    if stop.kind == "flat" or np.linalg.matrix_rank(stop.across) != 2:
+    if stop.kind == "flat" or stop.sign < 0.0 or np.linalg.matrix_rank(stop.across) != 2:
         return False
     basis = np.linalg.svd(stop.across)[2][:2]
     around = (np.vstack([before, after[::-1], before[:1]]) - stop.place) @ basis.T

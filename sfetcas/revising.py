@@ -117,11 +117,11 @@ class Reviser:
         return tuple(found)
 
     def ran_over(self, now: Held | None, there: Held) -> bool:
-        """Whether a step takes a member over an obstacle without touching it."""
+        """Whether a step takes a member over an obstacle, or to the other side of one that it touches."""
         touched = [touch.contact for touch in there.mesh.touches]
-        before = () if now is None else now.mesh.touches
         for contact, stop in there.touched.obstacles.items():
-            if stop.kind == "flat" or contact in touched or contact in [t.contact for t in before]:
+            # On an edge itself no side can be told.
+            if stop.kind == "sharp" and contact in touched:
                 continue
             for member in members_of(self.scene.contacts[contact], self.scene.members):
                 line = self.scene.center_lines[member]
@@ -213,6 +213,8 @@ class Reviser:
 
     def _laid(self, held: Held, touch: Touch) -> Touch | None:
         """The stretch that a place becomes; None where the member curves away from the obstacle."""
+        if self._stiff(touch.member):
+            return None
         scales = held.prepared.model.scales
         bent = held.touched.gap_curvature(touch) * scales.length
         if bent > -FLAT or self._leaves(held, touch):
@@ -224,6 +226,10 @@ class Reviser:
         reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
         low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
         return replace(touch, at=low, to=high, way=self._bend(held, touch))
+
+    def _stiff(self, member: str) -> bool:
+        """Whether a member cannot come to lie along an obstacle, but touches it at places only."""
+        return self.scene.members[member].type == "rigid"
 
     @staticmethod
     def _leaves(held: Held, touch: Touch) -> bool:
@@ -238,7 +244,7 @@ class Reviser:
         """Between two places of one obstacle without any gap between them the member lies on it."""
         touches, limit = held.mesh.touches, self.limit * self.scene.size
         for touch in touches:
-            if held.touched.obstacles[touch.contact].kind == "sharp":
+            if held.touched.obstacles[touch.contact].kind == "sharp" or self._stiff(touch.member):
                 continue
             others = [
                 (t, x)
@@ -288,7 +294,7 @@ class Reviser:
         """The touches with one that keeps a run of places out of an obstacle."""
         touches = held.mesh.touches
         width = max(gap.end - gap.begin, 1e-4)
-        for i, touch in enumerate(touches):
+        for i, touch in enumerate(() if self._stiff(gap.member) else touches):
             if (touch.contact, touch.member) != (gap.contact, gap.member):
                 continue
             beside = [x for x in touch.places if gap.begin - width <= x <= gap.end + width]

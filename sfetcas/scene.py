@@ -468,8 +468,8 @@ def _check_contacts(scene: Scene) -> None:
             message = f"found a point, accepted in space: a line, as {scene.dimension_reason}"
             raise SceneError(message, ("contacts", name, "type"))
         for member in members_of(contact, scene.members):
-            if scene.members[member].type != "flexible":
-                accepted = "flexible members, whose whole length can touch"
+            if scene.members[member].type == "small":
+                accepted = "flexible and rigid members, whose shape between their ends is known"
                 raise SceneError(
                     f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
                     ("contacts", name),

@@ -36,6 +36,9 @@ CLOSE = 1e-4
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
 
+MISSED = 1e-6
+"""Conditions of places, dimensionless, that are larger than this do not hold."""
+
 MOST_STEPS = 40
 """Steps of places before giving up."""
 
@@ -135,6 +138,16 @@ def balanced(equations: Equations, state: State, loading: Loading) -> State:
     return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
 
 
+def closed(equations: Equations, state: State, loading: Loading) -> State:
+    """The state with the displacements kept as unknowns where the members lead: a new mesh has new places."""
+    n, positions = equations.unknowns, equations.model.positions
+    rows = len(positions.rows)
+    if not rows or not len(state.y) or rows * len(state.y) > 4_000_000:
+        return state
+    gaps = equations.at(state, loading).residual[n : n + rows]
+    return replace(state, y=state.y - np.linalg.lstsq(positions.W.full(), gaps, rcond=1e-12)[0])
+
+
 class Settler:
     """Equilibria of one scene with given touches.
 
@@ -170,7 +183,8 @@ class Settler:
             state = source[1]
         else:
             state = transferred(source[0], source[1], prepared.model)
-            state = balanced(prepared.equations, prepared.equations.holding(state, loading), loading)
+            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading)
+            state = balanced(prepared.equations, state, loading)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
         if not corrected.converged and corrected.residual > 1e-9:
             return None
@@ -206,7 +220,8 @@ class Settler:
             if (ran is not None and room < 10.0 * APART) or (end is not None and crowded > PATIENCE):
                 return end
             if np.abs(step).max() < SETTLED:
-                return replace(held, slopes=slopes)
+                # Where places have no say, as along a straight rigid member, no step is no answer.
+                return replace(held, slopes=slopes) if np.abs(here).max() < MISSED else None
             there = self._stepped(held, free, step, way)
             if there is None:
                 return ran

@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
@@ -501,13 +502,14 @@ class _Run:
         """The answer where obstacles may stop members."""
         base = self.pilot_mesh.refined()
         notes: tuple[str, ...] = ()
-        held = contact.continued(base, factor)
+        last = contact.continued(base, factor)
         falls = bool(pilot.diagnosis.mobility) and not contact.first_touches(base)
-        if held is None or not held.mesh.touches:
+        held, failure = None, None
+        if last is None or not last.mesh.touches:
             free, failure = self._unstopped(pilot, factor)
             if free is not None and free.left and not self.creeping and not self.scene.histories:
                 return self._crept(contact, pilot, factor, free.left[0])
-            held = None
+            last = None
             if free is not None:
                 there = self._onto(base, free, factor)
                 held, notes = _as_held(there, factor), there.notes
@@ -517,9 +519,11 @@ class _Run:
                     if contact.clear(answer.fields):
                         contact.last = (factor, held)
                         return answer
-            ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
-            return self._first_pressed(contact, ways, factor, notes, failure)
-        return self._pressed(contact.answered(held, factor, self.target, notes), factor)
+        ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
+        try:
+            return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
+        except SolveError as error:
+            raise self._named(pilot, error) from None
 
     def _first_pressed(
         self,
@@ -529,15 +533,22 @@ class _Run:
         notes: tuple[str, ...],
         failure: SolveError | None,
     ) -> Equilibrium:
-        """The first answer among states in contact that were found in different ways."""
+        """The first stable answer among states in contact that were found in different ways; else the first."""
         refused: SolveError | None = None
+        unstable: Equilibrium | None = None
         for held in ways:
             if held is None:
                 continue
             try:
-                return self._pressed(contact.answered(held, factor, self.target, notes), factor)
+                answer = self._pressed(contact.answered(held, factor, self.target, notes), factor)
             except SolveError as error:
                 refused = refused or error
+                continue
+            if not self.leave or answer.certificate.negative == 0:
+                return answer
+            unstable = unstable or answer
+        if unstable is not None:
+            return unstable
         if refused is not None:
             raise refused
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"

@@ -449,14 +449,69 @@ def test_wrong_contacts_are_refused(contact, message):
     assert message in str(found.value)
 
 
-def test_point_in_space_and_rigid_member_are_refused():
+def test_point_in_space_and_small_member_are_refused():
     point = {"type": "point", "position": [0.5, 0], "side": [0, 1], "member": "m"}
     with pytest.raises(SceneError, match="found a point, accepted in space: a line"):
         made(above(0.2, contact=point, loads=weight(1.0), dimension="space"))
     table = above(0.2, loads=tip(1.0))
-    table["members"]["m"]["type"] = "rigid"
-    with pytest.raises(SceneError, match="found the rigid member 'm', accepted: flexible members"):
+    table["members"]["m"]["type"] = "small"
+    with pytest.raises(SceneError, match="found the small member 'm', accepted: flexible and rigid members"):
         made(table)
+
+
+def rods(count, height, *, contact=None, types=None):
+    """Heavy links of 1 m in a row at a height, hinged to each other and to the ground."""
+    floor = {key: value for key, value in FLOOR.items() if key != "member"} | {"members": "all"}
+    table = {"sections": {"s": SOFT}, "nodes": {}, "members": {}, "loads": {}, "contacts": {"floor": contact or floor}}
+    for i in range(count + 1):
+        table["nodes"][f"n{i}"] = {"position": [i, height], **({"joint": "hinge"} if 0 < i < count else {})}
+    table["nodes"]["n0"]["support"] = "hinge"
+    for i in range(count):
+        kind = (types or ["rigid"] * count)[i]
+        table["members"][f"m{i}"] = {"nodes": [f"n{i}", f"n{i + 1}"], "section": "s", "type": kind}
+        table["loads"][f"w{i}"] = {"type": "distributed", "member": f"m{i}", "value": [0, -1]}
+    return table
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_rigid_links_fall_flat_on_a_floor(count):
+    """The first leans on the floor, the others lie: half of each weight goes to either end of a link."""
+    step = solve(made(rods(count, 0.3))).last
+    reach = np.sqrt(1.0 - 0.3**2) + np.arange(count)
+    for i in range(count):
+        np.testing.assert_allclose(step.position(f"n{i + 1}"), [reach[i], 0, 0], atol=1e-12)
+    up = np.atleast_2d(step.contacts["floor"]["force"])[:, 1]
+    np.testing.assert_allclose(up, [1.0] * (count - 1) + [0.5], rtol=1e-9)
+
+
+def test_rigid_and_flexible_links_fall_together():
+    step = solve(made(rods(3, 0.3, types=["rigid", "flexible", "rigid"]))).last
+    assert smallest_gap(step) > -1e-9
+    np.testing.assert_allclose(balance(step), [0, 3, 0], atol=1e-9)
+
+
+def test_rigid_arc_rolls_on_its_way_to_a_floor():
+    """It touches where its tangent is level: the lowest place of a circle is its radius below its centre."""
+    table = rods(1, 0.3)
+    table["members"]["m0"]["shape"] = {"type": "arc", "angle": 2.0}
+    step = solve(made(table)).last
+    entry = step.contacts["floor"]
+    assert 0.0 < entry["at"] < 1.0
+    tangent = step.fields.tangents("m0", np.array([entry["at"]]))[0]
+    assert tangent[1] == pytest.approx(0.0, abs=1e-9)
+    # Moments about the hinge: the weight of an arc acts in its middle of mass.
+    x = step.along("m0", np.linspace(0.0, 1.0, 2001))["position"][:, 0]
+    length = 2.0 * 0.5 / np.sin(1.0)
+    at = step.along("m0", [entry["at"]])["position"][0][0]
+    assert entry["force"][1] * at == pytest.approx(length * np.trapezoid(x, dx=1 / 2000), rel=1e-6)  # the sum
+
+
+def test_rigid_links_hang_over_a_drum():
+    drum = {"type": "circle", "center": [1.5, -0.6], "radius": 0.5, "members": "all"}
+    step = solve(made(rods(3, 0.3, contact=drum))).last
+    assert smallest_gap(step) > -1e-9
+    assert step.certificate.stable is True
+    np.testing.assert_allclose(balance(step), [0, 3, 0], atol=1e-9)
 
 
 def test_contact_that_cannot_be_satisfied():
@@ -672,3 +727,24 @@ def test_lying_on_an_obstacle_is_where_it_stays():
     table = above(0.0, loads=weight(1.0))
     table["nodes"]["A"]["support"] = "hinge"
     np.testing.assert_allclose(solve(made(table)).last.position("B"), [1.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_member_inside_a_circle_may_pass_its_centre():
+    """Only what is outside of a circle can run over it."""
+    bowl = {"type": "circle", "center": [0.5, 0.4], "radius": 1.2, "member": "m", "side": "inside"}
+    table = above(0.0, contact=bowl, loads={"M": {"type": "moment", "node": "B", "value": 2.5}})
+    step = solve(made(table)).last
+    # The centre lies between the straight beam and the arc of radius 1 / 2.5 that it becomes.
+    np.testing.assert_allclose(step.position("B")[:2], [np.sin(2.5) / 2.5, (1 - np.cos(2.5)) / 2.5], atol=1e-6)
+
+
+def test_body_without_support_lies_in_a_bowl():
+    """Nothing but the bowl holds it: half of the weight on either end, along the normals there."""
+    bowl = {"type": "circle", "center": [0.5, 1.0], "radius": 1.3, "member": "m", "side": "inside"}
+    table = above(0.0, contact=bowl, loads=weight(5.0))
+    del table["nodes"]["A"]["support"]
+    step = solve(made(table)).last
+    left, right = np.array(step.contacts["floor"]["force"])
+    np.testing.assert_allclose([left[1], right[1]], 2.5, rtol=1e-6)
+    out = np.array([0.5, 1.0, 0.0]) - step.position("A")
+    np.testing.assert_allclose(np.cross(left, out), 0.0, atol=1e-6)
