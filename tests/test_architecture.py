@@ -37,6 +37,7 @@ ORDER = [
     "scenefile",
     "elements",
     "joints",
+    "carried",
     "mesh",
     "rotations",
     "segments",
