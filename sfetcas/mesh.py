@@ -129,6 +129,16 @@ class Mesh:
             cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
         return replace(self, cuts=cuts)
 
+    def same(self, other: Mesh) -> bool:
+        """Whether another mesh has the same elements, touches and stops."""
+        alike = (self.order, self.gauss, self.touches, self.stops) == (
+            other.order,
+            other.gauss,
+            other.touches,
+            other.stops,
+        )
+        return alike and all(np.array_equal(cuts, other.cuts[name]) for name, cuts in self.cuts.items())
+
     def cut_at(self, member: str, place: float) -> int:
         """Number of the cut of a member that is nearest to a fraction of its length."""
         return int(np.argmin(np.abs(self.cuts[member] - place)))

@@ -583,6 +583,9 @@ class _Run:
 
     def _onto(self, mesh: Mesh, source: _Found, factor: float) -> _Found:
         """The same equilibrium on another mesh."""
+        if mesh.same(source.prepared.model.mesh):
+            # Without flexible members nothing is halved.
+            return source
         prepared = self._prepared(mesh)
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)

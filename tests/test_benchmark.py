@@ -41,16 +41,36 @@ def test_net_has_as_many_members_as_asked_for_and_a_row_more_at_most(members):
     assert len(scene.nodes) == len(scene.members) / (2 * columns + 1) * (columns + 1) + columns + 1
 
 
-def test_net_is_measured_in_a_process_of_its_own(capsys, monkeypatch):
-    monkeypatch.setattr(benchmark, "NETS", (3, 10))
+@pytest.mark.parametrize("kind", benchmark.NETS)
+@pytest.mark.parametrize("members", [1, 7, 30])
+def test_large_systems_are_of_their_kind(kind, members):
+    scene = benchmark.large(kind, members)
+    assert members <= len(scene.members) <= 2 * members + 4
+    types = {member.type for member in scene.members.values()}
+    asked = {
+        "rigid rows": {"flexible", "rigid"},
+        "small": {"small"},
+        "lattice": {"small"},
+        "chain": {"flexible", "rigid"},
+    }
+    wanted = asked.get(kind, {"flexible", "small", "rigid"} if kind == "all types" else {"flexible"})
+    assert types == wanted if members == 30 else types <= wanted
+
+
+def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark, "NETS", {"wavy strips": (3, 10), "lattice": (4,)})
     benchmark.main(["net"])
-    found = rows(capsys.readouterr().out)
-    assert [int(row[0]) for row in found] == [len(benchmark.woven(n).members) for n in (3, 10)]
-    for row in found:
+    lines = capsys.readouterr().out.strip().splitlines()[2:]
+    cases = [("wavy strips", 3), ("wavy strips", 10), ("lattice", 4)]
+    for line, (kind, members) in zip(lines, cases, strict=True):
+        scene = benchmark.large(kind, members)
+        assert line[:12].strip() == kind
+        row = line[12:].split()
+        assert int(row[0]) == len(scene.members)
         made, model, solving, total = (float(cell) for cell in row[3:7])
         # printed with two digits
         assert made + model + solving <= total + 0.02
-        assert int(row[2]) == solve(benchmark.woven(int(row[0]))).last.model.unknowns
+        assert int(row[2]) == solve(scene).last.model.unknowns
 
 
 def test_paths_are_measured(capsys, once):
