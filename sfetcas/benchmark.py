@@ -212,6 +212,7 @@ def tree(members: int) -> Scene:
 
 def chain(members: int) -> Scene:
     """Rigid links hinged to each other between two supports, loaded at each hinge; the middle one is flexible."""
+    members = max(members, 2)
     nodes, links, loads = {"0": Node(position=[0, 0], support="hinge")}, {}, {}
     for k in range(1, members + 1):
         place = [float(k), -0.3 * members * math.sin(math.pi * k / members)]
