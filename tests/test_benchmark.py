@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from sfetcas import benchmark
@@ -55,6 +56,26 @@ def test_large_systems_are_of_their_kind(kind, members):
     }
     wanted = asked.get(kind, {"flexible", "small", "rigid"} if kind == "all types" else {"flexible"})
     assert types == wanted if members == 30 else types <= wanted
+
+
+@pytest.mark.parametrize(
+    ("kind", "members"), [("rigid rows", 250), ("lattice", 500), ("all types", 200), ("chain", 200)]
+)
+def test_large_systems_are_solved(kind, members):
+    """Systems for which solvers of linear equations run out of what they estimated: the ground balances the loads."""
+    scene = benchmark.large(kind, members)
+    step = solve(scene).last
+    assert step.certificate.stable is True
+    held = [name for name, node in scene.nodes.items() if node.support != "free"]
+    force = sum(np.array(load.vector) for load in scene.loads.values())
+    moment = sum(np.cross(step.position(load.node), load.vector) for load in scene.loads.values())
+    for name in held:
+        reaction, turning = step.reaction(name)
+        force, moment = force + reaction, moment + turning + np.cross(step.position(name), reaction)
+    # Residuals of 1e-12 of what is added up, by as many nodes; levers are the size of the scene.
+    loads = sum(np.linalg.norm(load.vector) for load in scene.loads.values())
+    assert np.abs(force).max() < 1e-9 * loads
+    assert np.abs(moment).max() < 1e-9 * loads * scene.size
 
 
 def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
