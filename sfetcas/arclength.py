@@ -37,6 +37,9 @@ ITERATIONS = 10
 TURN = 0.6
 """No node turns by more than this, rad, in the corrections of a step."""
 
+FIRMER = 1e3
+"""Times the weight of the proximal term for a second attempt between two points of the curve."""
+
 HELD = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
 
@@ -278,7 +281,10 @@ class Curve:
             bend = Tangent(bend.z - along * a.tangent.z, bend.factor - along * a.tangent.factor)
 
         def at(length: float) -> Standing | None:
-            return self.corrected(*self.predicted(a, length, bend), a.tangent, a.arc + length)
+            near = self.predicted(a, length, bend)
+            found = self.corrected(*near, a.tangent, a.arc + length)
+            # Where the proximal term happens to make the matrix singular, a firmer one does not.
+            return found or self.corrected(*near, a.tangent, a.arc + length, firm=FIRMER)
 
         return at
 

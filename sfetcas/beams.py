@@ -85,6 +85,7 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
     """Data of the elements of all members but the small ones, which have none."""
     stiffness, tangent, weight = [], [], []
     first: dict[str, int] = {}
+    count = 0
     for name, member in scene.members.items():
         if member.type == "small":
             continue
@@ -102,7 +103,8 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         stiffness.append(_in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
         tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
         weight.append(w)
-        first[name] = sum(len(part) for part in weight[:-1])
+        first[name] = count
+        count += len(w)
     n = element.order + 1
     stiffness.append(np.zeros((0, n, element.stiffnesses)))
     tangent.append(np.zeros((0, n, element.axes)))

@@ -3,7 +3,8 @@
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
 the 45-degree bend under 300 and 600; S3, S3b a roll-up of 1 and 5 turns; S4 a beam on hinge and slider; Lee's frame and
-the arch of 215 degrees for paths.  A net of wavy strips has as many members as wanted.
+the arch of 215 degrees for paths.  Nets, lattices, trees and chains have as many
+members as wanted.
 """
 
 from __future__ import annotations
@@ -38,7 +39,15 @@ T = TypeVar("T")
 TIP = np.array([0.445004402246249, 0.810609024880296])
 """Tip of the cantilever under F L^2/EI = 10, elliptic integrals."""
 
-NETS = (100, 300, 1000, 2000)
+NETS = {
+    "wavy strips": (100, 300, 1000, 2000),
+    "rigid rows": (250, 1000, 2000),
+    "small": (250, 1000, 2000),
+    "all types": (250, 1000, 2000),
+    "lattice": (250, 1000, 1860),
+    "tree": (250, 1000, 2000),
+    "chain": (250, 500, 1000),
+}
 """Members of the nets, at least."""
 
 
@@ -146,6 +155,75 @@ def _wavy(first: str, second: str, angle: float) -> Member:
     return Member(nodes=[first, second], section="strip", shape=Arc(angle=angle))
 
 
+def _of_types(scene: Scene, kind: Callable[[int, bool], str]) -> Scene:
+    """A net with its members of other types, each by its number and whether it is level."""
+    members = {
+        name: Member(nodes=member.nodes, section="strip", shape=member.shape, type=kind(i, name.startswith("right")))
+        for i, (name, member) in enumerate(scene.members.items())
+    }
+    return scene.replace(members=members)
+
+
+def with_rigid_rows(members: int) -> Scene:
+    """The net with rigid level members: each row turns as one."""
+    return _of_types(woven(members), lambda i, level: "rigid" if level else "flexible")
+
+
+def of_small_members(members: int) -> Scene:
+    """The net of small members."""
+    return _of_types(woven(members), lambda i, level: "small")
+
+
+def of_all_types(members: int) -> Scene:
+    """The net with flexible and small members, some of its level ones rigid."""
+    names = ("flexible", "small", "rigid")
+    return _of_types(woven(members), lambda i, level: names[i % (3 if level else 2)])
+
+
+def lattice(members: int) -> Scene:
+    """A square lattice of at least so many straight small members, its feet clamped, its top pushed and pulled."""
+    n = math.ceil(math.sqrt(members / 2 + 1 / 16) - 1 / 4)
+    nodes, bars, loads = {}, {}, {}
+    for j in range(n + 1):
+        for i in range(n + 1):
+            here = f"{i} {j}"
+            nodes[here] = Node(position=[0.1 * i, 0.1 * j], support="free" if j else "clamped")
+            if j > 0:
+                bars[f"up {here}"] = Member(nodes=[f"{i} {j - 1}", here], section="strip", type="small")
+            if i > 0 and j > 0:
+                bars[f"right {here}"] = Member(nodes=[f"{i - 1} {j}", here], section="strip", type="small")
+            if j == n:
+                loads[here] = Load(type="force", node=here, value=[0.3 / n, 0.2 / n])
+    return Scene(sections={"strip": CrossSection(EI3=0.01)}, nodes=nodes, members=bars, loads=loads)
+
+
+def tree(members: int) -> Scene:
+    """A tree of so many flexible members, two at each end of another, its leaves pulled."""
+    nodes = {"0": Node(position=[0, 0], support="clamped")}
+    branches, loads = {}, {}
+    for k in range(1, members + 1):
+        x, y, _ = nodes[str((k - 1) // 2)].position
+        nodes[str(k)] = Node(position=[x + 0.3 * math.sin(3.0 * k), y + 1.0 + 0.2 * math.cos(5.0 * k)])
+        branches[str(k)] = Member(nodes=[str((k - 1) // 2), str(k)], section="twig")
+        if 2 * k >= members:
+            loads[str(k)] = Load(type="force", node=str(k), value=[0.01, 0.02])
+    return Scene(sections={"twig": CrossSection(EI3=1.0)}, nodes=nodes, members=branches, loads=loads)
+
+
+def chain(members: int) -> Scene:
+    """Rigid links hinged to each other between two supports, loaded at each hinge; the middle one is flexible."""
+    members = max(members, 2)
+    nodes, links, loads = {"0": Node(position=[0, 0], support="hinge")}, {}, {}
+    for k in range(1, members + 1):
+        place = [float(k), -0.3 * members * math.sin(math.pi * k / members)]
+        nodes[str(k)] = Node(position=place, joint="hinge") if k < members else Node(position=place, support="hinge")
+        kind = "flexible" if k == (members + 1) // 2 else "rigid"
+        links[str(k)] = Member(nodes=[str(k - 1), str(k)], section="rod", type=kind)
+        if k < members:
+            loads[str(k)] = Load(type="force", node=str(k), value=[0.0, -0.5])
+    return Scene(sections={"rod": CrossSection(EI3=100.0)}, nodes=nodes, members=links, loads=loads)
+
+
 def _median(call: Callable[[], T], runs: int) -> tuple[float, T]:
     times, result = [], call()
     for _ in range(runs):
@@ -244,17 +322,32 @@ def repeated() -> None:
 
 
 def net() -> None:
-    """Nets of many members at the default accuracy, each in a process of its own."""
+    """Systems of many members at the default accuracy, each in a process of its own."""
     print("Nets: members, elements, unknowns; seconds of the scene, of the models, of the solve, of all; memory\n")
     context = multiprocessing.get_context("spawn")
-    for members in NETS:
-        with context.Pool(1) as pool:
-            print(pool.apply(_net, (members,)))
+    for kind, counts in NETS.items():
+        for members in counts:
+            with context.Pool(1) as pool:
+                print(f"{kind:>12} {pool.apply(_net, (kind, members))}")
 
 
-def _net(members: int) -> str:
+def large(kind: str, members: int) -> Scene:
+    """A system of a kind of NETS with at least so many members."""
+    made = {
+        "wavy strips": woven,
+        "rigid rows": with_rigid_rows,
+        "small": of_small_members,
+        "all types": of_all_types,
+        "lattice": lattice,
+        "tree": tree,
+        "chain": chain,
+    }
+    return made[kind](members)
+
+
+def _net(kind: str, members: int) -> str:
     begin = time.perf_counter()
-    scene = woven(members)
+    scene = large(kind, members)
     made = time.perf_counter() - begin
     solution = solve(scene)
     total, seconds, model = time.perf_counter() - begin, solution.seconds, solution.last.model

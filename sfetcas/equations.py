@@ -429,8 +429,8 @@ class Equations:
     @functools.cached_property
     def solver(self) -> SparseSolver:
         """Solver of the Newton matrix."""
-        # Chains with few closings are banded; the bordered matrices of frames need a better ordering.
-        return SparseSolver(self.total, self.row, self.column, "mumps" if self.rows > FEW_ROWS else "csparse")
+        symmetric = self.model.has_potential
+        return SparseSolver(self.total, self.row, self.column, self.rows, symmetric=symmetric)
 
     def moved(self, state: State, step: Array) -> State:
         """The state after a step of all unknowns and multipliers."""
@@ -519,10 +519,6 @@ class _Linked:
         if self.rows:
             self._batch.set(4, state.lam[rows])
         return self._batch()
-
-
-FEW_ROWS = 12
-"""Up to this many closings csparse is faster than MUMPS, beyond it can be ten times slower (measured)."""
 
 
 def _to_basis(basis: Array, number: int, moments: Array, stiffness: Array, spin: Array) -> None:

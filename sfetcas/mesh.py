@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import Array
+from .carried import carried
 from .scene import Scene
 from .sections import breaks as kinks
 
@@ -128,6 +129,11 @@ class Mesh:
             cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
         return replace(self, cuts=cuts)
 
+    def same(self, other: Mesh) -> bool:
+        """Whether another mesh of the same scene has the same elements and all else as well."""
+        alike = replace(self, cuts={}) == replace(other, cuts={})
+        return alike and all(np.array_equal(cuts, other.cuts[name]) for name, cuts in self.cuts.items())
+
     def cut_at(self, member: str, place: float) -> int:
         """Number of the cut of a member that is nearest to a fraction of its length."""
         return int(np.argmin(np.abs(self.cuts[member] - place)))
@@ -192,45 +198,22 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
     ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
     """
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
-    moments = sum(float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "moment")
-    most = _largest_force(scene)
+    reaching, follows = carried(scene), any(load.follows for load in scene.loads.values())
     cuts = {}
     for name in cut(scene):
         line, section = scene.center_lines[name], scene.sections.get(str(scene.members[name].section))
         if scene.members[name].type == "rigid" or section is None:
             cuts[name] = rigid_cuts(scene, name)
             continue
+        most = reaching[name].force
         softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
-        expected = line.turning + max(rotations, default=0.0) + moments * line.length / softest
+        expected = line.turning + max(rotations, default=0.0) + reaching[name].moment * line.length / softest
         # What turns with its load may bend to and fro all along; waves are as long as the layers are thick.
-        waves = line.length * np.sqrt(most / softest) if any(load.follows for load in scene.loads.values()) else 0.0
+        waves = line.length * np.sqrt(most / softest) if follows else 0.0
         count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))
         layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
         cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
     return Mesh(order, cuts, rigid=rigid(scene))
-
-
-def _largest_force(scene: Scene) -> float:
-    """Sum of all loads at the largest factor: no member of a tree carries more."""
-    factors = scene.analysis.steps
-    largest = max(abs(factor) for factor in factors)
-    total = 0.0
-    for load in scene.loads.values():
-        if load.type != "moment":
-            length = scene.center_lines[load.member].length if load.type == "distributed" and load.member else 1.0
-            history = None if load.history is None else scene.histories[load.history]
-            share = largest if history is None else max(abs(history.factor(factor)) for factor in factors)
-            total += float(np.linalg.norm(load.vector)) * length * share
-    if scene.gravity is not None:
-        x = np.linspace(0.0, 1.0, 5)
-        masses = [
-            float(scene.sections[m.section].mass(x).mean()) * scene.center_lines[n].length
-            for n, m in scene.members.items()
-            if m.section is not None
-        ]
-        masses += [node.mass for node in scene.nodes.values()]
-        total += float(np.linalg.norm(scene.gravity)) * sum(masses) * largest
-    return total
 
 
 def _graded(cuts: Array, breaks: Array, layer: float) -> Array:

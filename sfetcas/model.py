@@ -214,7 +214,8 @@ def assemble(
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
     scales, rotations = scales_of(scene), number_rotations(scene, mesh, element)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
-    both = {name: place_nodes(scene, segments, element.axes, name == "closing") for name in ("closing", "nodal")}
+    names = ("closing", "nodal") if assembly == "auto" else (assembly,)
+    both = {name: place_nodes(scene, segments, element.axes, name == "closing") for name in names}
     if assembly == "auto":
         closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
         assembly = "closing" if closing <= nodal else "nodal"

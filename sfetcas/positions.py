@@ -81,10 +81,15 @@ class _Place:
     terms: dict[Source, Array] = field(default_factory=dict)
 
     def plus(self, other: _Place, sign: float = 1.0) -> _Place:
+        # What is not added to is shared, not copied: far places of a chain have many terms.
         terms = dict(self.terms)
         for source, matrix in other.terms.items():
-            terms[source] = terms[source] + sign * matrix if source in terms else sign * matrix
-        return _Place({source: matrix for source, matrix in terms.items() if matrix.any()})
+            signed = matrix if sign == 1.0 else sign * matrix
+            total = terms[source] + signed if source in terms else signed
+            terms[source] = total
+            if not total.any():
+                del terms[source]
+        return _Place(terms)
 
     def times(self, matrix: Array) -> _Place:
         return _Place({source: matrix @ term for source, term in self.terms.items()})
@@ -185,15 +190,19 @@ class _Placing:
 
     def matrix(self, parts: list[_Place], height: int, kind: str, columns: int) -> SparseMap:
         """The terms of one kind of all parts below each other, each of some height."""
-        row, column, value = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
+        shared: dict[int, tuple[Array, list[int], list[int]]] = {}
         for i, part in enumerate(parts):
             for (source, number), matrix in part.terms.items():
                 if source == kind:
-                    first = number if kind == "Y" else number * self.axes
-                    r, c = np.nonzero(matrix)
-                    row.append(i * height + r)
-                    column.append(first + c)
-                    value.append(matrix[r, c])
+                    _, rows, columns_of = shared.setdefault(id(matrix), (matrix, [], []))
+                    rows.append(i * height)
+                    columns_of.append(number if kind == "Y" else number * self.axes)
+        row, column, value = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
+        for matrix, rows, columns_of in shared.values():
+            r, c = np.nonzero(matrix)
+            row.append((np.array(rows)[:, None] + r).ravel())
+            column.append((np.array(columns_of)[:, None] + c).ravel())
+            value.append(np.tile(matrix[r, c], len(rows)))
         shape = (len(parts) * height, columns)
         return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
 

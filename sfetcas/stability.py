@@ -254,16 +254,18 @@ class StabilityTest:
         entries, diagonal = point.entries.copy(), equations.diagonal
         entries[diagonal[self._chosen]] -= shift * self._weights
         size = float(np.abs(entries[diagonal[: equations.turning_unknowns]]).max(initial=1.0))
-        entries[diagonal[equations.turning_unknowns : equations.unknowns]] += SOFT * self._softest
-        entries[diagonal[equations.unknowns :]] -= SOFT / size
-        matrix = ca.DM(self._bordered_pattern, entries)
-        self._bordered.nfact(matrix)
-        # Without pivots the factors break down where displacements hang between two slides: then they solve nothing.
-        ones = ca.DM.ones(equations.total)
-        gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
-        if not np.abs(gap).max() < BROKEN:
-            return self._below_dense(point, shift)
-        return int(self._bordered.neig(matrix)) - equations.rows
+        # Without pivots the factors break down where displacements hang between two slides, or between many rigid
+        # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
+        for soft in (SOFT,) if self._n <= FULL else SOFTER:
+            softened = entries.copy()
+            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self._softest
+            softened[diagonal[equations.unknowns :]] -= soft / size
+            matrix, ones = ca.DM(self._bordered_pattern, softened), ca.DM.ones(equations.total)
+            self._bordered.nfact(matrix)
+            gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
+            if np.abs(gap).max() < BROKEN:
+                return int(self._bordered.neig(matrix)) - equations.rows
+        return self._below_dense(point, shift)
 
     def _below_dense(self, point: Point, shift: float) -> int:
         values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
@@ -361,6 +363,12 @@ LIGHT = 1e-3
 
 SOFT = 1e-9
 """Softness of closings in the bordered matrix, and stiffness of displacements, beside the rest."""
+
+SOFTER = (SOFT, 10.0 * SOFT, 100.0 * SOFT)
+"""The same one after the other, where full matrices would take long."""
+
+FULL = 600
+"""Up to this many unknowns full matrices take less than a second."""
 
 BROKEN = 1e-2
 """Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""

@@ -33,10 +33,12 @@ ORDER = [
     "obstacles",
     "supports",
     "dimension",
+    "task",
     "scene",
     "scenefile",
     "elements",
     "joints",
+    "carried",
     "mesh",
     "rotations",
     "segments",
@@ -74,6 +76,11 @@ ORDER = [
     "several",
     "contact_balance",
     "contact_statics",
+    "settings",
+    "single",
+    "meshing",
+    "piloting",
+    "refining",
     "statics",
     "stops",
     "path",
@@ -131,7 +138,18 @@ def test_mechanics_and_solvers_know_no_more_than_they_need(name):
     own, other = imported(TREES[name])
     if name in ("nlp", "interpolation", "quaternion", "kernels", "linear"):
         assert own <= {"errors", "arrays", "kernels"}, "mathematics knows no mechanics"
-    if name in ("sections", "shapes", "structure", "loads", "supports", "dimension", "scene", "records", "scenefile"):
+    if name in (
+        "sections",
+        "shapes",
+        "structure",
+        "loads",
+        "supports",
+        "dimension",
+        "task",
+        "scene",
+        "records",
+        "scenefile",
+    ):
         assert "casadi" not in other, "descriptions need no solver"
     assert ("matplotlib" in other) == (name in PICTURES)
     assert not {*PICTURES, *PROGRAMS} & own or name in ("cli", "__main__")

@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from sfetcas import benchmark
@@ -41,16 +42,56 @@ def test_net_has_as_many_members_as_asked_for_and_a_row_more_at_most(members):
     assert len(scene.nodes) == len(scene.members) / (2 * columns + 1) * (columns + 1) + columns + 1
 
 
-def test_net_is_measured_in_a_process_of_its_own(capsys, monkeypatch):
-    monkeypatch.setattr(benchmark, "NETS", (3, 10))
+@pytest.mark.parametrize("kind", benchmark.NETS)
+@pytest.mark.parametrize("members", [1, 7, 30])
+def test_large_systems_are_of_their_kind(kind, members):
+    scene = benchmark.large(kind, members)
+    assert members <= len(scene.members) <= 2 * members + 4
+    types = {member.type for member in scene.members.values()}
+    asked = {
+        "rigid rows": {"flexible", "rigid"},
+        "small": {"small"},
+        "lattice": {"small"},
+        "chain": {"flexible", "rigid"},
+    }
+    wanted = asked.get(kind, {"flexible", "small", "rigid"} if kind == "all types" else {"flexible"})
+    assert types == wanted if members == 30 else types <= wanted
+
+
+@pytest.mark.parametrize(
+    ("kind", "members"), [("rigid rows", 250), ("lattice", 500), ("all types", 200), ("chain", 200)]
+)
+def test_large_systems_are_solved(kind, members):
+    """Systems for which solvers of linear equations run out of what they estimated: the ground balances the loads."""
+    scene = benchmark.large(kind, members)
+    step = solve(scene).last
+    assert step.certificate.stable is True
+    held = [name for name, node in scene.nodes.items() if node.support != "free"]
+    force = sum(np.array(load.vector) for load in scene.loads.values())
+    moment = sum(np.cross(step.position(load.node), load.vector) for load in scene.loads.values())
+    for name in held:
+        reaction, turning = step.reaction(name)
+        force, moment = force + reaction, moment + turning + np.cross(step.position(name), reaction)
+    # Residuals of 1e-12 of what is added up, by as many nodes; levers are the size of the scene.
+    loads = sum(np.linalg.norm(load.vector) for load in scene.loads.values())
+    assert np.abs(force).max() < 1e-9 * loads
+    assert np.abs(moment).max() < 1e-9 * loads * scene.size
+
+
+def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark, "NETS", {"wavy strips": (3, 10), "lattice": (4,)})
     benchmark.main(["net"])
-    found = rows(capsys.readouterr().out)
-    assert [int(row[0]) for row in found] == [len(benchmark.woven(n).members) for n in (3, 10)]
-    for row in found:
+    lines = capsys.readouterr().out.strip().splitlines()[2:]
+    cases = [("wavy strips", 3), ("wavy strips", 10), ("lattice", 4)]
+    for line, (kind, members) in zip(lines, cases, strict=True):
+        scene = benchmark.large(kind, members)
+        assert line[:12].strip() == kind
+        row = line[12:].split()
+        assert int(row[0]) == len(scene.members)
         made, model, solving, total = (float(cell) for cell in row[3:7])
         # printed with two digits
         assert made + model + solving <= total + 0.02
-        assert int(row[2]) == solve(benchmark.woven(int(row[0]))).last.model.unknowns
+        assert int(row[2]) == solve(scene).last.model.unknowns
 
 
 def test_paths_are_measured(capsys, once):

@@ -8,12 +8,13 @@ from scenes import SOFT, ZOO, cantilever, made, model_of
 from systems import EVERY, SYSTEMS
 
 import sfetcas
-from sfetcas import newton
+from sfetcas import benchmark, newton
 from sfetcas import stability as stability_module
 from sfetcas.equations import Equations
+from sfetcas.model import assemble
 from sfetcas.prepared import Prepared
 from sfetcas.stability import StabilityTest
-from sfetcas.statics import solve_model
+from sfetcas.statics import pilot_of, solve_model
 
 EI = SOFT["EI3"]
 
@@ -321,6 +322,33 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
         assert prepared._test._below_bordered(point, -limit) == dense
         counts.add(dense)
     assert max(counts) > 0
+
+
+@pytest.mark.parametrize("soft", stability_module.SOFTER)
+@pytest.mark.parametrize("kind", ["rigid rows", "all types", "lattice"])
+def test_bordered_count_of_nets_is_the_dense_count(kind, soft, monkeypatch):
+    """With each softness, at the answer and far from it, where hundreds of eigenvalues are negative."""
+    prepared = Prepared(assemble(scene := benchmark.large(kind, 60), pilot_of(scene), assembly="nodal"))
+    equations, loading = prepared.equations, prepared.model.loading(1.0)
+    found = prepared.correct(equations.start(loading), loading, iterations=30)
+    assert found.converged
+    monkeypatch.setattr(stability_module, "SOFT", soft)
+    monkeypatch.setattr(stability_module, "SOFTER", (soft,))
+    monkeypatch.setattr(StabilityTest, "_below_dense", None)  # the bordered matrix alone is meant
+    counts = []
+    for factor in (1.0, 100.0, -100.0, -1000.0):
+        state = replace(found.state, lam=factor * found.state.lam)
+        point = equations.at(state, loading.scaled(factor))
+        values = np.linalg.eigvalsh(
+            prepared._test._projected(prepared._test._weighted(point), prepared._test._rows(point))[0]
+        )
+        # Between eigenvalues of the size of a member's, as far from them as can be.
+        gaps, middles = np.diff(values), 0.5 * (values[1:] + values[:-1])
+        near = np.argsort(np.where(np.abs(middles) < 100.0, np.abs(middles) / gaps, np.inf))[:3]
+        for shift in middles[near]:
+            counts.append(int((values < shift).sum()))
+            assert prepared._test._below_bordered(point, float(shift)) == counts[-1]
+    assert max(counts) > 10
 
 
 def redundant():

@@ -7,7 +7,7 @@ import pytest
 from scenes import SOFT, UNLIKE, ZOO, arch, bend_45, cantilever, elastica, guided, helix, made, model_of
 
 import sfetcas
-from sfetcas import SolveError, Status
+from sfetcas import SolveError, Status, benchmark, meshing
 from sfetcas.fields import Fields, transferred
 from sfetcas.prepared import Prepared
 from sfetcas.statics import Settings, pilot_of, solve, solve_model
@@ -440,3 +440,13 @@ def test_an_arc_turned_far_at_its_clamp_is_found_on_a_finer_pilot():
     # The same on a prescribed fine mesh; the tension is -1729 N, and both estimates are below 1e-4 of the size.
     fine = solve(scene, elements=32).last
     np.testing.assert_allclose(step.along("beam", [0.5])["position"], fine.along("beam", [0.5])["position"], atol=1e-4)
+
+
+def test_without_flexible_members_nothing_is_assembled_twice(monkeypatch):
+    """Their meshes cannot be refined: the answer is on the pilot, and its error is zero."""
+    assembled, assemble = [], meshing.assemble
+    monkeypatch.setattr(meshing, "assemble", lambda *args, **options: assembled.append(1) or assemble(*args, **options))
+    assert solve(benchmark.lattice(12)).last.certificate.error_estimate == 0.0
+    assert len(assembled) == 1
+    assert solve(benchmark.of_all_types(12)).last.certificate.error_estimate > 0.0
+    assert len(assembled) == 3

@@ -1,0 +1,90 @@
+"""Sparse systems against LAPACK: with few constraints, with many, and where softness or missing pivots would harm."""
+
+import numpy as np
+import pytest
+
+from sfetcas import linear
+from sfetcas.linear import SparseSolver
+
+
+def frame(seed, n=240, rows=80):
+    """A bordered matrix as nets have it: banded stiffness, unknowns without any, sparse constraints; full."""
+    rng = np.random.default_rng(seed)
+    matrix = np.zeros((n + rows, n + rows))
+    for i in range(n - 40):
+        k = slice(i, min(i + 4, n - 40))
+        part = rng.normal(size=(k.stop - i, k.stop - i))
+        matrix[k, k] += part @ part.T
+    for i in range(rows):
+        # the last unknowns are displacements: nothing but constraints holds them
+        touched = np.append(rng.choice(n - 40, 3, replace=False), n - 40 + i % 40)
+        matrix[n + i, touched] = rng.normal(size=4)
+        matrix[touched, n + i] = matrix[n + i, touched]
+    return matrix
+
+
+def solver_of(matrix, **options):
+    """The solver with the pattern of a matrix, its whole diagonal in it, and the entries."""
+    column, row = np.nonzero((matrix != 0.0).T | np.eye(len(matrix), dtype=bool))
+    return SparseSolver(len(matrix), row, column, **options), matrix[row, column]
+
+
+def residual(matrix, x, b):
+    """Relative to matrix times solution."""
+    return np.abs(matrix @ x - b).max() / (np.abs(matrix).max() * np.abs(x).max())
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("few", [False, True])
+def test_bordered_systems_are_solved_to_rounding(seed, few, monkeypatch):
+    monkeypatch.setattr(linear, "FEW_ROWS", 1000 if few else 12)
+    matrix = frame(seed)
+    solver, entries = solver_of(matrix, rows=80)
+    solver.factor(entries)
+    for shape in ((320,), (320, 3)):
+        b = np.random.default_rng(seed).normal(size=shape)
+        x = solver.solve(b)
+        assert x.shape == shape
+        # csparse takes pivots down to 1e-8 of their column and loses digits by that
+        assert residual(matrix, x, b) < (1e-10 if few else 1e-15)
+        assert np.abs(x - np.linalg.solve(matrix, b)).max() < 1e-7 * np.abs(x).max()
+
+
+def test_what_refinement_does_not_reach_is_solved_with_pivots(monkeypatch):
+    """Two nearly equal constraints: the softness is as large as what tells them apart."""
+    matrix = frame(0)
+    matrix[-1], matrix[:, -1] = matrix[-2], matrix[:, -2]
+    matrix[-1, :3] += 1e-6
+    matrix[:3, -1] += 1e-6
+    solver, entries = solver_of(matrix, rows=80)
+    solver.factor(entries)
+    b = np.random.default_rng(1).normal(size=320)
+    soft = entries.copy()
+    soft[solver._diagonal] += solver._sides
+    _, error = solver._refined(solver._without_pivots, soft, b[:, None])
+    assert error > linear.SOLVED
+    assert residual(matrix, solver.solve(b), b) < 1e-15
+
+
+def test_matrices_need_not_be_symmetric():
+    matrix = frame(2)
+    matrix[:50, 100:150] += np.diag(np.random.default_rng(3).normal(size=50))
+    solver, entries = solver_of(matrix, rows=80, symmetric=False)
+    solver.factor(entries)
+    b = np.random.default_rng(4).normal(size=320)
+    assert residual(matrix, solver.solve(b), b) < 1e-15
+
+
+@pytest.mark.parametrize("rows", [0, 80])
+@pytest.mark.parametrize("block", [0.0, 1.0])
+def test_singular_matrices_have_no_solution(rows, block):
+    matrix = np.eye(200)
+    matrix[:2, :2] = block
+    solver, entries = solver_of(matrix, rows=rows, symmetric=False)
+    solver.factor(np.ones(200))
+    solver.factor(entries)
+    try:
+        x = solver.solve(np.arange(200.0))
+    except np.linalg.LinAlgError:
+        return
+    assert not np.isfinite(x).all()
