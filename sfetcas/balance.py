@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from . import quaternion
 from .arrays import Array
 from .connections import GROUND, Group
 from .equations import Equations, State
@@ -246,12 +245,9 @@ class Balance:
         group, i = next((g, g.names.index(name)) for g in model.connections if name in g.names and _is_spring(g))
         data, axes = group.data[i], model.element.axes
         if isinstance(group.kind, TurnSpring):
-            a, b = (self._rotation(turn) for turn in group.turns[i])
-            if model.space:
-                angle = float(quaternion.angle_about(quaternion.multiply(quaternion.conjugate(a), b), data[:3]))
-            else:
-                angle = float(data[2] * (b - a)[0])
-            return SpringState(True, angle, -data[3] * (angle - data[4]) * scales.moment)
+            stiffness, rest = data[group.kind.first :][:2].tolist()
+            angle = self._angle(group, i)
+            return SpringState(True, angle, -stiffness * (angle - rest) * scales.moment)
         gap = [np.zeros(axes) if place == GROUND else self._places[place] for place in group.places[i]]
         moved = gap[1] - gap[0]
         if isinstance(group.kind, LineSpring):
@@ -260,10 +256,14 @@ class Balance:
         travel = float(np.linalg.norm(data[:axes] + moved) - data[axes + 1])
         return SpringState(False, travel * scales.length, -data[axes] * travel * scales.force)
 
-    def _rotation(self, turn: int) -> Array:
-        if turn != GROUND:
-            return self._state.q[turn]
-        return np.array([1.0, 0.0, 0.0, 0.0]) if self.model.space else np.zeros(1)
+    def _angle(self, group: Group, number: int) -> float:
+        """Angle of a rotational spring, all turns counted."""
+        model, state = self.model, self._state
+        part = model.winding.parts[next(i for i, other in enumerate(model.connections) if other is group)]
+        if part is not None:
+            return float(model.winding.angles(state.q, state.wound)[part][number])
+        a, b = (0.0 if turn == GROUND else float(state.q[turn, 0]) for turn in group.turns[number])
+        return float(group.data[number, 2]) * (b - a)
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:
         """Force and moment that the surroundings exert on each end of a small member."""

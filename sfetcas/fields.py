@@ -443,7 +443,7 @@ def transferred(source: Any, state: State, target: Any) -> State:
             q[number] = state.q[source.rotations.node_turn[name]]
     y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
     lam = _by_name(source.row_names, state.lam, target.row_names)
-    return State(q, y, lam)
+    return State(q, y, lam, state.wound)
 
 
 def _by_name(names: tuple[str, ...], values: Array, wanted: tuple[str, ...]) -> Array:

@@ -26,6 +26,7 @@ from .positions import Positions, entries, place_nodes
 from .rotations import Rotations, Turn, number_rotations
 from .scene import Scene
 from .segments import Segments, cut_members
+from .winding import Winding, winding_of
 
 __all__ = ["Block", "Model", "assemble"]
 
@@ -95,6 +96,11 @@ class Model:
     def reason(self) -> str:
         """Why the model is in the plane or in space."""
         return self.scene.dimension_reason
+
+    @functools.cached_property
+    def winding(self) -> Winding:
+        """The angles that count turns in space."""
+        return winding_of(self.connections, self.rotations, self.space)
 
     @functools.cached_property
     def row_names(self) -> tuple[str, ...]:

@@ -148,9 +148,11 @@ class Prepared:
         problem = self._problem
         scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
         result = self._ipopt(scale)(
-            p=problem.parameters(loading), guess=problem.unknowns(state), lam=problem.multipliers(state) / scale
+            p=problem.parameters(loading, state),
+            guess=problem.unknowns(state),
+            lam=problem.multipliers(state) / scale,
         )
-        trial = problem.state(result.x, result.lam, loading)
+        trial = problem.state(result.x, result.lam, loading, state)
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)

@@ -388,30 +388,6 @@ def _check_loads(scene: Scene) -> None:
             raise SceneError(message, ("loads", name, "node"))
 
 
-def _check_turns(scene: Scene, name: str, spring: Spring) -> None:
-    """In space an angle is known up to a turn either way."""
-    if scene.resolved_dimension == "plane" or spring.type != "rotational":
-        return
-    if abs(spring.rest) > TURN:
-        raise SceneError(
-            f"found {spring.rest:g}, accepted in space: up to 6 rad, less than a turn", ("springs", name, "rest")
-        )
-    steps = scene.analysis.range or scene.analysis.steps
-    for motion_name, motion in scene.motions.items():
-        if motion.node != spring.node or motion.rotation is None:
-            continue
-        history = None if motion.history is None else scene.histories[motion.history]
-        most = max(abs(step if history is None else history.factor(step)) for step in steps)
-        turned = most * float(np.linalg.norm(motion.rotation))
-        if turned > TURN:
-            message = f"turns springs.{name} by {turned:g} rad, accepted in space: up to 6 rad, less than a turn"
-            raise SceneError(message, ("motions", motion_name, "rotation"))
-
-
-TURN = 6.0
-"""Largest angle of a rotational spring in space, rad: at a whole turn it would begin anew."""
-
-
 def _check_springs(scene: Scene) -> None:
     for name, spring in scene.springs.items():
         _known(spring.node, scene.nodes, "nodes", "springs", name, "node")
@@ -421,7 +397,6 @@ def _check_springs(scene: Scene) -> None:
             if party not in ("ground", spring.node, *ends):
                 message = unknown(party, ("ground", spring.node, *ends), "parties")
                 raise SceneError(message, ("springs", name, "between"))
-        _check_turns(scene, name, spring)
         own = spring.between is None or spring.node in spring.between
         if spring.type == "rotational" and own and scene.nodes[spring.node].joint != "rigid":
             joint = scene.nodes[spring.node].joint

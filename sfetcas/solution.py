@@ -13,7 +13,7 @@ from . import quaternion
 from .arrays import Array
 from .balance import SpringState
 from .equations import Equations, Point, State
-from .errors import SceneError, Status
+from .errors import SceneError, SolveError, Status
 from .fields import Fields
 from .loading import Loading
 from .model import Model
@@ -242,8 +242,17 @@ def equilibrium(
     notes: tuple[str, ...] = (),
     iterations: int = 0,
 ) -> Equilibrium:
-    """Put an equilibrium together; dimensionless in, by name and in SI out."""
+    """Put an equilibrium together; dimensionless in, by name and in SI out.
+
+    Raises
+    ------
+    SolveError
+        The angle of a spring cannot be told.
+    """
     model = equations.model
+    doubt = model.winding.doubt(state.q, state.wound, loading)
+    if doubt is not None:
+        raise SolveError(Status.FAILED, doubt, state)
     turn = np.where(equations.number >= 0, stability.shape[equations.number], 0.0) if len(stability.shape) else None
     escape = {} if turn is None else {name: turn[model.chain(name)] for name in model.members}
     certificate = Certificate(

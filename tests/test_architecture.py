@@ -45,6 +45,7 @@ ORDER = [
     "bodies",
     "connections",
     "loading",
+    "winding",
     "model",
     "work",
     "equations",

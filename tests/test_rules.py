@@ -213,15 +213,6 @@ def test_release_at_a_joint_is_refused():
         made(table)
 
 
-def test_springs_in_space_turn_less_than_once():
-    table = cantilever() | {"dimension": "space", "springs": {"k": {"node": "A", "stiffness": 1.0}}}
-    table["nodes"]["A"]["support"] = "hinge"
-    with pytest.raises(SceneError, match=r"^springs\.k\.rest: found 7, accepted in space: up to 6 rad"):
-        made(table | {"springs": {"k": {"node": "A", "stiffness": 1.0, "rest": 7.0}}})
-    with pytest.raises(SceneError, match=r"^motions\.t\.rotation: turns springs\.k by 7 rad, accepted in space"):
-        made(table | {"motions": {"t": {"node": "A", "rotation": 7.0}}})
-
-
 def test_driven_slider_crank_of_rigid_links():
     """A closing without any displacement kept as an unknown."""
     table = {

@@ -26,7 +26,7 @@ def spring_wrench(step, name):
     if state.rotational:
         axis = np.asarray(spring.axis) / np.linalg.norm(spring.axis)
         sides = np.array([rotation_of(step, spring, party) for party in spring.between or ("ground", spring.node)])
-        data = np.array([*axis, spring.stiffness, spring.rest])
+        data = np.array([*axis, spring.stiffness, spring.rest, state.travel])
         # Where the joint turns about other axes as well, the moment is not quite along the spring's.
         moment = -joints.by_turning(joints.TurnSpring(True))(sides.T, [], data, [], [])[3].full()[3:, 0]
         assert moment @ quat.rotate(sides[0], axis) == pytest.approx(state.effort, abs=1e-9)
