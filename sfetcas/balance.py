@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from . import quaternion
 from .arrays import Array
 from .connections import GROUND, Group
 from .equations import Equations, State
-from .joints import Body, DrivenSlide, LineSpring, Slide, TurnSpring, TurnStop, Universal
+from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
 from .joints import Spring as Tension
 from .loading import Loading
 from .rotations import STIFF, end_joints
@@ -239,6 +240,29 @@ class Balance:
         names = self.model.row_names
         effort = -float(self._state.lam[names.index(row)]) * unit if row in names else 0.0
         return replace(state, stop=effort)
+
+    def drive(self, name: str) -> dict[str, float]:
+        """What drives a joint, in SI units: the derivatives of the energy by its angle and its travel."""
+        found: dict[str, float] = {}
+        first = len(self.model.positions.rows)
+        for group, loads in zip(self.model.connections, self._loading.loads, strict=True):
+            if isinstance(group.kind, (DrivenTurn, DrivenSlide)) and name in group.names:
+                i = group.names.index(name)
+                effort = -float(self._state.lam[first + i])
+                if isinstance(group.kind, DrivenTurn):
+                    found["moment"] = self._way(group, i, float(loads[i, 0])) * effort * self.model.scales.moment
+                else:
+                    found["force"] = effort * self.model.scales.force
+            first += len(group.rows)
+        return found
+
+    def _way(self, group: Group, number: int, angle: float) -> float:
+        """Sign of a driven turn's row, which in space is a sine: it changes with each whole turn."""
+        if not self.model.space:
+            return 1.0
+        a, b = (np.array([1.0, 0, 0, 0]) if turn == GROUND else self._state.q[turn] for turn in group.turns[number])
+        r = quaternion.multiply(quaternion.conjugate(a), b)
+        return float(np.sign(np.cos(0.5 * angle) * r[0] + np.sin(0.5 * angle) * (group.data[number] @ r[1:])))
 
     def _spring(self, name: str) -> SpringState:
         model, scales = self.model, self.model.scales

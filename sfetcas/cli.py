@@ -233,6 +233,9 @@ def _report_step(step: Equilibrium, place: str) -> None:
             *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts),
         ]
         print(f"  spring {name}: {', '.join(told)}")
+    for name in step.model.scene.motions:
+        told = [f"{key} {_effort(value)} {UNITS[key]}" for key, value in step.motion(name).items()]
+        print(f"  motion {name}: {', '.join(told)}")
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate
@@ -261,6 +264,14 @@ def _report_contact(name: str, entry: dict[str, Any]) -> None:
     ):
         where = f"from {at[0]:.9g} to {at[1]:.9g}" if isinstance(at, list) else f"at {at:.9g}"
         print(f"  contact {name}: {member} {where}, force {_vector(force)} N")
+
+
+UNITS = {"moment": "N m", "force": "N"}
+"""Of what makes a motion."""
+
+
+def _effort(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else _vector(value)
 
 
 def _vector(values: Any) -> str:

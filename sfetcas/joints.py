@@ -151,7 +151,7 @@ class DrivenTurn(Connection):
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The angle less what it shall be; in space by its half sine, which is smooth at any angle."""
         if not self.space:
-            return [q[1][0] - q[0][0] - load]
+            return [data[2] * (q[1][0] - q[0][0]) - load]
         r = self.relative(*q)
         about, half = ca.dot(data, ca.vertcat(*r[1:])), 0.5 * load
         return [2.0 * (ca.cos(half) * about - ca.sin(half) * r[0])]

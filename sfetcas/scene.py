@@ -462,6 +462,7 @@ def _check_expect(scene: Scene) -> None:
         "reactions": scene.nodes,
         "members": scene.members,
         "springs": scene.springs,
+        "motions": scene.motions,
         "contacts": scene.contacts,
     }
     for i, expect in enumerate(scene.expect):
