@@ -255,6 +255,10 @@ def test_what_makes_the_motions_does_the_work(dimension, against):
         np.abs(np.ravel(value)).max() > 1e-2 for name in table["motions"] for value in step.motion(name).values()
     )
     np.testing.assert_allclose(step.motion("foot")["force"], step.reaction("C")[0])
+    before, after = (step.along(name, at)["quaternion"][0] for name, at in (("m", 1.0), ("n", 0.0)))
+    turned = quat.multiply(quat.conjugate(before), after)[1:]
+    axis = np.asarray(table["nodes"]["B"]["axis"]) / np.linalg.norm(table["nodes"]["B"]["axis"])
+    np.testing.assert_allclose(turned, np.sin(-0.35) * axis, atol=1e-12)
     assert np.ndim(step.motion("turn")["moment"]) == np.ndim(step.motion("knee")["moment"]) == 0
 
 
