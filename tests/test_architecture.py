@@ -82,6 +82,9 @@ ORDER = [
     "analyses",
     "checks",
     "benchmark",
+    "sketch",
+    "glyphs",
+    "sheet",
     "plotting",
     "charts",
     "cli",
@@ -93,7 +96,7 @@ ORDER = [
 PROGRAMS = ("cli", "benchmark")
 """What is run and not imported: only these print."""
 
-PICTURES = ("plotting", "charts")
+PICTURES = ("sheet", "plotting", "charts")
 """What needs matplotlib, which a run pays for only when a picture is asked for."""
 
 MODULES = sorted(path.stem for path in FOLDER.glob("*.py"))
@@ -135,7 +138,7 @@ def test_mechanics_and_solvers_know_no_more_than_they_need(name):
     if name in ("sections", "shapes", "structure", "loads", "supports", "dimension", "scene", "records", "scenefile"):
         assert "casadi" not in other, "descriptions need no solver"
     assert ("matplotlib" in other) == (name in PICTURES)
-    assert not {*PICTURES, *PROGRAMS} & own or name in ("cli", "__main__")
+    assert not {*PICTURES, *PROGRAMS} & own or name in ("cli", "__main__", *PICTURES)
 
 
 @each
