@@ -33,6 +33,7 @@ from .sketch import (
     tangents_of,
 )
 from .solution import Equilibrium
+from .springs import Spring
 from .structure import Node, unit
 
 __all__ = ["sketch_all"]
@@ -40,6 +41,13 @@ __all__ = ["sketch_all"]
 ARROW = 0.12
 """Length of the longest arrow over the size of the picture; the other constants are meant like this."""
 SYMBOL = 0.03
+SPRING = "#5A5A5A"
+SPIRAL = 0.026
+"""Outer radius of the spiral of a rotational spring."""
+SHORT = 0.03
+"""Springs shorter than this are not seen."""
+SIDES = ((0, -1), (0, 1), (-1, 0), (1, 0))
+"""Where the ground is put, the first that is free: below, above, left, right."""
 TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
 """Radii of circular arrows."""
 
@@ -52,6 +60,8 @@ def sketch_all(sketch: Sketch) -> None:
         if node.joint != "rigid":
             sketch.dot(sketch.at(name), f"joint-{name}")
     _sketch_releases(sketch)
+    for name, spring in scene.springs.items():
+        (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
     for name, motion in scene.motions.items():
         _sketch_motion(sketch, name, motion)
     for name, load in scene.loads.items():
@@ -77,40 +87,46 @@ def _circle(radius: float, centre: tuple[float, float]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Symbol:
-    """Where a support's symbol is drawn: its own axes go along the ground and, from the node, towards it."""
+    """Where a symbol is drawn, by which name: its own axes go along the ground and, from the place, towards it."""
 
     sketch: Sketch
-    node: str
+    name: str
+    place: Array
     down: Array
 
     def put(self, shape: Any) -> Array:
         """Points (n, 2) of the symbol, in units of the size of symbols, in fixed axes (n, 3)."""
         flat = np.asarray(shape, float) @ np.stack([left_of(self.down), self.down])
-        return self.sketch.at(self.node) + self.sketch.view.raised(SYMBOL * self.sketch.size * flat)
+        return self.place + self.sketch.view.raised(SYMBOL * self.sketch.size * flat)
 
     def line(self, shape: Any) -> None:
         """Draw a polyline of the symbol."""
-        self.sketch.line(self.put(shape), f"support-{self.node}")
+        self.sketch.line(self.put(shape), self.name)
 
     def area(self, shape: Any) -> None:
         """Draw a polygon of the symbol."""
-        self.sketch.area(self.put(shape), f"support-{self.node}")
+        self.sketch.area(self.put(shape), self.name)
 
     def ground(self, depth: float, half: float = 1.25, side: float = 1.0) -> None:
         """Draw a hatched line."""
         self.line([[-half, depth], [half, depth]])
         strokes = np.linspace(-half, half, 7)[1:]
         hatch = [np.array([[x, depth], [x - 0.4, depth + 0.4 * side]]) for x in strokes]
-        self.sketch.line(self.put(broken(*hatch)), f"support-{self.node}", width=0.8)
+        self.sketch.line(self.put(broken(*hatch)), self.name, width=0.8)
 
     def triangle(self, half: float, height: float) -> None:
         """Draw a triangle with a pin in the node."""
         self.area([[0, 0], [-half, height], [half, height]])
-        self.sketch.dot(self.sketch.at(self.node), f"support-{self.node}")
+        self.sketch.dot(self.place, self.name)
+
+
+def _symbol(sketch: Sketch, node: str, down: Array) -> _Symbol:
+    """Where the symbol of a node's support is drawn."""
+    return _Symbol(sketch, f"support-{node}", sketch.at(node), down)
 
 
 def _sketch_support(sketch: Sketch, name: str, node: Node) -> None:
-    symbol = _Symbol(sketch, name, _below(sketch, name, [(0, -1), (0, 1), (-1, 0), (1, 0)]))
+    symbol = _symbol(sketch, name, _below(sketch, name, SIDES))
     if node.support == "clamped":
         _sketch_clamp(sketch, name)
     elif node.support == "hinge":
@@ -136,7 +152,7 @@ def _sketch_clamp(sketch: Sketch, name: str) -> None:
     """A hatched wall across the members; in space a plate."""
     into = -sketch.leaving(name).sum(axis=0)
     if sketch.view.angles is None:
-        _Symbol(sketch, name, flat_unit(sketch.view.flat(into), (0.0, -1.0))).ground(0.0, half=1.4)
+        _symbol(sketch, name, flat_unit(sketch.view.flat(into), (0.0, -1.0))).ground(0.0, half=1.4)
         return
     normal = into / norm(into) if norm(into) > 0.05 else np.array([0.0, 0.0, 1.0])
     one, two = _pair_across(normal, np.array([0.0, 0.0, 1.0]))
@@ -163,7 +179,7 @@ def _sketch_rod(sketch: Sketch, name: str, direction: Iterable[float], half: flo
 def _sketch_slider(sketch: Sketch, name: str, node: Node, direction: tuple[float, float, float]) -> None:
     along = flat_unit(sketch.view.flat(direction), (1.0, 0.0))
     normal = left_of(along) * (1.0 if along[0] < 0.0 or (along[0] == 0.0 and along[1] < 0.0) else -1.0)
-    symbol = _Symbol(sketch, name, _below(sketch, name, [normal, -normal]))
+    symbol = _symbol(sketch, name, _below(sketch, name, [normal, -normal]))
     if sketch.view.angles is not None:
         _sketch_rod(sketch, name, direction, 3.0)
         symbol.area(
@@ -186,6 +202,69 @@ def _sketch_releases(sketch: Sketch) -> None:
             if sketch.scene.members[name].release[end] != "rigid":
                 beside = np.linalg.norm(points - points[0], axis=1) > 0.02 * sketch.size
                 sketch.dot(points[int(np.argmax(beside))], f"joint-{name}")
+
+
+# Springs
+
+
+def _sketch_spiral(sketch: Sketch, name: str, spring: Spring) -> None:
+    """A spiral about the axis of a rotational spring, as its first party carries it."""
+    axis = quaternion.rotate(_turned(sketch, spring), np.array(unit(spring.axis)))
+    one, two = _pair_across(axis, sketch.leaving(spring.node)[0])
+    angle = np.linspace(0.5 * math.pi, 5.0 * math.pi, 121)[:, None]
+    radius = SPIRAL * sketch.size * angle / angle[-1]
+    points = sketch.at(spring.node) + radius * (np.cos(angle) * one + np.sin(angle) * two)
+    sketch.line(points, f"spring-{name}", colour=SPRING, width=0.9, level=4.5)
+
+
+def _turned(sketch: Sketch, spring: Spring) -> Array:
+    """Rotation of the first party of a rotational spring, (4,)."""
+    party = (spring.between or ("ground",))[0]
+    if party in sketch.scene.members:
+        end = sketch.scene.members[party].nodes.index(spring.node)
+        x = end / (len(sketch.scene.members[party].nodes) - 1)
+        return np.asarray(sketch.step.along(party, np.array([x]))["quaternion"][0])
+    turned = None if party == "ground" else sketch.step.quaternion(party)
+    return np.array([1.0, 0.0, 0.0, 0.0]) if turned is None else turned
+
+
+def _sketch_zigzag(sketch: Sketch, name: str, spring: Spring) -> None:
+    """A zigzag between the ends of a translational spring, the ground hatched.
+
+    A spring to the ground without a visible length, and one that acts along a direction only, is drawn as a short
+    one that the ground holds there.
+    """
+    end = sketch.at(spring.node)
+    start = sketch.at(spring.to) if spring.to is not None else _anchor(sketch, spring, end)
+    apart = start - end
+    if norm(apart) < SHORT * sketch.size:
+        return
+    along = apart / norm(apart)
+    across = sketch.view.raised(left_of(flat_unit(sketch.view.flat(along), (1.0, 0.0))))
+    teeth = int(np.clip(round(1.2 * norm(apart) / (SYMBOL * sketch.size)), 5, 60))
+    share = np.array([0.0, 0.15, *(0.15 + 0.7 * (np.arange(teeth) + 0.5) / teeth), 0.85, 1.0])
+    side = np.array([0.0, 0.0, *(1.0 - 2.0 * (np.arange(teeth) % 2)), 0.0, 0.0])
+    points = end + share[:, None] * apart + 0.5 * SYMBOL * sketch.size * side[:, None] * across
+    sketch.line(points, f"spring-{name}", colour=SPRING, width=0.9, level=4.5)
+    if spring.to is None:
+        down = flat_unit(sketch.view.flat(along), (0.0, -1.0))
+        _Symbol(sketch, f"spring-{name}", start, down).ground(0.0, half=0.8)
+
+
+def _anchor(sketch: Sketch, spring: Spring, end: Array) -> Array:
+    """Where a spring is seen to be held by the ground, (3,)."""
+    length = 3.5 * SYMBOL * sketch.size
+    if spring.direction is not None:
+        along = np.array(unit(spring.direction))
+        sides = [-along, along]
+        flat = [flat_unit(sketch.view.flat(side), (0.0, -1.0)) for side in sides]
+        chosen = _below(sketch, spring.node, flat)
+        side = next(side for side, seen in zip(sides, flat, strict=True) if np.array_equal(seen, chosen))
+        return np.asarray(end + length * side)
+    place = np.array(spring.anchor or sketch.scene.nodes[spring.node].position) / sketch.course.unit
+    if norm(place - end) >= SHORT * sketch.size:
+        return place
+    return np.asarray(end + length * sketch.view.raised(_below(sketch, spring.node, SIDES)))
 
 
 # Motions, loads and reactions
