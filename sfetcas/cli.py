@@ -8,6 +8,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,8 +29,10 @@ from .statics import Settings, pilot_of
 
 __all__ = ["main"]
 
-SOLVED, SHORT, BAD_INPUT, NO_SOLUTION = 0, 1, 2, 3
+SOLVED, SHORT, BAD_INPUT, NO_SOLUTION, INTERNAL = 0, 1, 2, 3, 70
 """Exit codes."""
+
+REPORT = "a mistake of sfetcas, not of the scene; please report it with the lines above and the scene file"
 
 MOST_NODES = 20
 """Nodes in the printed report at most."""
@@ -47,8 +50,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SolveError as error:
         print(f"sfetcas: no solution: {error}", file=sys.stderr)
         return NO_SOLUTION
-    except (ArithmeticError, ValueError, np.linalg.LinAlgError, RuntimeError) as error:
+    except (FloatingPointError, OverflowError, np.linalg.LinAlgError) as error:
         print(f"sfetcas: no solution: the numbers of this scene leave what can be computed ({error})", file=sys.stderr)
+        return NO_SOLUTION
+    except MemoryError:
+        print("sfetcas: no solution: the scene needs more memory than there is", file=sys.stderr)
         return NO_SOLUTION
     except KeyboardInterrupt:
         print("sfetcas: interrupted; nothing was written", file=sys.stderr)
@@ -56,6 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return SOLVED
+    except Exception:
+        traceback.print_exc()
+        print(f"sfetcas: internal error: {REPORT}", file=sys.stderr)
+        return INTERNAL
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -314,7 +314,7 @@ class _Run:
         """The error with the motions that nothing holds, where there are any."""
         try:
             free = pilot.diagnosis
-        except (RuntimeError, np.linalg.LinAlgError):
+        except np.linalg.LinAlgError:
             return error
         if not free.mobility:
             return error

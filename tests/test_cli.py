@@ -238,3 +238,30 @@ def test_an_expectation_of_the_wrong_shape_is_exit_2(scene, capsys, value):
 def test_numbers_that_overflow_are_no_solution(scene, capsys):
     assert main(["run", str(scene(("value = [0, 1]", "value = [0, 1e160]")))]) == 3
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("error", [RuntimeError("lost"), ValueError("shapes"), KeyError("name"), ZeroDivisionError()])
+def test_a_mistake_of_the_program_is_told_as_one(scene, tmp_path, capsys, monkeypatch, error):
+    """Neither an answer nor "no solution": a traceback, a sentence that asks to report it, a code of its own."""
+
+    def broken(*_):
+        raise error
+
+    monkeypatch.setattr("sfetcas.cli.solve", broken)
+    out = tmp_path / "answer.json"
+    assert main(["run", str(scene()), "--json", str(out)]) == 70
+    caught = capsys.readouterr()
+    assert "Traceback" in caught.err
+    assert type(error).__name__ in caught.err
+    assert caught.err.splitlines()[-1].startswith("sfetcas: internal error: a mistake of sfetcas")
+    assert "report" in caught.err
+    assert not out.exists()
+
+
+def test_a_mistake_while_a_scene_is_made_is_no_syntax_error(scene, capsys, monkeypatch):
+    def broken(*_):
+        raise ValueError("shapes do not fit")
+
+    monkeypatch.setattr("sfetcas.scenefile.Scene.from_dict", broken)
+    assert main(["run", str(scene())]) == 70
+    assert "not read as" not in capsys.readouterr().err
