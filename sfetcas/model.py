@@ -23,6 +23,7 @@ from .errors import SceneError
 from .loading import Followers, Loading, find_followers, unit_loadings
 from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
+from .records import counted
 from .rotations import Rotations, Turn, number_rotations
 from .scene import Scene
 from .segments import Segments, cut_members
@@ -252,12 +253,12 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     free, about = int((kind == Turn.FREE).sum()), int((kind == Turn.AXIS).sum())
     blocks = []
     if model.space:
-        blocks.append(Block("quaternions", 4 * free, f"4 for each of {free} free rotations: {model.reason}"))
+        blocks.append(Block("quaternions", 4 * free, f"4 for each of {counted(free, 'free rotation')}: {model.reason}"))
         if about:
             blocks.append(Block("hinge rotations", 2 * about, "2 for each rotation held but for its hinge axis"))
         blocks.append(Block("norms", free + about, "a quaternion of a free rotation is unit; held ones need no row"))
     else:
-        blocks.append(Block("angles", free, f"1 for each of {free} free rotations: {model.reason}"))
+        blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
     if model.positions.unknowns:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.kept:

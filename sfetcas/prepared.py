@@ -21,6 +21,7 @@ from .model import Model
 from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem
+from .records import counted
 from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
@@ -158,7 +159,7 @@ class Prepared:
         polished = self.correct(trial, loading)
         if not polished.converged and polished.residual > SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
-            detail = f"IPOPT: {result.message}, {result.iterations} iterations"
+            detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if status is Status.FAILED:
                 detail += f"; Newton's method left a residual of {polished.residual:.1e}"
             raise SolveError(status, detail, trial)

@@ -26,7 +26,19 @@ from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 
-__all__ = ["Analysis", "Contact", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
+__all__ = [
+    "Analysis",
+    "Contact",
+    "Expect",
+    "History",
+    "Load",
+    "Member",
+    "Motion",
+    "Node",
+    "Scene",
+    "Spring",
+    "check_loaded",
+]
 
 
 def _accuracy(value: float) -> float:
@@ -272,6 +284,19 @@ def _check_members(scene: Scene) -> None:
             raise SceneError("node without member, accepted: a node where at least one member ends", ("nodes", name))
 
 
+def check_loaded(scene: Scene) -> None:
+    """Refuse a scene of which nothing moves or strains anything; it can be looked at, but there is nothing to solve.
+
+    Raises
+    ------
+    SceneError
+        There is no load, no motion, no gravity and no spring that is not at rest.
+    """
+    pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
+    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
+        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
+
+
 def _check_driven(scene: Scene) -> None:
     for name, load in scene.loads.items():
         _known(load.node, scene.nodes, "nodes", "loads", name, "node")
@@ -280,14 +305,22 @@ def _check_driven(scene: Scene) -> None:
     for name, motion in scene.motions.items():
         _known(motion.node, scene.nodes, "nodes", "motions", name, "node")
         _known(motion.history, scene.histories, "histories", "motions", name, "history")
-    pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
-    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
-        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
 
 
 def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
     if word is not None and word not in table:
         raise SceneError(unknown(word, table, kind), where)
+
+
+def _check_lengths(scene: Scene) -> None:
+    for name, line in scene.center_lines.items():
+        if not SHORTEST <= line.length <= LONGEST:
+            accepted = f"{SHORTEST:g} to {LONGEST:g} m, whose squares are still numbers"
+            raise SceneError(f"found a length of {line.length:.6g} m, accepted: {accepted}", ("members", name))
+
+
+SHORTEST, LONGEST = 1e-100, 1e100
+"""Of members, m."""
 
 
 def _check_releases(scene: Scene) -> None:
@@ -483,6 +516,7 @@ def _check_expect(scene: Scene) -> None:
 
 _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_members,
+    _check_lengths,
     _check_driven,
     _check_axes,
     _check_dimension,

@@ -32,6 +32,7 @@ from .mesh import Mesh, first_mesh, uniform_mesh
 from .model import Model, assemble
 from .newton import Corrected, loose_rows, relative_residual, rows_in
 from .prepared import SOLVED, Prepared
+from .records import counted
 from .scene import Scene
 from .settling import Held
 from .several import Search, long_elements, missing, same, search
@@ -379,7 +380,8 @@ class _Run:
         if alone.stability.negative == 0 or not self.leave:
             return alone
         corrected, stability = pilot.leave(alone.corrected.state, alone.stability, loading)
-        note = f"left an unstable equilibrium with {alone.stability.negative} ways out along its escape shape"
+        ways = counted(alone.stability.negative, "way out", "ways out")
+        note = f"left an unstable equilibrium with {ways} along its escape shape"
         return _Found(pilot, corrected, stability, (note,), alone.iterations)
 
     def _grown(self, pilot: Prepared, factor: float, last: tuple[float, _Found] | None) -> _Found | None:
@@ -463,7 +465,8 @@ class _Run:
                 answers.append(further)
         note = result.sentence() + missing(answers)
         if dropped:
-            note += f"; {dropped} of the mesh of the search are none on finer ones"
+            coarse = counted(dropped, "equilibrium", "equilibria")
+            note += f"; {coarse} of the mesh of the search not found on finer ones"
         answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
         return [replace(other, notes=(*other.notes, note)) for other in answers]
 

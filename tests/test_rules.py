@@ -228,3 +228,11 @@ def test_driven_slider_crank_of_rigid_links():
     angle, rod = np.arctan2(0.6, 0.8) + 1.2, np.hypot(2.2, 0.6)
     x = np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
     np.testing.assert_allclose(step.position("Q"), [x, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-170, 1e150])
+def test_lengths_whose_squares_are_no_numbers_are_refused(size):
+    table = cantilever()
+    table["nodes"]["B"]["position"] = [size, 0.0]
+    with pytest.raises(SceneError, match=r"^members\.m: found a length of .* m, accepted: 1e-100 to 1e\+100 m"):
+        made(table)
