@@ -189,6 +189,13 @@ class Model:
             total = total.plus(part)
         return total
 
+    def motion(self, name: str) -> Loading:
+        """What one motion prescribes, without its factor."""
+        motions = {name: self.scene.motions[name]}
+        scene = self.scene.model_copy(update={"motions": motions, "loads": {}, "gravity": None})
+        parts = self.mesh, self.element, self.scales, self.segments, self.rotations, self.beams
+        return unit_loadings(scene, *parts, self.connections, self.followers)[motions[name].history]
+
     def held(self, loading: Loading) -> Array:
         """Rotations with the held ones at their prescribed values and all others at rest, (rotations, comps)."""
         if not self.space:

@@ -22,7 +22,7 @@ from .contact_balance import refuse_lost_forces, refuse_unbalanced
 from .contact_statics import ContactRun, Pressed
 from .continuation import follow
 from .deflation import deflated
-from .doctor import in_words, moves_nodes
+from .doctor import contradiction, in_words, moves_nodes
 from .elements import ELEMENTS
 from .equations import State
 from .errors import SceneError, SolveError, Status
@@ -156,6 +156,8 @@ def _cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
         rows = np.abs(equations.at(state, loading).residual[equations.unknowns :])
         worst = ", ".join(equations.row_names[i] for i in np.flatnonzero(rows > 0.3 * rows.max())[:4])
         detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at {worst}"
+        told = contradiction(equations, state, loading)
+        detail += f"; {told}" if told else ""
         raise SolveError(Status.INFEASIBLE, detail, state)
     return prepared.minimise(loading, state)
 
