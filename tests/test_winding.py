@@ -51,6 +51,16 @@ def test_prescribed_turns_wind_a_spring(dimension):
         np.testing.assert_allclose(step.reaction("A")[1], moment * np.asarray(axis), atol=1e-12)
 
 
+@pytest.mark.parametrize("driven", [False, True])
+def test_paths_count_turns(driven):
+    """Along the factor of a moment or of a motion, at crossings beyond one and three turns."""
+    table = crank("space", moment=0.0 if driven else 0.5)
+    table["motions"] = {"turn": {"node": "A", "rotation": 1.0}} if driven else {}
+    table["analysis"] = {"type": "path", "range": [0, 21], "steps": [8, 20]}
+    crossings = solve(made(table)).steps
+    assert [step.spring("k").travel for step in crossings] == pytest.approx([8.0, 20.0], rel=1e-9)
+
+
 def arms(dimension, *, drive=None, moment=0.0):
     """A flexible arm on a hinged crank, joined by a hinge with a spring; the arm's tip carries a moment."""
     table = crank(dimension, stiffness=0.3)
