@@ -7,7 +7,7 @@ from typing import Any
 
 from . import paths, statics, stops
 from .path import Path
-from .scene import Scene
+from .scene import Scene, check_loaded
 from .solution import Solution
 from .statics import Settings
 
@@ -41,6 +41,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
+    check_loaded(scene)
     if scene.analysis.type == "path":
         return paths.follow_path(scene, settings)
     stopped = any(spring.stop is not None for spring in scene.springs.values())

@@ -16,7 +16,7 @@ from . import quaternion
 from .arrays import Array
 from .connections import GROUND, Group
 from .equations import Equations, State
-from .joints import Body, DrivenSlide, LineSpring, Slide, TurnSpring, TurnStop, Universal
+from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
 from .joints import Spring as Tension
 from .loading import Loading
 from .rotations import STIFF, end_joints
@@ -241,17 +241,37 @@ class Balance:
         effort = -float(self._state.lam[names.index(row)]) * unit if row in names else 0.0
         return replace(state, stop=effort)
 
+    def drive(self, name: str) -> dict[str, float]:
+        """What drives a joint, in SI units: the derivatives of the energy by its angle and its travel."""
+        found: dict[str, float] = {}
+        first = len(self.model.positions.rows)
+        for group, loads in zip(self.model.connections, self._loading.loads, strict=True):
+            if isinstance(group.kind, (DrivenTurn, DrivenSlide)) and name in group.names:
+                i = group.names.index(name)
+                effort = -float(self._state.lam[first + i])
+                if isinstance(group.kind, DrivenTurn):
+                    found["moment"] = self._way(group, i, float(loads[i, 0])) * effort * self.model.scales.moment
+                else:
+                    found["force"] = effort * self.model.scales.force
+            first += len(group.rows)
+        return found
+
+    def _way(self, group: Group, number: int, angle: float) -> float:
+        """Sign of a driven turn's row, which in space is a sine: it changes with each whole turn."""
+        if not self.model.space:
+            return 1.0
+        a, b = (np.array([1.0, 0, 0, 0]) if turn == GROUND else self._state.q[turn] for turn in group.turns[number])
+        r = quaternion.multiply(quaternion.conjugate(a), b)
+        return float(np.sign(np.cos(0.5 * angle) * r[0] + np.sin(0.5 * angle) * (group.data[number] @ r[1:])))
+
     def _spring(self, name: str) -> SpringState:
         model, scales = self.model, self.model.scales
         group, i = next((g, g.names.index(name)) for g in model.connections if name in g.names and _is_spring(g))
         data, axes = group.data[i], model.element.axes
         if isinstance(group.kind, TurnSpring):
-            a, b = (self._rotation(turn) for turn in group.turns[i])
-            if model.space:
-                angle = float(quaternion.angle_about(quaternion.multiply(quaternion.conjugate(a), b), data[:3]))
-            else:
-                angle = float(data[2] * (b - a)[0])
-            return SpringState(True, angle, -data[3] * (angle - data[4]) * scales.moment)
+            stiffness, rest = data[group.kind.first :][:2].tolist()
+            angle = self._angle(group, i)
+            return SpringState(True, angle, -stiffness * (angle - rest) * scales.moment)
         gap = [np.zeros(axes) if place == GROUND else self._places[place] for place in group.places[i]]
         moved = gap[1] - gap[0]
         if isinstance(group.kind, LineSpring):
@@ -260,10 +280,14 @@ class Balance:
         travel = float(np.linalg.norm(data[:axes] + moved) - data[axes + 1])
         return SpringState(False, travel * scales.length, -data[axes] * travel * scales.force)
 
-    def _rotation(self, turn: int) -> Array:
-        if turn != GROUND:
-            return self._state.q[turn]
-        return np.array([1.0, 0.0, 0.0, 0.0]) if self.model.space else np.zeros(1)
+    def _angle(self, group: Group, number: int) -> float:
+        """Angle of a rotational spring, all turns counted."""
+        model, state = self.model, self._state
+        part = model.winding.parts[next(i for i, other in enumerate(model.connections) if other is group)]
+        if part is not None:
+            return float(model.winding.angles(state.q, state.wound)[part][number])
+        a, b = (0.0 if turn == GROUND else float(state.q[turn, 0]) for turn in group.turns[number])
+        return float(group.data[number, 2]) * (b - a)
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:
         """Force and moment that the surroundings exert on each end of a small member."""

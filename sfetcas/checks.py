@@ -123,6 +123,8 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
         return _entry({"force": force, "moment": moment}, parts[2])
     if parts[0] == "springs" and len(parts) == 3:
         return _entry(step.spring(parts[1]).to_dict(), parts[2])
+    if parts[0] == "motions" and len(parts) == 3:
+        return _entry(step.motion(parts[1]), parts[2])
     if parts[0] == "contacts" and len(parts) == 3:
         return _entry(step.contacts[parts[1]], parts[2])
     if parts[0] == "energy" and len(parts) == 2:
@@ -132,8 +134,8 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
     if quantity == "factor":
         return step.factor
     known = (
-        "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, springs.NAME.KEY, contacts.NAME.KEY, energy.KEY, "
-        "certificate.KEY, factor"
+        "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, springs.NAME.KEY, motions.NAME.KEY, "
+        "contacts.NAME.KEY, energy.KEY, certificate.KEY, factor"
     )
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 

@@ -8,6 +8,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,14 +23,21 @@ from .model import assemble
 from .path import Branch
 from .path import Path as Course
 from .prepared import Prepared
+from .records import counted
+from .scene import Scene
 from .scenefile import load
 from .solution import Equilibrium, Solution
 from .statics import Settings, pilot_of
 
 __all__ = ["main"]
 
-SOLVED, SHORT, BAD_INPUT, NO_SOLUTION = 0, 1, 2, 3
+SOLVED, SHORT, BAD_INPUT, NO_SOLUTION, INTERNAL = 0, 1, 2, 3, 70
 """Exit codes."""
+
+REPORT = "a mistake of sfetcas, not of the scene; please report it with the lines above and the scene file"
+
+WAYS = ("way out", "ways out")
+"""Negative eigenvalues in words."""
 
 MOST_NODES = 20
 """Nodes in the printed report at most."""
@@ -47,8 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SolveError as error:
         print(f"sfetcas: no solution: {error}", file=sys.stderr)
         return NO_SOLUTION
-    except (ArithmeticError, ValueError, np.linalg.LinAlgError, RuntimeError) as error:
+    except (FloatingPointError, OverflowError, np.linalg.LinAlgError) as error:
         print(f"sfetcas: no solution: the numbers of this scene leave what can be computed ({error})", file=sys.stderr)
+        return NO_SOLUTION
+    except MemoryError:
+        print("sfetcas: no solution: the scene needs more memory than there is", file=sys.stderr)
         return NO_SOLUTION
     except KeyboardInterrupt:
         print("sfetcas: interrupted; nothing was written", file=sys.stderr)
@@ -56,6 +67,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return SOLVED
+    except Exception:
+        traceback.print_exc()
+        print(f"sfetcas: internal error: {REPORT}", file=sys.stderr)
+        return INTERNAL
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -107,15 +122,23 @@ def _run(options: argparse.Namespace) -> int:
             if path.exists() and path.samefile(options.file):
                 raise SceneError(f"{path}: is the scene itself, accepted: another file")
     drawing = _drawing(options.plot, scene.analysis.type == "path")
-    solution = solve(scene, settings)
+    solution, checks = _answered(options.file, scene, settings)
     if options.json is not None:
         _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
     if drawing is not None:
         _write(options.plot, lambda path: drawing(solution, path))
     _report(solution, time.perf_counter() - begin)
-    checks = check(scene, solution)
     _print_checks(checks)
     return SOLVED if solution.status is Status.SOLVED and all(c.passed for c in checks) else SHORT
+
+
+def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Solution | Course, list[Check]]:
+    """The answer of a scene and its comparisons; what is wrong with the scene is told with the file."""
+    try:
+        solution = solve(scene, settings)
+        return solution, check(scene, solution)
+    except SceneError as error:
+        raise SceneError(str(error), (str(file),)) from None
 
 
 def _drawing(path: Path | None, chart: bool) -> Callable[[Any, Path], None] | None:
@@ -165,7 +188,8 @@ def _report(solution: Solution | Course, seconds: float) -> None:
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(
-        f"  {model.mesh.elements} elements {model.element.name}, {model.unknowns} unknowns, {model.assembly} assembly"
+        f"  {counted(model.mesh.elements, 'element')} {model.element.name}, {counted(model.unknowns, 'unknown')}, "
+        f"{model.assembly} assembly"
     )
     if isinstance(solution, Course):
         _report_path(solution)
@@ -179,7 +203,7 @@ def _report_path(path: Course) -> None:
     for branch in path.branches:
         name = f"branch at bifurcation {branch.bifurcation}, side {branch.side:+d}" if branch.bifurcation else "path"
         low, high = branch.factors.min(), branch.factors.max()
-        print(f"{name}: {len(branch.points)} points, factors {low:.6g} to {high:.6g}; {branch.end}")
+        print(f"{name}: {counted(len(branch.points), 'point')}, factors {low:.6g} to {high:.6g}; {branch.end}")
         for stable, first, last in branch.stretches():
             ends = " to ".join(f"{branch.points[i].factor:.9g}" for i in (first, last))
             kind = {"True": "stable", "False": "unstable", "not defined": "stability not defined"}.get(
@@ -198,7 +222,7 @@ def _report_events(branch: Branch) -> None:
         for i, entry in enumerate(entries, start=1):
             error = entry.certificate.error_estimate
             said = "" if error is None else f", estimated error {error:.1e}"
-            ways = f", {entry.certificate.negative} ways out" if entry.certificate.negative else ""
+            ways = f", {counted(entry.certificate.negative, *WAYS)}" if entry.certificate.negative else ""
             print(f"  {kind} {i}: factor {entry.factor:.12g}{ways}{said}")
             for note in entry.notes:
                 print(f"    note: {note}")
@@ -219,7 +243,7 @@ def _report_step(step: Equilibrium, place: str) -> None:
         turned = f"  angle {angle:.9g} rad" if angle is not None else ""
         print(f"  node {name}: position {_vector(step.position(name))} m{turned}")
     if len(step.model.nodes) > MOST_NODES:
-        print(f"  ... and {len(step.model.nodes) - MOST_NODES} more nodes, see --json")
+        print(f"  ... and {counted(len(step.model.nodes) - MOST_NODES, 'more node')}, see --json")
     for name, node in step.model.scene.nodes.items():
         if node.support != "free":
             force, moment = step.reaction(name)
@@ -233,6 +257,9 @@ def _report_step(step: Equilibrium, place: str) -> None:
             *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts),
         ]
         print(f"  spring {name}: {', '.join(told)}")
+    for name in step.model.scene.motions:
+        told = [f"{key} {_effort(value)} {UNITS[key]}" for key, value in step.motion(name).items()]
+        print(f"  motion {name}: {', '.join(told)}")
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate
@@ -247,7 +274,7 @@ def _kind(step: Equilibrium) -> str:
     proof = step.certificate
     if proof.stable == "not defined":
         return "stability not defined, as loads have no potential"
-    kind = {"True": "stable", "False": f"unstable ({proof.negative} ways out)"}.get(str(proof.stable), "neutral")
+    kind = {"True": "stable", "False": f"unstable ({counted(proof.negative, *WAYS)})"}.get(str(proof.stable), "neutral")
     return f"{kind}, smallest eigenvalue {proof.smallest:.4g} N" if np.isfinite(proof.smallest) else kind
 
 
@@ -263,6 +290,14 @@ def _report_contact(name: str, entry: dict[str, Any]) -> None:
         print(f"  contact {name}: {member} {where}, force {_vector(force)} N")
 
 
+UNITS = {"moment": "N m", "force": "N"}
+"""Of what makes a motion."""
+
+
+def _effort(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else _vector(value)
+
+
 def _vector(values: Any) -> str:
     return "(" + ", ".join(f"{value + 0.0:.9g}" for value in values) + ")"
 
@@ -272,8 +307,7 @@ def _check(options: argparse.Namespace) -> int:
     for file in options.files:
         scene = load(file)
         print(f"{file}: {scene.title}")
-        solution = solve(scene, _settings(options))
-        checks = check(scene, solution)
+        solution, checks = _answered(file, scene, _settings(options))
         _print_checks(checks)
         if solution.status is not Status.SOLVED or not all(c.passed for c in checks):
             worst = SHORT
@@ -315,12 +349,12 @@ def _info(options: argparse.Namespace) -> int:
     model = assemble(scene, mesh, assembly=settings.assembly)
     print(scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(f"  begins with {mesh.elements} elements {model.element.name}; {model.assembly} assembly")
+    print(f"  begins with {counted(mesh.elements, 'element')} {model.element.name}; {model.assembly} assembly")
     for block in model.blocks:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")
     for name, member in scene.members.items():
-        made = f"{len(mesh.cuts[name]) - 1} elements" if member.type == "flexible" else member.type
+        made = counted(len(mesh.cuts[name]) - 1, "element") if member.type == "flexible" else member.type
         print(f"  member {name}: {made}, length {scene.center_lines[name].length:.9g} m")
     print(f"  {Prepared(model).diagnosis.sentence}")
     print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")

@@ -36,7 +36,7 @@ from .joints import (
 from .mesh import Cushion, Mesh, Touch
 from .obstacles import Obstacle, obstacle, rounded, takes_part
 from .positions import normals
-from .rotations import Pin, Rotations, Turn, end_joints
+from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
 from .scene import Scene
 from .segments import Segments, cushioned
 from .structure import SLIDING
@@ -192,8 +192,9 @@ class _Maker:
     def _spring(self, name: str) -> _One:
         spring, scales = self.scene.springs[name], self.scales
         if spring.type == "rotational":
-            data = np.array([*_unit(spring.axis), spring.stiffness / scales.moment, spring.rest])
-            return _One(TurnSpring(self.space), name, spring.node, data, self.parties(name))
+            crossed, sides, head = self._measured(name)
+            data = np.array([*head, spring.stiffness / scales.moment, spring.rest, *self._near])
+            return _One(TurnSpring(self.space, crossed), name, spring.node, data, sides)
         other, places = spring.to, self._ends_of(name)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
         if spring.direction is not None:
@@ -219,13 +220,35 @@ class _Maker:
             assert spring.stop is not None
             at = spring.stop[0 if side == "low" else 1]
             if spring.type == "rotational":
-                data = np.array([*_unit(spring.axis), at])
-                yield _One(
-                    TurnStop(self.space), f"{side} stop of {name}", spring.node, data, self.parties(name), row=row
-                )
+                crossed, sides, head = self._measured(name)
+                data = np.array([*head, at, *self._near])
+                stop = TurnStop(self.space, crossed)
+                yield _One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
                 continue
             data = np.array([*_unit(spring.direction)[: self.axes], at / self.scales.length])
             yield _One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
+
+    @property
+    def _near(self) -> tuple[float, ...]:
+        """Value near which an angle in space is counted, in the undeformed scene."""
+        return (0.0,) if self.space else ()
+
+    def _measured(self, name: str) -> tuple[bool, tuple[int, int], list[float]]:
+        """Whether a rotational spring is at a universal joint, its sides, and the directions of its data.
+
+        At a universal joint a spring about one of the two axes is put on the side that carries this axis.
+        """
+        spring, (first, second) = self.scene.springs[name], self.parties(name)
+        axis, node = _unit(spring.axis), self.scene.nodes[spring.node]
+        for pin in self.rotations.pins:
+            base = GROUND if pin.base is None else pin.base
+            if not self.space or pin.joint != "universal" or {base, pin.turn} != {first, second}:
+                continue
+            one, two = _unit(node.axis), _unit(node.axis2)
+            for carrier, other, along, across in ((base, pin.turn, one, two), (pin.turn, base, two, one)):
+                if np.linalg.norm(np.cross(axis, along)) < PARALLEL:
+                    return True, (carrier, other), [*(axis if carrier == first else -axis), *across]
+        return False, (first, second), [*axis]
 
     def parties(self, name: str) -> tuple[int, int]:
         """Rotations of the two parties of a rotational spring."""

@@ -33,6 +33,9 @@ SHORTEST = 1e-4
 TINY = 1e-12
 """The first step is never below this part of the way."""
 
+HALF_TURN = np.pi
+"""Where turns are counted a step turns a node by this at most, rad."""
+
 NARROW = 0.02
 """The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
@@ -75,8 +78,9 @@ def follow(
     With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A step
     that is not ``allowed`` from one state to the next is too long.
     """
-    # In space a whole turn of a held node looks like none: no step may turn one by more than a radian.
-    turn = float(np.linalg.norm(way(1.0).turn - way(0.0).turn, axis=1).max(initial=0.0))
+    # In space a whole turn of what is held or driven looks like none: no step may turn it by more than a radian.
+    whole = way(1.0).plus(way(0.0).scaled(-1.0))
+    turn = max(float(np.linalg.norm(whole.turn, axis=1).max(initial=0.0)), whole.driven)
     longest = 1.0 / max(turn, 1.0) if prepared.model.space else 1.0
     done, step = 0.0, 0.5
     left: list[float] = []
@@ -89,7 +93,9 @@ def follow(
         there = prepared.correct(
             now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
         )
-        good = there.converged and (allowed is None or allowed(now.state, there.state))
+        # Where turns are counted a step that turns by more than half of one could lose one.
+        far = prepared.model.winding.count and there.first > HALF_TURN
+        good = there.converged and not far and (allowed is None or allowed(now.state, there.state))
         if not good:
             if step > max(SHORTEST * done, TINY):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25

@@ -17,9 +17,10 @@ import numpy as np
 
 from .arrays import Array
 from .equations import Equations, State
+from .loading import Loading
 from .newton import loose_rows, rows_in
 
-__all__ = ["Diagnosis", "diagnose", "free_motions", "in_words", "moves_nodes"]
+__all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
 SOFT = 1e-7
 """Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing."""
@@ -171,6 +172,75 @@ def _node_travel(equations: Equations, motion: Array, state: State | None = None
 
 STEP = 1e-5
 """Step of the central difference: 1e-10 of the motion is left out."""
+
+
+STUCK = 0.01
+"""Share of the gaps that an unknown takes away, to first order, where they are still said to be stuck."""
+
+NOTHING = 1e-9
+"""Gaps below this, in lengths of the scene or rad, are closed."""
+
+DAMPED = 40
+"""Steps towards the smallest gaps."""
+
+
+def contradiction(equations: Equations, state: State, loading: Loading) -> str:
+    """Which motions ask for what closings and joints do not give, in words; empty where that cannot be told.
+
+    From a state on, the gaps are made as small as can be.  What is left is a combination of rows that no unknown
+    changes to first order: the motions that change it contradict each other, or the rows of the combination.
+    """
+    if not equations.model.scene.motions or not equations.rows:
+        return ""
+    state, gaps, slope = _nearest(equations, state, loading)
+    size = float(np.linalg.norm(gaps))
+    if not NOTHING < size < np.inf or slope > STUCK * size:
+        return ""
+    stuck = gaps / size
+    changes = {name: float(stuck @ _asked(equations, state, loading, name)) for name in equations.model.scene.motions}
+    largest = max(map(abs, changes.values()), default=0.0)
+    asking = [f"motions.{name}" for name, change in changes.items() if abs(change) > SHARE * largest > 0.0]
+    if not asking:
+        return ""
+    shares = np.abs(stuck)
+    names = [equations.row_names[i] for i in np.flatnonzero(shares > SHARE * shares.max())]
+    against = [name for name in dict.fromkeys(names) if name not in asking]
+    found = "contradict each other" if len(asking) > 1 else "asks for more than there is"
+    return f"{' and '.join(asking)} {found}" + (f" in {', '.join(against[:4])}" if against else "")
+
+
+def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[State, Array, float]:
+    """A state with the smallest gaps near one, by Levenberg and Marquardt, and the largest slope of their square."""
+    n, soft = equations.unknowns, 1e-2
+    rows = (equations.row >= n) & (equations.column < n)
+    coupling = rows | ((equations.row < n) & (equations.column >= n))
+    state = equations.holding(state, loading)
+    point = equations.at(state, loading)
+    for _ in range(DAMPED):
+        gaps = point.residual[n:]
+        entries = np.where(coupling, point.entries, 0.0)
+        entries[equations.diagonal[:n]] = soft
+        entries[equations.diagonal[n:]] = -1.0
+        equations.solver.factor(entries)
+        step = equations.solver.solve(np.concatenate([np.zeros(n), -gaps]))
+        step[n:] = 0.0
+        trial = equations.moved(state, step)
+        there = equations.at(trial, loading)
+        if np.linalg.norm(there.residual[n:]) < np.linalg.norm(gaps):
+            state, point, soft = trial, there, 0.3 * soft
+        else:
+            soft *= 10.0
+    slope, gaps = np.zeros(n), point.residual[n:]
+    np.add.at(slope, equations.column[rows], point.entries[rows] * gaps[equations.row[rows] - n])
+    return state, gaps, float(np.abs(slope).max(initial=0.0))
+
+
+def _asked(equations: Equations, state: State, loading: Loading, name: str) -> Array:
+    """Derivative of the rows by a motion, what it holds carried along."""
+    motion = equations.model.motion(name).scaled(STEP)
+    ahead, behind = (loading.plus(motion.scaled(sign)) for sign in (1.0, -1.0))
+    rows = [equations.at(equations.holding(state, at), at).residual[equations.unknowns :] for at in (ahead, behind)]
+    return np.asarray(rows[0] - rows[1]) / (2.0 * STEP)
 
 
 def moves_nodes(equations: Equations, motion: Array, state: State) -> bool:

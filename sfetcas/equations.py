@@ -43,11 +43,14 @@ class State:
         Displacements kept as unknowns.
     lam : ndarray
         Multipliers of the closing rows, then of the hinge rows.
+    wound : ndarray
+        Values near which the angles that count turns are counted, see :class:`~sfetcas.winding.Winding`.
     """
 
     q: Array
     y: Array
     lam: Array
+    wound: Array
 
 
 @dataclass(frozen=True)
@@ -215,12 +218,18 @@ class Equations:
 
     def start(self, loading: Loading) -> State:
         """The undeformed scene with held rotations at their prescribed values."""
-        return State(self.model.held(loading), np.zeros(self.displacement_unknowns), np.zeros(self.rows))
+        winding = self.model.winding
+        wound = winding.prescribed(self.model.rotations.kind, loading)
+        wound = np.where(np.isnan(wound), winding.of_vectors(loading.turn), wound)
+        return State(self.model.held(loading), np.zeros(self.displacement_unknowns), np.zeros(self.rows), wound)
 
     def holding(self, state: State, loading: Loading) -> State:
         """The state with held rotations moved to their prescribed values."""
         q = np.where((self.model.rotations.kind == Turn.HELD)[:, None], self.model.held(loading), state.q)
-        return replace(state, q=q)
+        if not self.model.winding.count:
+            return replace(state, q=q)
+        wound = self.model.winding.prescribed(self.model.rotations.kind, loading)
+        return replace(state, q=q, wound=np.where(np.isnan(wound), state.wound, wound))
 
     def segment_pulls(self, lam: Array, loading: Loading) -> Array:
         """Minus the constant part of the internal force of each segment, (segments, axes)."""
@@ -398,10 +407,10 @@ class Equations:
         """Work of the moments that have a potential: about z in the plane, about the axis of a held hinge."""
         if not self.model.space:
             return float(loading.moment[:, 2] @ state.q[:, 0])
-        axes = {i: self.model.rotations.axis[i] for i in self._basis}
+        winding = self.model.winding
+        angles = winding.angles(state.q, state.wound)
         return sum(
-            float(loading.moment[i] @ axis) * float(quaternion.angle_about(state.q[i], axis))
-            for i, axis in axes.items()
+            float(loading.moment[i] @ winding.axis[angle]) * float(angles[angle]) for i, angle in winding.about.items()
         )
 
     def _local_parts(self, moments: Array, stiffness: Array, spin: Array) -> tuple[Array, Array, Array]:
@@ -445,7 +454,8 @@ class Equations:
         else:
             q = state.q + turn
         y = state.y + step[self.turning_unknowns : self.unknowns]
-        return State(q, y, state.lam + step[self.unknowns :])
+        wound = model.winding.moved(state.q, state.wound, turn, q)
+        return State(q, y, state.lam + step[self.unknowns :], wound)
 
 
 class _Linked:
@@ -464,7 +474,8 @@ class _Linked:
         turning, moving = numbers[group.turns].reshape(n, -1), moves[group.places].reshape(n, -1)
         self.cells = np.concatenate([turning, moving], axis=1)
         self._batch = Batch(by_turning(group.kind), n)
-        self._batch.set(2, group.data)
+        self._data, self._angles = group.data.copy(), model.winding.parts[len(before)]
+        self._batch.set(2, self._data)
         self._about = np.argwhere(np.isin(group.turns, list(equations._basis))).tolist()
 
     def add_noise(self, noise: Array) -> None:
@@ -514,6 +525,9 @@ class _Linked:
         for i, values in enumerate((q[group.turns], u[group.places])):
             if values.size:
                 self._batch.set(i, values)
+        if self._angles is not None:
+            self._data[:, -1] = state.wound[self._angles]
+            self._batch.set(2, self._data)
         if load.size:
             self._batch.set(3, load)
         if self.rows:

@@ -91,6 +91,25 @@ class Fields:
         """A spring of the scene."""
         return self.balance.spring(name)
 
+    def drive(self, name: str) -> dict[str, Any]:
+        """What makes a motion: ``moment`` (N m) with a rotation, ``force`` (N) with a displacement.
+
+        At a driven joint they are numbers, on the second member about the axis or along the line of the joint.  At a
+        support they are what the ground does: (3,), or a number about its axis where the rotation is a number.
+        """
+        motion = self.model.scene.motions[name]
+        if motion.between is not None:
+            return dict(self.balance.drive(name))
+        found: dict[str, Any] = {}
+        force, moment = self.reaction(motion.node)
+        if motion.rotation is not None:
+            axis = np.asarray(self.model.scene.nodes[motion.node].turn_axis, dtype=float)
+            number = isinstance(motion.rotation, float)
+            found["moment"] = float(moment @ axis / np.linalg.norm(axis)) if number else moment
+        if motion.displacement is not None:
+            found["force"] = force
+        return found
+
     # -- members --------------------------------------------------------------------------------
 
     def along(self, member: str, x: Array, *, dimensionless: bool = False) -> dict[str, Array]:
@@ -443,7 +462,7 @@ def transferred(source: Any, state: State, target: Any) -> State:
             q[number] = state.q[source.rotations.node_turn[name]]
     y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
     lam = _by_name(source.row_names, state.lam, target.row_names)
-    return State(q, y, lam)
+    return State(q, y, lam, state.wound)
 
 
 def _by_name(names: tuple[str, ...], values: Array, wanted: tuple[str, ...]) -> Array:

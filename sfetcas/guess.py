@@ -215,7 +215,8 @@ def _carried(equations: Equations, loading: Loading) -> State:
     about = model.rotations.kind == Turn.AXIS
     field[about] = (field[about] * model.rotations.axis[about]).sum(axis=1, keepdims=True) * model.rotations.axis[about]
     q = quaternion.from_rotation_vector(field) if model.space else field[:, 2:3]
-    return equations.holding(replace(equations.start(loading), q=q), loading)
+    wound = model.winding.of_vectors(field)
+    return equations.holding(replace(equations.start(loading), q=q, wound=wound), loading)
 
 
 def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -> State:

@@ -40,6 +40,7 @@ __all__ = [
     "Spring",
     "TurnSpring",
     "TurnStop",
+    "Turning",
     "Universal",
     "by_components",
     "by_turning",
@@ -100,11 +101,6 @@ class Connection(Components, abc.ABC):
         """Rotation of side b against side a, seen from the undeformed scene."""
         return product([a[0], -a[1], -a[2], -a[3]], b) if self.space else [b[0] - a[0]]
 
-    def angle(self, a: Side, b: Side, axis: ca.SX) -> ca.SX:
-        """Angle of side b against side a about an axis: all turns in the plane, up to one either way in space."""
-        r = self.relative(a, b)
-        return 2.0 * ca.atan2(ca.dot(axis, ca.vertcat(*r[1:])), r[0]) if self.space else axis[2] * r[0]
-
 
 def _dot(a: Side, b: Side) -> ca.SX:
     return ca.dot(ca.vertcat(*a), ca.vertcat(*b))
@@ -155,7 +151,7 @@ class DrivenTurn(Connection):
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The angle less what it shall be; in space by its half sine, which is smooth at any angle."""
         if not self.space:
-            return [q[1][0] - q[0][0] - load]
+            return [data[2] * (q[1][0] - q[0][0]) - load]
         r = self.relative(*q)
         about, half = ca.dot(data, ca.vertcat(*r[1:])), 0.5 * load
         return [2.0 * (ca.cos(half) * about - ca.sin(half) * r[0])]
@@ -194,35 +190,93 @@ class DrivenSlide(Connection):
         return [ca.dot(data, gap) - load]
 
 
-@final
 @dataclass(frozen=True)
-class TurnSpring(Connection):
-    """A rotational spring about an axis of the first side; data: axis, stiffness, rest angle."""
+class Turning(Connection):
+    """What acts on the angle of the second side against the first about an axis of the first; it has no places.
+
+    Angles count turns: in the plane by themselves, in space near a value that the state carries.  With ``r`` the
+    rotation of one side against the other the angle is twice ``atan2(axis.r, r_0)``, and does what it shall for a
+    hinge.  At a universal joint the axis of the one side is normal to a direction ``c`` that the other carries, and
+    the angle of ``c`` about the axis is taken: then the moment is along the axis and leaves the joint what is normal
+    to both axes.
+
+    Data: axis, of a universal joint ``c`` in the undeformed scene, then what :attr:`own` counts, in space the near
+    value.
+
+    Attributes
+    ----------
+    crossed : bool
+        At a universal joint.
+    """
+
+    crossed: bool = False
+
+    @property
+    @abc.abstractmethod
+    def own(self) -> int:
+        """Data of the kind itself."""
+
+    @property
+    def first(self) -> int:
+        """Where these begin."""
+        return 6 if self.crossed else 3
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """No row."""
-        return 2, 0, 0, 5, 0
+        return 2, 0, 0, self.first + self.own + self.space, 0
 
-    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
-        angle = self.angle(q[0], q[1], data[:3])
-        return 0.5 * data[3] * angle * (angle - 2.0 * data[4])
+    def angle(self, q: list[Side], data: ca.SX) -> ca.SX:
+        """The angle, rad."""
+        axis = data[:3]
+        r = self.relative(*q)
+        if not self.space:
+            return axis[2] * r[0]
+        sine, cosine, share = ca.dot(axis, ca.vertcat(*r[1:])), r[0], 2.0
+        if self.crossed:
+            other = data[3:6]
+            seen = ca.vertcat(*self.forth(r, ca.vertsplit(other)))
+            sine, cosine, share = ca.dot(ca.cross(axis, other), seen), ca.dot(other, seen), 1.0
+        near = data[self.first + self.own]
+        c, s = ca.cos(near / share), ca.sin(near / share)
+        return near + share * ca.atan2(sine * c - cosine * s, cosine * c + sine * s)
 
 
 @final
 @dataclass(frozen=True)
-class TurnStop(Connection):
-    """A rotational spring that stands at a stop; data: axis, angle of the stop."""
+class TurnSpring(Turning):
+    """A rotational spring about an axis of the first side; its own data: stiffness, rest angle."""
+
+    @property
+    def own(self) -> int:
+        """Two."""
+        return 2
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
+        angle = self.angle(q, data)
+        return 0.5 * data[self.first] * angle * (angle - 2.0 * data[self.first + 1])
+
+
+@final
+@dataclass(frozen=True)
+class TurnStop(Turning):
+    """A rotational spring that stands at a stop; its own data: angle of the stop."""
+
+    @property
+    def own(self) -> int:
+        """One."""
+        return 1
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row."""
-        return 2, 0, 1, 4, 0
+        turns, places, _, data, load = super().sizes
+        return turns, places, 1, data, load
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The angle less that of the stop."""
-        return [self.angle(q[0], q[1], data[:3]) - data[3]]
+        return [self.angle(q, data) - data[self.first]]
 
 
 @final
@@ -533,6 +587,7 @@ def _symbols(kind: Connection) -> tuple[list[ca.SX], ca.SX, ca.SX]:
 
 def _name(kind: Connection) -> str:
     extra = f"_{kind.nodes}_{kind.stiff}" if isinstance(kind, Body) else ""
+    extra += "_crossed" if isinstance(kind, Turning) and kind.crossed else ""
     return f"{type(kind).__name__.lower()}_{'space' if kind.space else 'plane'}{extra}"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from .arrays import Array
 from .kernels import Batch
 
-__all__ = ["SparseMap", "SparseSolver", "inertia_solver", "pattern"]
+__all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "pattern"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
@@ -246,8 +246,30 @@ def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:
     return ca.Sparsity(n, n, np.searchsorted(column, np.arange(n + 1)).tolist(), row.tolist())
 
 
-def inertia_solver(name: str, sparsity: ca.Sparsity) -> ca.Linsol:
-    """Factors that count negative eigenvalues of symmetric matrices of one pattern."""
-    solver = ca.Linsol(name, "ldl", sparsity)
-    solver.sfact(ca.DM(sparsity, 1.0))
-    return solver
+class InertiaSolver:
+    """Factors that count negative eigenvalues of symmetric matrices of one pattern.
+
+    All methods raise numpy.linalg.LinAlgError where the factorisation breaks down.
+    """
+
+    def __init__(self, name: str, sparsity: ca.Sparsity) -> None:
+        self._solver = ca.Linsol(name, "ldl", sparsity)
+        self._solver.sfact(ca.DM(sparsity, 1.0))
+
+    def nfact(self, matrix: ca.DM) -> None:
+        """Factorise a matrix."""
+        try:
+            self._solver.nfact(matrix)
+        except RuntimeError:
+            raise np.linalg.LinAlgError("no factors without pivots") from None
+
+    def neig(self, matrix: ca.DM) -> int:
+        """Number of negative eigenvalues of the matrix factorised last."""
+        return int(self._solver.neig(matrix))
+
+    def solve(self, matrix: ca.DM, b: ca.DM) -> ca.DM:
+        """Solution for the matrix factorised last."""
+        try:
+            return self._solver.solve(matrix, b)
+        except RuntimeError:
+            raise np.linalg.LinAlgError("no factors without pivots") from None

@@ -86,4 +86,5 @@ def mirrored(model: Model, state: State, mirror: Mirror) -> State:
         else:
             values = sign * mirror.matrix[2, 2] * values
         q[model.chain(name)] = values
-    return replace(state, q=q, y=np.zeros_like(state.y), lam=np.zeros_like(state.lam))
+    nothing = {name: np.zeros_like(getattr(state, name)) for name in ("y", "lam", "wound")}
+    return replace(state, q=q, **nothing)

@@ -23,9 +23,11 @@ from .errors import SceneError
 from .loading import Followers, Loading, find_followers, unit_loadings
 from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
+from .records import counted
 from .rotations import Rotations, Turn, number_rotations
 from .scene import Scene
 from .segments import Segments, cut_members
+from .winding import Winding, winding_of
 
 __all__ = ["Block", "Model", "assemble"]
 
@@ -95,6 +97,11 @@ class Model:
     def reason(self) -> str:
         """Why the model is in the plane or in space."""
         return self.scene.dimension_reason
+
+    @functools.cached_property
+    def winding(self) -> Winding:
+        """The angles that count turns in space."""
+        return winding_of(self.connections, self.rotations, self.space)
 
     @functools.cached_property
     def row_names(self) -> tuple[str, ...]:
@@ -182,6 +189,13 @@ class Model:
             total = total.plus(part)
         return total
 
+    def motion(self, name: str) -> Loading:
+        """What one motion prescribes, without its factor."""
+        motions = {name: self.scene.motions[name]}
+        scene = self.scene.model_copy(update={"motions": motions, "loads": {}, "gravity": None})
+        parts = self.mesh, self.element, self.scales, self.segments, self.rotations, self.beams
+        return unit_loadings(scene, *parts, self.connections, self.followers)[motions[name].history]
+
     def held(self, loading: Loading) -> Array:
         """Rotations with the held ones at their prescribed values and all others at rest, (rotations, comps)."""
         if not self.space:
@@ -247,12 +261,12 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     free, about = int((kind == Turn.FREE).sum()), int((kind == Turn.AXIS).sum())
     blocks = []
     if model.space:
-        blocks.append(Block("quaternions", 4 * free, f"4 for each of {free} free rotations: {model.reason}"))
+        blocks.append(Block("quaternions", 4 * free, f"4 for each of {counted(free, 'free rotation')}: {model.reason}"))
         if about:
             blocks.append(Block("hinge rotations", 2 * about, "2 for each rotation held but for its hinge axis"))
         blocks.append(Block("norms", free + about, "a quaternion of a free rotation is unit; held ones need no row"))
     else:
-        blocks.append(Block("angles", free, f"1 for each of {free} free rotations: {model.reason}"))
+        blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
     if model.positions.unknowns:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.kept:

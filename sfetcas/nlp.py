@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array
-from .errors import Status
+from .errors import SolveError, Status
 
 __all__ = ["NLP", "Ipopt", "NLPResult", "Solver"]
 
@@ -131,15 +131,20 @@ class Solver:
         function = ca.nlpsol("nlp", self.plugin, {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}, options)
 
         def solve(p: Array | None = None, guess: Array | None = None, lam: Array | None = None) -> NLPResult:
-            solution = function(
-                x0=nlp.guess if guess is None else guess,
-                p=nlp.p_value if p is None else p,
-                lbx=nlp.x_lower,
-                ubx=nlp.x_upper,
-                lbg=nlp.lower,
-                ubg=nlp.upper,
-                lam_g0=np.zeros(nlp.g.numel()) if lam is None else lam,
-            )
+            try:
+                solution = function(
+                    x0=nlp.guess if guess is None else guess,
+                    p=nlp.p_value if p is None else p,
+                    lbx=nlp.x_lower,
+                    ubx=nlp.x_upper,
+                    lbg=nlp.lower,
+                    ubg=nlp.upper,
+                    lam_g0=np.zeros(nlp.g.numel()) if lam is None else lam,
+                )
+            except RuntimeError as error:
+                # What a plugin cannot cope with, CasADi says in many lines, the reason last.
+                reason = str(error).strip().splitlines()[-1]
+                raise SolveError(Status.FAILED, f"{self.plugin}: {reason}") from None
             stats = function.stats()
             if stats.get("return_status") == "NonIpopt_Exception_Thrown":
                 # The one exception that reaches IPOPT from outside is Ctrl-C.

@@ -13,6 +13,7 @@ from .errors import SolveError, Status
 from .loading import Loading
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .prepared import Prepared
+from .records import counted
 from .scene import Scene
 from .settings import Settings
 from .single import cold
@@ -53,7 +54,7 @@ class Piloting(Meshing):
         """The error with the motions that nothing holds, where there are any."""
         try:
             free = pilot.diagnosis
-        except (RuntimeError, np.linalg.LinAlgError):
+        except np.linalg.LinAlgError:
             return error
         if not free.mobility:
             return error
@@ -105,7 +106,8 @@ class Piloting(Meshing):
         if alone.stability.negative == 0 or not self.leave:
             return alone
         corrected, stability = pilot.leave(alone.corrected.state, alone.stability, loading)
-        note = f"left an unstable equilibrium with {alone.stability.negative} ways out along its escape shape"
+        ways = counted(alone.stability.negative, "way out", "ways out")
+        note = f"left an unstable equilibrium with {ways} along its escape shape"
         return Found(pilot, corrected, stability, (note,), alone.iterations)
 
     def _grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import quaternion
 from .arrays import Array
-from .doctor import Diagnosis, diagnose
+from .doctor import Diagnosis, contradiction, diagnose
 from .equations import Equations, Point, State
 from .errors import SolveError, Status
 from .guess import first_guess, lacks_slack, restore
@@ -21,6 +21,7 @@ from .model import Model
 from .newton import Corrected, correct
 from .nlp import Ipopt, NLPResult
 from .problem import EquilibriumProblem
+from .records import counted
 from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
@@ -141,24 +142,27 @@ class Prepared:
             found = self.correct(state, loading, iterations=50)
             if not found.converged:
                 detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
-                motions = [f"motions.{name}" for name in self.model.scene.motions]
-                detail += f"; {' and '.join(motions)} may contradict each other" if len(motions) > 1 else ""
-                raise SolveError(Status.FAILED, detail, state)
+                told = contradiction(self.equations, state, loading)
+                raise SolveError(Status.INFEASIBLE if told else Status.FAILED, told or detail, state)
             return found, 0
         problem = self._problem
         scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
         result = self._ipopt(scale)(
-            p=problem.parameters(loading), guess=problem.unknowns(state), lam=problem.multipliers(state) / scale
+            p=problem.parameters(loading, state),
+            guess=problem.unknowns(state),
+            lam=problem.multipliers(state) / scale,
         )
-        trial = problem.state(result.x, result.lam, loading)
+        trial = problem.state(result.x, result.lam, loading, state)
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)
         if not polished.converged and polished.residual > SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
-            detail = f"IPOPT: {result.message}, {result.iterations} iterations"
+            detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if status is Status.FAILED:
                 detail += f"; Newton's method left a residual of {polished.residual:.1e}"
+            told = contradiction(self.equations, trial, loading) if status is Status.INFEASIBLE else ""
+            detail += f"; {told}" if told else ""
             raise SolveError(status, detail, trial)
         return polished, result.iterations
 

@@ -115,7 +115,7 @@ class _Link:
         self._arguments = [
             ca.reshape(q[flat[0].ravel().tolist()], components, turns * n) if turns else ca.MX(components, 0),
             ca.reshape(u[flat[1].ravel().tolist()], axes, places * n) if places else ca.MX(axes, 0),
-            ca.MX(ca.DM(group.data.T)),
+            _with_near(ca.MX(ca.DM(group.data.T)), problem._near, model.winding.parts[number]),
             ca.reshape(problem._loads[number], loads, n),
         ]
         self._function = by_components(group.kind).map(n)
@@ -149,6 +149,11 @@ def _with_ground(problem: EquilibriumProblem, reduction: _Reduction) -> list[tup
     ]
 
 
+def _with_near(data: ca.MX, near: ca.MX, angles: slice | None) -> ca.MX:
+    """Data of a group, those of angles that count turns with the values near which they are counted."""
+    return data if angles is None else ca.vertcat(data[:-1, :], near[angles].T)
+
+
 class EquilibriumProblem:
     """The nonlinear program of a model, with the means to write terms by the names of the scene.
 
@@ -162,6 +167,7 @@ class EquilibriumProblem:
 
     def __init__(self, model: Model, loading: Loading, guess: State, *, kernels: Kernels = "auto") -> None:
         self.model = model
+        self._wound = guess.wound
         self._kernels: Kernels = kernels
         self._reduction = _reduction(model)
         self._symbols()
@@ -195,10 +201,13 @@ class EquilibriumProblem:
             len(positions.rows),
             self.x.numel(),
             positions.B.shape[1],
+            model.winding.count,
             *(len(group.names) * group.kind.sizes[4] for group in model.connections),
         )
         self.p = ca.MX.sym("p", sum(sizes))
-        pull, held, offset, force, shift, *self._loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
+        pull, held, offset, force, shift, self._near, *self._loads = ca.vertsplit(
+            self.p, np.cumsum([0, *sizes]).tolist()
+        )
         self._pull = ca.reshape(pull, element.axes, n * points)
         self._offset, self._force, self._b = offset, force, shift
         index, weight = self._reduction.index, self._reduction.weight
@@ -446,8 +455,8 @@ class EquilibriumProblem:
 
     # -- numbers --------------------------------------------------------------------------------
 
-    def parameters(self, loading: Loading) -> Array:
-        """Values of the parameters for a loading."""
+    def parameters(self, loading: Loading, near: State | None = None) -> Array:
+        """Values of the parameters for a loading; angles that count turns are counted near those of a state."""
         model, positions = self.model, self.model.positions
         held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
         offset = positions.BZ @ loading.shift - positions.Z @ self._rest
@@ -459,7 +468,8 @@ class EquilibriumProblem:
             force[self._reduction.first[free]] = loading.moment[free, 2]
         force[self._reduction.unknowns :] = positions.Y.T @ loading.force.ravel()
         loads = [load.ravel() for load in loading.loads]
-        return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift, *loads])
+        wound = self._wound if near is None else near.wound
+        return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift, wound, *loads])
 
     def unknowns(self, state: State) -> Array:
         """The unknowns of the program at a state."""
@@ -470,8 +480,8 @@ class EquilibriumProblem:
         x[self._reduction.unknowns :] = state.y
         return x
 
-    def state(self, x: Array, lam: Array, loading: Loading) -> State:
-        """The state of a solution; quaternions are made exactly unit."""
+    def state(self, x: Array, lam: Array, loading: Loading, near: State | None = None) -> State:
+        """The state of a solution; quaternions are made exactly unit, turns counted near those of another state."""
         model = self.model
         held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0).ravel()
         weight, index = self._reduction.weight, self._reduction.index
@@ -479,7 +489,8 @@ class EquilibriumProblem:
         if model.space:
             q = q / np.linalg.norm(q, axis=-1, keepdims=True)
         rows = self.rows_of_equations
-        return State(q, x[self._reduction.unknowns :].copy(), lam[rows])
+        wound = model.winding.angles(q, self._wound if near is None else near.wound)
+        return State(q, x[self._reduction.unknowns :].copy(), lam[rows], wound)
 
     @property
     def rows_of_equations(self) -> slice:

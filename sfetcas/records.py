@@ -25,6 +25,7 @@ __all__ = [
     "Record",
     "Turn",
     "Vector",
+    "counted",
     "listed",
     "nearest",
     "number",
@@ -213,6 +214,11 @@ class Record(BaseModel):
         """A copy with other values, validated anew."""
         kept = {name: getattr(self, name) for name in self.model_fields_set}
         return type(self)(**{**kept, **changes})
+
+
+def counted(number: int, one: str, more: str | None = None) -> str:
+    """A number with what it counts: ``1 way out``, ``2 ways out``; without a third word the plural ends on s."""
+    return f"{number} {one if number == 1 else more or one + 's'}"
 
 
 def plain(value: Any) -> Any:

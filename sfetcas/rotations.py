@@ -13,7 +13,7 @@ from .elements import Element
 from .mesh import Mesh
 from .scene import Member, Node, Scene
 
-__all__ = ["STIFF", "Pin", "Rotations", "Turn", "end_joints", "number_rotations"]
+__all__ = ["PARALLEL", "STIFF", "Pin", "Rotations", "Turn", "end_joints", "number_rotations"]
 
 
 class Turn(enum.IntEnum):

@@ -27,7 +27,19 @@ from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
 from .task import Analysis, Expect
 
-__all__ = ["Analysis", "Contact", "Expect", "History", "Load", "Member", "Motion", "Node", "Scene", "Spring"]
+__all__ = [
+    "Analysis",
+    "Contact",
+    "Expect",
+    "History",
+    "Load",
+    "Member",
+    "Motion",
+    "Node",
+    "Scene",
+    "Spring",
+    "check_loaded",
+]
 
 
 class Scene(Staged):
@@ -139,6 +151,19 @@ def _check_members(scene: Scene) -> None:
             raise SceneError("node without member, accepted: a node where at least one member ends", ("nodes", name))
 
 
+def check_loaded(scene: Scene) -> None:
+    """Refuse a scene of which nothing moves or strains anything; it can be looked at, but there is nothing to solve.
+
+    Raises
+    ------
+    SceneError
+        There is no load, no motion, no gravity and no spring that is not at rest.
+    """
+    pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
+    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
+        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
+
+
 def _check_driven(scene: Scene) -> None:
     for name, load in scene.loads.items():
         _known(load.node, scene.nodes, "nodes", "loads", name, "node")
@@ -147,14 +172,22 @@ def _check_driven(scene: Scene) -> None:
     for name, motion in scene.motions.items():
         _known(motion.node, scene.nodes, "nodes", "motions", name, "node")
         _known(motion.history, scene.histories, "histories", "motions", name, "history")
-    pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
-    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
-        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
 
 
 def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
     if word is not None and word not in table:
         raise SceneError(unknown(word, table, kind), where)
+
+
+def _check_lengths(scene: Scene) -> None:
+    for name, line in scene.center_lines.items():
+        if not SHORTEST <= line.length <= LONGEST:
+            accepted = f"{SHORTEST:g} to {LONGEST:g} m, whose squares are still numbers"
+            raise SceneError(f"found a length of {line.length:.6g} m, accepted: {accepted}", ("members", name))
+
+
+SHORTEST, LONGEST = 1e-100, 1e100
+"""Of members, m."""
 
 
 def _check_releases(scene: Scene) -> None:
@@ -255,30 +288,6 @@ def _check_loads(scene: Scene) -> None:
             raise SceneError(message, ("loads", name, "node"))
 
 
-def _check_turns(scene: Scene, name: str, spring: Spring) -> None:
-    """In space an angle is known up to a turn either way."""
-    if scene.resolved_dimension == "plane" or spring.type != "rotational":
-        return
-    if abs(spring.rest) > TURN:
-        raise SceneError(
-            f"found {spring.rest:g}, accepted in space: up to 6 rad, less than a turn", ("springs", name, "rest")
-        )
-    steps = scene.analysis.range or scene.analysis.steps
-    for motion_name, motion in scene.motions.items():
-        if motion.node != spring.node or motion.rotation is None:
-            continue
-        history = None if motion.history is None else scene.histories[motion.history]
-        most = max(abs(step if history is None else history.factor(step)) for step in steps)
-        turned = most * float(np.linalg.norm(motion.rotation))
-        if turned > TURN:
-            message = f"turns springs.{name} by {turned:g} rad, accepted in space: up to 6 rad, less than a turn"
-            raise SceneError(message, ("motions", motion_name, "rotation"))
-
-
-TURN = 6.0
-"""Largest angle of a rotational spring in space, rad: at a whole turn it would begin anew."""
-
-
 def _check_springs(scene: Scene) -> None:
     for name, spring in scene.springs.items():
         _known(spring.node, scene.nodes, "nodes", "springs", name, "node")
@@ -288,7 +297,6 @@ def _check_springs(scene: Scene) -> None:
             if party not in ("ground", spring.node, *ends):
                 message = unknown(party, ("ground", spring.node, *ends), "parties")
                 raise SceneError(message, ("springs", name, "between"))
-        _check_turns(scene, name, spring)
         own = spring.between is None or spring.node in spring.between
         if spring.type == "rotational" and own and scene.nodes[spring.node].joint != "rigid":
             joint = scene.nodes[spring.node].joint
@@ -354,6 +362,7 @@ def _check_expect(scene: Scene) -> None:
         "reactions": scene.nodes,
         "members": scene.members,
         "springs": scene.springs,
+        "motions": scene.motions,
         "contacts": scene.contacts,
     }
     for i, expect in enumerate(scene.expect):
@@ -374,6 +383,7 @@ def _check_expect(scene: Scene) -> None:
 
 _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_members,
+    _check_lengths,
     _check_driven,
     _check_axes,
     _check_dimension,

@@ -61,12 +61,18 @@ def parse(text: str, format: str, folder: Path | None = None) -> Scene:
     if not text.strip():
         raise SceneError("the file is empty, accepted: a scene with sections, nodes and members")
     try:
-        values = tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
+        values = _values(text, format)
         return Scene.from_dict(values if folder is None else _within(values, folder))
-    except SceneError:
-        raise
     except RecursionError:
         raise SceneError(f"not read as {format.upper()}: lists or tables are nested too deeply") from None
+
+
+def _values(text: str, format: str) -> Any:
+    """The tables of a text."""
+    try:
+        return tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
+    except SceneError:
+        raise
     except ValueError as error:
         raise SceneError(f"not read as {format.upper()}: {error}") from None
 

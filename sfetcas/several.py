@@ -25,6 +25,7 @@ from .loading import Loading
 from .mirrors import Mirror, mirrored, mirrors
 from .newton import Corrected
 from .prepared import Prepared
+from .records import counted
 from .solution import Equilibrium
 
 __all__ = ["Search", "long_elements", "missing", "same", "search"]
@@ -110,7 +111,7 @@ class Search:
         kinds = ", ".join(f"{n} {kind}" for kind, n in self.counts.items())
         end = "stopped at its largest number of runs" if self.exhausted else "went through all its starts"
         return (
-            f"searched by {self.total} Newton runs, {self.deflated} of them deflated ({kinds}), of which "
+            f"searched by {counted(self.total, 'Newton run')}, {self.deflated} of them deflated ({kinds}), of which "
             f"{self.arrived} arrived, after {self.smaller} under smaller loads; the search {end}; there may be more "
             "equilibria"
         )

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .continuation import follow
+from .doctor import contradiction
 from .errors import SolveError, Status
 from .loading import Loading
 from .newton import Corrected
@@ -72,6 +73,8 @@ def cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
         rows = np.abs(equations.at(state, loading).residual[equations.unknowns :])
         worst = ", ".join(equations.row_names[i] for i in np.flatnonzero(rows > 0.3 * rows.max())[:4])
         detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at {worst}"
+        told = contradiction(equations, state, loading)
+        detail += f"; {told}" if told else ""
         raise SolveError(Status.INFEASIBLE, detail, state)
     return prepared.minimise(loading, state)
 

@@ -13,7 +13,7 @@ from . import quaternion
 from .arrays import Array
 from .balance import SpringState
 from .equations import Equations, Point, State
-from .errors import SceneError, Status
+from .errors import SceneError, SolveError, Status
 from .fields import Fields
 from .loading import Loading
 from .model import Model
@@ -116,6 +116,10 @@ class Equilibrium:
         """A spring: angle (rad) and moment (N m) on its second party, or travel (m) and force (N)."""
         return self.fields.spring(self._known(name, tuple(self.model.scene.springs), "spring"))
 
+    def motion(self, name: str) -> dict[str, Any]:
+        """What makes a motion: ``moment`` with a rotation, ``force`` with a displacement, see :meth:`Fields.drive`."""
+        return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
+
     def along(self, member: str, at: Any) -> dict[str, Array]:
         """Fields of a member at fractions of its length, see :meth:`Fields.along`; quaternions added."""
         found = self.fields.along(self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at))
@@ -187,6 +191,8 @@ class Equilibrium:
             members[name] = {"s": places.tolist(), **{key: value.tolist() for key, value in found.items()}}
         answer: dict[str, Any] = {"factor": self.factor, "nodes": nodes, "reactions": reactions, "members": members}
         answer |= {"springs": {name: self.spring(name).to_dict() for name in scene.springs}} if scene.springs else {}
+        if scene.motions:
+            answer["motions"] = {name: plain(self.motion(name)) for name in scene.motions}
         if self.contacts:
             answer["contacts"] = {name: plain(entry) for name, entry in self.contacts.items()}
         answer |= {"energy": self.energy, "certificate": self.certificate.to_dict()}
@@ -242,8 +248,17 @@ def equilibrium(
     notes: tuple[str, ...] = (),
     iterations: int = 0,
 ) -> Equilibrium:
-    """Put an equilibrium together; dimensionless in, by name and in SI out."""
+    """Put an equilibrium together; dimensionless in, by name and in SI out.
+
+    Raises
+    ------
+    SolveError
+        The angle of a spring cannot be told.
+    """
     model = equations.model
+    doubt = model.winding.doubt(state.q, state.wound, loading)
+    if doubt is not None:
+        raise SolveError(Status.FAILED, doubt, state)
     turn = np.where(equations.number >= 0, stability.shape[equations.number], 0.0) if len(stability.shape) else None
     escape = {} if turn is None else {name: turn[model.chain(name)] for name in model.members}
     certificate = Certificate(

@@ -44,7 +44,8 @@ class Spring(Staged):
     type : rotational or translational
     node : name of the node
     stiffness : N m, or N/m of a translational one
-    axis : (3,), fixed axes of the undeformed scene - of a rotational spring; turns with the first party
+    axis : (3,), fixed axes of the undeformed scene - of a rotational spring; turns with the first party, at a
+        universal joint with the side that has this axis
     between : rotational: the two parties, of ground, the node, or members that end there; the angle is that of the
         second against the first since the undeformed scene; left out: the ground and the node
     rest : rad - angle at which it gives no moment; of a translational spring with a direction m, the travel

@@ -19,7 +19,7 @@ import numpy as np
 
 from .arrays import Array
 from .equations import Equations, Point
-from .linear import inertia_solver, pattern
+from .linear import InertiaSolver, pattern
 
 __all__ = ["LIGHT", "Inertia", "Stability", "StabilityTest"]
 
@@ -239,10 +239,10 @@ class StabilityTest:
         matrix = ca.DM(self._pattern, shifted)
         self._ldl.nfact(matrix)
         if not len(rows):
-            return int(self._ldl.neig(matrix))
+            return self._ldl.neig(matrix)
         schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
         values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
-        return int(self._ldl.neig(matrix)) - int((values < -RANK * np.abs(values).max()).sum())
+        return self._ldl.neig(matrix) - int((values < -RANK * np.abs(values).max()).sum())
 
     def _below_bordered(self, point: Point, shift: float) -> int:
         """The same from the whole Newton matrix, with closings and displacements very slightly soft.
@@ -264,7 +264,7 @@ class StabilityTest:
             self._bordered.nfact(matrix)
             gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
             if np.abs(gap).max() < BROKEN:
-                return int(self._bordered.neig(matrix)) - equations.rows
+                return self._bordered.neig(matrix) - equations.rows
         return self._below_dense(point, shift)
 
     def _below_dense(self, point: Point, shift: float) -> int:
@@ -276,16 +276,16 @@ class StabilityTest:
         return pattern(self.equations.total, self.equations.row, self.equations.column)
 
     @functools.cached_property
-    def _bordered(self) -> ca.Linsol:
-        return inertia_solver("bordered_inertia", self._bordered_pattern)
+    def _bordered(self) -> InertiaSolver:
+        return InertiaSolver("bordered_inertia", self._bordered_pattern)
 
     @functools.cached_property
     def _pattern(self) -> ca.Sparsity:
         return pattern(self._n, self._h_row, self._h_column)
 
     @functools.cached_property
-    def _ldl(self) -> ca.Linsol:
-        return inertia_solver("inertia", self._pattern)
+    def _ldl(self) -> InertiaSolver:
+        return InertiaSolver("inertia", self._pattern)
 
     @functools.cached_property
     def _starts(self) -> Array:

@@ -24,6 +24,7 @@ from .mesh import Mesh
 from .meshing import Found
 from .model import Model
 from .prepared import Prepared
+from .records import counted
 from .refining import LEVELS, Refining
 from .scene import Scene
 from .settings import Settings
@@ -123,7 +124,8 @@ class _Run(Refining):
                 answers.append(further)
         note = result.sentence() + missing(answers)
         if dropped:
-            note += f"; {dropped} of the mesh of the search are none on finer ones"
+            coarse = counted(dropped, "equilibrium", "equilibria")
+            note += f"; {coarse} of the mesh of the search not found on finer ones"
         answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
         return [replace(other, notes=(*other.notes, note)) for other in answers]
 

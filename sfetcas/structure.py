@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, model_validator
 from .errors import SceneError
 from .later import Staged
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
-from .records import Direction, NotNegative, Vector, listed, say
+from .records import Direction, NotNegative, Vector, counted, listed, say
 from .shapes import Shape, Straight
 
 __all__ = ["SLIDING", "Member", "Node", "released", "unit"]
@@ -187,7 +187,8 @@ class Member(Staged):
             message = f"found {len(self.nodes)} nodes, accepted: two; only a small member may have more"
             raise SceneError(message, ("nodes",))
         if len(self.release) != len(self.nodes):
-            message = f"found {len(self.release)} entries, accepted: one for each of {len(self.nodes)} nodes"
+            found = counted(len(self.release), "entry", "entries")
+            message = f"found {found}, accepted: one for each of {len(self.nodes)} nodes"
             raise SceneError(message, ("release",))
         self._check_kind()
         return self

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sfetcas.cli import main
+from sfetcas.records import counted
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
@@ -238,3 +239,82 @@ def test_an_expectation_of_the_wrong_shape_is_exit_2(scene, capsys, value):
 def test_numbers_that_overflow_are_no_solution(scene, capsys):
     assert main(["run", str(scene(("value = [0, 1]", "value = [0, 1e160]")))]) == 3
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("error", [RuntimeError("lost"), ValueError("shapes"), KeyError("name"), ZeroDivisionError()])
+def test_a_mistake_of_the_program_is_told_as_one(scene, tmp_path, capsys, monkeypatch, error):
+    """Neither an answer nor "no solution": a traceback, a sentence that asks to report it, a code of its own."""
+
+    def broken(*_):
+        raise error
+
+    monkeypatch.setattr("sfetcas.cli.solve", broken)
+    out = tmp_path / "answer.json"
+    assert main(["run", str(scene()), "--json", str(out)]) == 70
+    caught = capsys.readouterr()
+    assert "Traceback" in caught.err
+    assert type(error).__name__ in caught.err
+    assert caught.err.splitlines()[-1].startswith("sfetcas: internal error: a mistake of sfetcas")
+    assert "report" in caught.err
+    assert not out.exists()
+
+
+def test_a_mistake_while_a_scene_is_made_is_no_syntax_error(scene, capsys, monkeypatch):
+    def broken(*_):
+        raise ValueError("shapes do not fit")
+
+    monkeypatch.setattr("sfetcas.scenefile.Scene.from_dict", broken)
+    assert main(["run", str(scene())]) == 70
+    assert "not read as" not in capsys.readouterr().err
+
+
+UNLOADED = ('[loads.tip]\ntype = "force"\nnode = "B"\nvalue = [0, 1]\n', "")
+
+
+def test_info_needs_no_load(scene, capsys):
+    assert main(["info", str(scene(UNLOADED))]) == 0
+    printed = capsys.readouterr().out
+    assert "angles: 1 for each" in printed
+    assert "mobility 0" in printed
+    assert main(["info", str(scene(UNLOADED, ('"clamped"', '"hinge"')))]) == 0
+    assert "mobility 1: member beam turning with node B moving" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("file", sorted(PROBLEMS.glob("*.toml")), ids=lambda file: file.stem)
+def test_info_of_every_problem_without_its_loads(file, tmp_path, capsys):
+    """Loads and motions say nothing about what is modelled; only the mesh to begin with may differ."""
+    import sfetcas
+
+    table = sfetcas.load(file).to_dict()
+    for key in ("loads", "motions", "gravity", "expect", "analysis"):
+        table.pop(key, None)
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(table))
+    code = main(["info", str(path)])
+    caught = capsys.readouterr()
+    # A slider that only a motion holds floats without it.
+    assert code == 0 or "leave them free" in caught.err
+    assert code != 0 or "mobility" in caught.out
+
+
+@pytest.mark.parametrize(("number", "said"), [(0, "0 ways out"), (1, "1 way out"), (2, "2 ways out")])
+def test_counted_nouns(number, said):
+    assert counted(number, "way out", "ways out") == said
+
+
+def test_reports_count_in_words(tmp_path, capsys):
+    """One rigid crank: nothing is in the plural that is one."""
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"crank": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"k": {"node": "A", "stiffness": 1.0}},
+        "loads": {"push": {"type": "force", "node": "B", "value": [-2.0, 0.0]}},
+        "analysis": {"unstable": "stay"},
+    }
+    path = tmp_path / "crank.json"
+    path.write_text(json.dumps(table))
+    assert main(["run", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "unstable (1 way out)" in printed
+    assert "1 element SFET" in printed
+    assert "1 unknown," in printed

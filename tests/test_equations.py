@@ -1,12 +1,14 @@
 """The stationarity equations of whole models: derivatives of one Lagrangian, by differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import PLANE, ZOO, density, gauss_points, made, model_of
 from systems import EVERY, EVERYTHING
 
 from sfetcas import quaternion as quat
-from sfetcas.equations import Equations, State
+from sfetcas.equations import Equations
 from sfetcas.fields import Fields
 from sfetcas.interpolation import differentiation, evaluation
 from sfetcas.newton import relative_residual
@@ -25,7 +27,7 @@ def trial(name, assembly="closing", gauss=False, order=2, elements=2):
     equations, loading = Equations(model), model.loading(0.8)
     rng = np.random.default_rng(7)
     start = equations.start(loading)
-    start = State(start.q, rng.normal(size=start.y.shape), rng.normal(size=start.lam.shape))
+    start = replace(start, y=rng.normal(size=start.y.shape), lam=rng.normal(size=start.lam.shape))
     step = np.zeros(equations.total)
     step[: equations.turning_unknowns] = 0.5 * rng.normal(size=equations.turning_unknowns)
     return equations, loading, equations.moved(start, step)
@@ -163,7 +165,7 @@ def test_positive_part_and_elastic_entries(name, assembly, gauss):
     elastic = np.zeros((equations.total, equations.total))
     elastic[equations.row, equations.column] = equations.elastic_entries()
     rest = equations.start(equations.model.loading(0.0))
-    unloaded = State(rest.q, 0 * rest.y, 0 * rest.lam)
+    unloaded = replace(rest, y=0 * rest.y, lam=0 * rest.lam)
     plain = full(equations, equations.at(unloaded, equations.model.loading(0.0)))
     # Springs and small members act upon displacements too.
     part = np.concatenate([np.arange(n), equations.elastic_displacements])

@@ -3,6 +3,7 @@
 import copy
 import json
 import time
+from dataclasses import replace
 from pathlib import Path as File
 
 import numpy as np
@@ -14,7 +15,6 @@ from sfetcas.arclength import Curve, Tangent
 from sfetcas.charts import chart
 from sfetcas.cli import main
 from sfetcas.critical import events_between, root
-from sfetcas.equations import State
 from sfetcas.mesh import uniform_mesh
 from sfetcas.model import assemble
 from sfetcas.prepared import Prepared
@@ -387,7 +387,7 @@ def test_derivative_by_the_factor_is_that_of_the_equations():
         curve, start = curve_of(scene)
         rng = np.random.default_rng(1)
         state = curve.equations.moved(start.state, 0.1 * rng.standard_normal(curve.equations.total))
-        state = State(state.q, state.y, rng.standard_normal(len(state.lam)))
+        state = replace(state, lam=rng.standard_normal(len(state.lam)))
         factor, h = 0.4, 1e-4
 
         def residual(at, state=state, curve=curve):

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import scenes
+import systems
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
@@ -468,3 +469,57 @@ def test_scene_files_draw(tmp_path):
     figure = picture(solve(load(tmp_path / "a.toml")))
     assert texts(figure, "reaction-A") == ["0.5 N"]
     assert texts(figure, "reaction-B") == ["0.5 N"]
+
+
+# -- springs --------------------------------------------------------------------------------------
+
+
+def drawn(figure, name):
+    """Points (n, 2) of the lines with this name, each an array without the gaps."""
+    return [line.get_xydata()[np.isfinite(line.get_xydata()).all(axis=1)] for line in named(figure, name, Line2D)]
+
+
+def test_translational_springs_reach_from_end_to_end():
+    """A zigzag starts at the node and ends at the other node or where the ground holds it."""
+    solution = solve(scenes.made(systems.linked()), TIGHT)
+    figure, step = picture(solution), solution.last
+    (rope,) = drawn(figure, "spring-rope")
+    np.testing.assert_allclose(rope[[0, -1]], [step.position(n)[:2] for n in ("C", "A")], atol=1e-12)
+    pull, *ground = drawn(figure, "spring-pull")
+    np.testing.assert_allclose(pull[[0, -1]], [step.position("E")[:2], [2.0, 1.0]], atol=1e-12)
+    assert len(ground) == 2
+    push, *ground = drawn(figure, "spring-push")
+    along = (push[-1] - push[0]) / np.linalg.norm(push[-1] - push[0])
+    assert abs(along @ [1.0, 0.5]) == pytest.approx(np.hypot(1.0, 0.5), abs=1e-12)
+    assert len(ground) == 2
+    for line in (rope, pull, push):
+        x, y = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+        beside = (line - line[0]) @ [-y, x]
+        assert (np.diff(np.sign(beside[np.abs(beside) > 1e-9])) != 0).sum() >= 4
+
+
+@pytest.mark.parametrize("name", ["linked", "linked_space"])
+def test_rotational_springs_are_spirals_round_their_nodes(name):
+    """Round the node and, in space, across the axis that the first party carries."""
+    solution = solve(scenes.made(systems.SYSTEMS[name]()), TIGHT)
+    figure = picture(solution)
+    for spring, record in solution.scene.springs.items():
+        lines = drawn(figure, f"spring-{spring}")
+        if record.type == "translational":
+            assert lines
+        elif name == "linked":
+            (spiral,) = lines
+            radius = np.linalg.norm(spiral - solution.last.position(record.node)[:2], axis=1)
+            assert (np.diff(radius) > 0.0).all()
+            assert 0.02 < radius[-1] < 0.1
+        else:
+            (spiral,) = lines
+            assert len(spiral) > 100
+
+
+def test_a_spring_without_visible_length_hangs_on_the_ground():
+    spring = {"type": "translational", "node": "B", "stiffness": 1e6, "length": 0.0}
+    figure = picture(beam((0.0, 1e-3), springs={"stay": spring}))
+    line, *ground = drawn(figure, "spring-stay")
+    assert np.linalg.norm(line[-1] - line[0]) > 0.05
+    assert len(ground) == 2

@@ -7,7 +7,7 @@ import pytest
 from scenes import SOFT, cantilever, made
 
 import sfetcas
-from sfetcas import SceneError, solve
+from sfetcas import SceneError, SolveError, Status, solve
 
 BAR = {
     "sections": {"s": SOFT},
@@ -213,15 +213,6 @@ def test_release_at_a_joint_is_refused():
         made(table)
 
 
-def test_springs_in_space_turn_less_than_once():
-    table = cantilever() | {"dimension": "space", "springs": {"k": {"node": "A", "stiffness": 1.0}}}
-    table["nodes"]["A"]["support"] = "hinge"
-    with pytest.raises(SceneError, match=r"^springs\.k\.rest: found 7, accepted in space: up to 6 rad"):
-        made(table | {"springs": {"k": {"node": "A", "stiffness": 1.0, "rest": 7.0}}})
-    with pytest.raises(SceneError, match=r"^motions\.t\.rotation: turns springs\.k by 7 rad, accepted in space"):
-        made(table | {"motions": {"t": {"node": "A", "rotation": 7.0}}})
-
-
 def test_driven_slider_crank_of_rigid_links():
     """A closing without any displacement kept as an unknown."""
     table = {
@@ -237,3 +228,44 @@ def test_driven_slider_crank_of_rigid_links():
     angle, rod = np.arctan2(0.6, 0.8) + 1.2, np.hypot(2.2, 0.6)
     x = np.cos(angle) + np.sqrt(rod**2 - np.sin(angle) ** 2)
     np.testing.assert_allclose(step.position("Q"), [x, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-170, 1e150])
+def test_lengths_whose_squares_are_no_numbers_are_refused(size):
+    table = cantilever()
+    table["nodes"]["B"]["position"] = [size, 0.0]
+    with pytest.raises(SceneError, match=r"^members\.m: found a length of .* m, accepted: 1e-100 to 1e\+100 m"):
+        made(table)
+
+
+def two_loops(dimension="plane", **motions):
+    """A four-bar linkage of rigid links, and a crank beside it."""
+    at = {"A": (0, 0), "B": (0, 1), "C": (1.5, 1), "D": (1.5, 0), "E": (3, 0), "F": (3, 1)}
+    how = {"A": "support", "B": "joint", "C": "joint", "D": "support", "E": "support"}
+    links = {name: {"nodes": list(name.upper()), "type": "rigid"} for name in ("ab", "bc", "cd", "ef")}
+    nodes = {name: {"position": list(p)} | ({how[name]: "hinge"} if name in how else {}) for name, p in at.items()}
+    beside = {"beside": {"node": "E", "rotation": 0.2}}
+    return made({"dimension": dimension, "nodes": nodes, "members": links, "motions": {**motions, **beside}})
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+@pytest.mark.parametrize(
+    "other",
+    [{"node": "D", "rotation": 0.5}, {"node": "C", "between": ["bc", "cd"], "rotation": 0.7}],
+    ids=["support", "joint"],
+)
+def test_motions_that_contradict_each_other_are_named(dimension, other):
+    """Those of the same loop, not what moves beside it; and none where they agree."""
+    first = {"node": "A", "rotation": 0.3}
+    sentence = r"\(motions\.first and motions\.other contradict each other in closing of bc, x, closing of bc, y\)$"
+    with pytest.raises(SolveError, match=sentence) as caught:
+        solve(two_loops(dimension, first=first, other=other))
+    assert caught.value.status is Status.INFEASIBLE
+    # A parallelogram turns both cranks alike, and its coupler against them by the same angle.
+    agreeing = {**other, "rotation": 0.3}
+    assert solve(two_loops(dimension, first=first, other=agreeing)).last.certificate.residual < 1e-12
+
+
+def test_a_motion_beyond_reach_is_named():
+    with pytest.raises(SolveError, match=r"; motions\.away asks for more than there is in closing of bc, x"):
+        solve(two_loops(away={"node": "D", "displacement": [3.0, 0.0]}))

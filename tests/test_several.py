@@ -466,7 +466,7 @@ def test_report_and_json_show_every_equilibrium(tmp_path, capsys):
     file.write_text(json.dumps(cantilever((-1.5 * FIRST_LOAD, 0.0), analysis={"equilibria": "all"})))
     assert main(["run", str(file), "--json", str(tmp_path / "out.json")]) == 0
     report = capsys.readouterr().out
-    for line in ("factor 1, equilibrium 1 of 3", "factor 1, equilibrium 3 of 3", "unstable (1 ways out)"):
+    for line in ("factor 1, equilibrium 1 of 3", "factor 1, equilibrium 3 of 3", "unstable (1 way out)"):
         assert report.count(line) == 1
     steps = json.loads((tmp_path / "out.json").read_text())["steps"]
     assert [step["factor"] for step in steps] == [1.0, 1.0, 1.0]
