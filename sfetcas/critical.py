@@ -89,7 +89,9 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
             found[found.index(twin)] = Event("bifurcation", twin.standing, twin.multiplicity + 1)
         else:
             found.append(Event("bifurcation", standing))
-    return sorted(found, key=lambda event: event.standing.arc)
+    # Two complex eigenvalues whose real parts change their signs together make nothing singular.
+    met = [event for event in found if curve.prepared.singular(event.standing.point, event.multiplicity)]
+    return sorted(met, key=lambda event: event.standing.arc)
 
 
 def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing:

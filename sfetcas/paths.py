@@ -319,7 +319,7 @@ class _Run:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=level.notes,
+            notes=level.notes if curve.model.conservative else (*level.notes, NO_POTENTIAL),
             seconds=self.seconds,
         )
 
@@ -327,19 +327,20 @@ class _Run:
         """The answer of one stretch."""
         traced = stretch.traced
         kinds = {id(event.standing): event for event in traced.events}
-        points = tuple(_point(p, kinds.get(id(p)), curve.model.has_potential) for p in traced.points)
+        energy = curve.model.conservative
+        points = tuple(_point(p, kinds.get(id(p)), energy) for p in traced.points)
 
         def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
             numbered = zip(standings, notes, strict=True)
             return tuple(self._entry(curve, s, errors.get((kind, j)), n) for j, (s, n) in enumerate(numbered))
 
-        bends = [event for event in traced.events if event.kind == "bifurcation"]
-        limits, crossings = stretch.of_kind("limit"), stretch.crossings
+        crossings = stretch.crossings
+        bends, limits = ([e for e in traced.events if e.kind == kind] for kind in ("bifurcation", "limit"))
         return Branch(
             points=points,
             steps=entries("step", crossings, [()] * len(crossings)),
-            limit_points=entries("limit", limits, [()] * len(limits)),
-            bifurcations=entries("bifurcation", [e.standing for e in bends], [_manifold(e) for e in bends]),
+            limit_points=entries("limit", [e.standing for e in limits], [_said(e, energy) for e in limits]),
+            bifurcations=entries("bifurcation", [e.standing for e in bends], [_said(e, energy) for e in bends]),
             end=self._end(traced),
             bifurcation=stretch.bifurcation,
             side=stretch.side,
@@ -376,14 +377,30 @@ def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:
     return largest_difference(Fields(one.equations, a.state, a.loading), Fields(other.equations, b.state, b.loading))
 
 
-def _point(standing: Standing, event: Event | None, has_potential: bool) -> PathPoint:
-    negative, zero = standing.inertia.negative, standing.inertia.zero
-    stable: bool | str = (False if negative else "neutral" if zero else True) if has_potential else "not defined"
+def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:
+    negative, zero = (standing.inertia.negative, standing.inertia.zero) if has_energy else (0, 0)
+    stable: bool | str = (False if negative else "neutral" if zero else True) if has_energy else "not defined"
     kind = "" if event is None else {"limit": "limit point"}.get(event.kind, event.kind)
     return PathPoint(float(standing.factor), standing.state, standing.loading, negative, stable, standing.arc, kind)
 
 
-def _manifold(event: Event) -> tuple[str, ...]:
-    if event.multiplicity == 1:
-        return ()
-    return (f"{event.multiplicity} eigenvalues vanish at once: branches lead off along each combination of shapes",)
+def _said(event: Event, has_energy: bool) -> tuple[str, ...]:
+    """What has to be known of a point where the tangent is singular."""
+    notes: tuple[str, ...] = () if has_energy else (DIVERGENCE,)
+    if event.multiplicity > 1:
+        notes += (
+            f"{event.multiplicity} eigenvalues vanish at once: branches lead off along each combination of shapes, "
+            "those along the first shape alone are followed; switch(path, ..., shape=...) follows another",
+        )
+    return notes
+
+
+DIVERGENCE = (
+    "static divergence: the static tangent is singular, another equilibrium is adjacent; without a potential the "
+    "structure may have become unstable before by flutter, which only shows in dynamics"
+)
+
+NO_POTENTIAL = (
+    "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
+    "tangent is singular (divergence), and flutter would only show in dynamics"
+)
