@@ -37,8 +37,14 @@ ITERATIONS = 10
 TURN = 0.6
 """No node turns by more than this, rad, in the corrections of a step."""
 
+SHORT = 0.01
+"""Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its shape."""
+
 HELD = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
+
+NEUTRAL_FIRM = 1e3
+"""Times the weight of the proximal term along neutral directions: rounding of 1e-14 then leads 1e-7 rad along them."""
 
 HISTORY = 1e-5
 """Share of the unit of the factor over which loads with histories are differenced: second order, so 1e-10."""
@@ -92,7 +98,7 @@ class Curve:
     """
 
     def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
-        self.prepared, self.unit, self.piece = prepared, unit, piece
+        self.prepared, self.unit, self.piece, self.firm = prepared, unit, piece, 1.0
         equations = prepared.equations
         self.equations, self.model = equations, prepared.model
         turning = equations.turning_unknowns
@@ -109,6 +115,12 @@ class Curve:
         """The same curve between two factors."""
         there = copy.copy(self)
         there.piece = piece
+        return there
+
+    def firmer(self) -> Curve:
+        """The same curve where a direction is neutral all along it: rounding must not lead far astray there."""
+        there = copy.copy(self)
+        there.firm = NEUTRAL_FIRM
         return there
 
     # -- lengths --------------------------------------------------------------------------------
@@ -169,7 +181,7 @@ class Curve:
     def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
         """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
         entries = point.entries.copy()
-        entries[self._diagonal[0]] += firm * self._proximal
+        entries[self._diagonal[0]] += max(firm, self.firm) * self._proximal
         entries[self._diagonal[1]] -= DUAL
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
@@ -235,7 +247,7 @@ class Curve:
             step = base + change * rate
             length = float(np.abs(step[:n]).max(initial=0.0))
             turned += length
-            if not np.isfinite(length + change) or turned > TURN or (count and residual > 1e-9 and length > last):
+            if not np.isfinite(length + change) or turned > TURN or (count and residual > 1e-9 and length > max(last, SHORT)):
                 return None
             last = length
             loading = self.loading(factor + change)
@@ -263,7 +275,7 @@ class Curve:
 
         ``most``: largest turn of a node (rad) from there.
         """
-        found = self.prepared.correct(near.state, self.loading(factor), most=most)
+        found = self.prepared.correct(near.state, self.loading(factor), firm=self.firm, most=most)
         if not found.converged or self.prepared.distance(found.state, near.state) > most:
             return None
         return self.standing(found.state, factor, near.tangent, arc=near.arc)

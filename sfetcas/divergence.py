@@ -82,9 +82,12 @@ class TangentTest:
         these span what the tangent leaves open, while eigenvectors may coincide.
         """
         tangent, basis, _ = self._tangent(point)
-        values = self._eigenvalues(tangent).real
-        shapes = np.zeros((len(self._root), len(values)))
-        shapes[:, np.argsort(np.abs(values))] = (basis @ np.linalg.svd(tangent)[2].T)[:, ::-1]
+        if self._symmetric:
+            values, vectors = np.linalg.eigh(tangent)
+        else:
+            values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
+            vectors[:, np.argsort(np.abs(values))] = np.linalg.svd(tangent)[2][::-1].T
+        shapes = basis @ vectors
         return 0, values, (shapes / self._root[:, None])[: self._equations.turning_unknowns]
 
     def singular(self, point: Point, count: int) -> bool:

@@ -90,9 +90,9 @@ class Prepared:
         """A state to start from, and the gap of its closings."""
         return first_guess(self.equations, loading, self._test.weight)
 
-    def correct(self, state: State, loading: Loading, **limits: Any) -> Corrected:
-        """Newton's method from a near state."""
-        return correct(self.equations, state, loading, self._test.weight, **limits)
+    def correct(self, state: State, loading: Loading, *, firm: float = 1.0, **limits: Any) -> Corrected:
+        """Newton's method from a near state, with a proximal term that may be made firmer."""
+        return correct(self.equations, state, loading, firm * self._test.weight, **limits)
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:

@@ -242,7 +242,7 @@ class StabilityTest:
             return int(self._ldl.neig(matrix))
         schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
         values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
-        return int(self._ldl.neig(matrix)) - int((values < -RANK * np.abs(values).max()).sum())
+        return int(self._ldl.neig(matrix)) - int((values < -REDUNDANT * np.abs(values).max()).sum())
 
     def _below_bordered(self, point: Point, shift: float) -> int:
         """The same from the whole Newton matrix, with closings and displacements very slightly soft.
@@ -331,7 +331,7 @@ class StabilityTest:
         block = np.random.default_rng(0).standard_normal((n, width))
         loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
         shifted = point.entries.copy()
-        shifted[equations.diagonal[self._chosen]] += NEUTRAL**2 * self._weights
+        shifted[equations.diagonal[self._chosen]] += BESIDE * self._weights
         shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
         equations.solver.factor(shifted)
         for _ in range(60):
@@ -346,6 +346,9 @@ class StabilityTest:
             last = values[nearest]
         return values[nearest], block[:, nearest]
 
+
+BESIDE = 1.3e-4
+"""Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
 
 NEAREST = 4
 """Eigenvalues that are looked at around zero where there are many: in space two may vanish at once."""
@@ -364,6 +367,12 @@ SOFT = 1e-9
 
 BROKEN = 1e-2
 """Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
+
+REDUNDANT = 1e-13
+"""Eigenvalues of the closings' complement below this, relative to the largest, come of redundant ones: rounding.
+
+A neutral direction shifted by 1e-7 leaves 1e-8 there, while the largest may be 1e3 and more.
+"""
 
 RANK = 1e-10
 """Singular values below this, relative to the largest, are zero."""
