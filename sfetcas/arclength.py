@@ -247,7 +247,11 @@ class Curve:
             step = base + change * rate
             length = float(np.abs(step[:n]).max(initial=0.0))
             turned += length
-            if not np.isfinite(length + change) or turned > TURN or (count and residual > 1e-9 and length > max(last, SHORT)):
+            if (
+                not np.isfinite(length + change)
+                or turned > TURN
+                or (count and residual > 1e-9 and length > max(last, SHORT))
+            ):
                 return None
             last = length
             loading = self.loading(factor + change)

@@ -1,10 +1,10 @@
 """Where the static tangent under loads without potential becomes singular: divergence.
 
 Such loads make the Newton matrix H unsymmetric.  With A the derivative of the closings, N a basis of the null space
-of A and M a weight, the eigenvalues mu of ``N^T H N x = mu N^T M N x`` may be complex; the tangent is singular where one
-of them is zero.  Along a path a real one does so by changing its sign, and two at once where a symmetry makes them
-equal: then the determinant keeps its sign, while the number of eigenvalues with a negative real part changes by two.  A
-complex pair whose real part changes its sign leaves the tangent regular.
+of A and M a weight, the eigenvalues mu of ``N^T H N x = mu N^T M N x`` may be complex; the tangent is singular where
+one of them is zero.  Along a path a real one does so by changing its sign, and two at once where a symmetry makes
+them equal: then the determinant keeps its sign, while the number of eigenvalues with a negative real part changes by
+two.  A complex pair whose real part changes its sign leaves the tangent regular.
 
 What these numbers say of stability is one thing only: at a zero another equilibrium is adjacent (static divergence).
 Flutter does not show in them.  Where the loads have a potential all the same, as even pressure on a closed

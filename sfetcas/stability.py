@@ -21,7 +21,7 @@ from .arrays import Array
 from .equations import Equations, Point
 from .linear import inertia_solver, pattern
 
-__all__ = ["LIGHT", "Inertia", "Stability", "StabilityTest"]
+__all__ = ["LIGHT", "NEUTRAL", "RANK", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
 
 NEUTRAL = 1e-7
 """Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
