@@ -11,6 +11,7 @@ Multipliers take no part in lengths: where a structure carries more load without
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -36,6 +37,9 @@ ITERATIONS = 10
 
 TURN = 0.6
 """No node turns by more than this, rad, in the corrections of a step."""
+
+DOUBT = 30.0
+"""A load of size one that moves more than this may meet an eigenvalue that vanishes: one of 1e-7 answers 1e5 times."""
 
 SHORT = 0.01
 """Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its shape."""
@@ -67,12 +71,13 @@ class Standing:
     state, factor, loading, point
         The equilibrium and the equations there.
     tangent : Tangent
-    inertia : Inertia
-        Numbers of negative and of vanishing eigenvalues of the energy on the closings.
     arc : float
         Arc length from the start of the curve.
     iterations : int
         Newton iterations that led here.
+    prepared : Prepared
+    doubtful : bool
+        Whether an eigenvalue may vanish: something answers more than usual.
     """
 
     state: State
@@ -80,9 +85,15 @@ class Standing:
     loading: Loading
     point: Point
     tangent: Tangent
-    inertia: Inertia
     arc: float
     iterations: int
+    prepared: Prepared
+    doubtful: bool
+
+    @functools.cached_property
+    def inertia(self) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues of the energy on the closings."""
+        return self.prepared.inertia(self.point, doubtful=self.doubtful)
 
 
 class Curve:
@@ -167,14 +178,19 @@ class Curve:
             there = self.loading(factor).plus(rate.scaled(w))
             return self.equations.at(self.equations.holding(state, there), there).residual
 
-        turning = max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven)
-        if turning == 0.0 and rate.nodal:
+        turning, nodal = self._steady if self._linear else _kind(rate)
+        if turning == 0.0 and nodal:
             return self.equations.slope(point, rate)
         if turning == 0.0:
             return np.asarray((residual(self.unit) - point.residual) / self.unit)
         h = min(self.unit, HELD / turning)
         a, b = ((residual(w) - residual(-w)) / (2.0 * w) for w in (h, 2.0 * h))
         return np.asarray((4.0 * a - b) / 3.0)
+
+    @functools.cached_property
+    def _steady(self) -> tuple[float, bool]:
+        """What :func:`_kind` says where no history changes it."""
+        return _kind(self.model.groups[None])
 
     # -- points ---------------------------------------------------------------------------------
 
@@ -186,16 +202,26 @@ class Curve:
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
-    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> Tangent:
-        """Direction of the curve at a state, to the side of another direction."""
+    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> tuple[Tangent, bool]:
+        """Direction of the curve at a state, to the side of another, and whether an eigenvalue may vanish there."""
         try:
-            rate = self.solved(point, -self.slope(state, factor, point))
+            both = self.solved(point, np.column_stack([-self.slope(state, factor, point), self._probe]))
         except np.linalg.LinAlgError:
-            return along
-        if not np.all(np.isfinite(rate)):
-            return along
+            return along, True
+        if not np.all(np.isfinite(both)):
+            return along, True
+        rate, answer = both[: len(self.weight), 0], both[: self._turning, 1]
         found = self.normed(Tangent(rate, 1.0))
-        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor)
+        doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
+        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor), doubtful
+
+    @functools.cached_property
+    def _probe(self) -> Array:
+        """A load of size one that has a share in every shape: where an eigenvalue vanishes it moves much."""
+        weight, probe = self.prepared.weight, np.zeros(self.equations.total)
+        shape = np.random.default_rng(0).standard_normal(self._turning)
+        probe[: self._turning] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), 1e-300))
+        return probe
 
     def standing(
         self, state: State, factor: float, along: Tangent, *, arc: float = 0.0, iterations: int = 0
@@ -203,8 +229,8 @@ class Curve:
         """Everything that is known of an equilibrium on the curve."""
         loading = self.loading(factor)
         point = self.equations.at(state, loading)
-        tangent = self.tangent(state, factor, point, along)
-        return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, iterations)
+        tangent, doubtful = self.tangent(state, factor, point, along)
+        return Standing(state, factor, loading, point, tangent, arc, iterations, self.prepared, doubtful)
 
     def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
         """State and factor a length along the tangent, bent by the rate of the tangent over the arc."""
@@ -265,9 +291,9 @@ class Curve:
                 return None
         if not (residual <= TOLERANCE or (not sharp and self._passes(point, residual))):
             return None
-        tangent = self.tangent(state, factor, point, across)
+        tangent, doubtful = self.tangent(state, factor, point, across)
         loading = self.loading(factor)
-        return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, count)
+        return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
 
     def _passes(self, point: Point, residual: float) -> bool:
         """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
@@ -304,3 +330,8 @@ class Curve:
         if arc == 0.0:
             return None
         return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
+
+
+def _kind(rate: Loading) -> tuple[float, bool]:
+    """Largest angle or travel of driven nodes and joints, and whether there is nothing but nodal loads and motions."""
+    return max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven), rate.nodal

@@ -39,8 +39,14 @@ LEVELS = 10
 MARGIN = 16.0
 """A halving gains this many times less than its order promises, as far as estimates go."""
 
+HOPED = 4.0
+"""Times more than that is hoped for when meshes are skipped."""
+
 PATIENCE = 5
 """After so many halvings one that does not halve the error is the last."""
+
+FEW_ELEMENTS = 16
+"""A first mesh of so many elements costs less than to look whether fewer would do."""
 
 MOST_ELEMENTS = 3000
 """A mesh that the library chooses does not grow beyond this."""
@@ -190,21 +196,26 @@ class _Run:
             hopeless = count >= PATIENCE and largest > 0.5 * last
             if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
                 break
-            coarse, last = self._next(fine, largest, gain), largest
+            coarse, last = self._next(fine, gain * largest, gain), largest
         return self._answer(fine, errors, begin)
 
     def _next(self, fine: _Level, error: float, gain: float) -> _Level:
-        """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks."""
-        halvings = int(np.log(error / self.accuracy) / np.log(max(gain, 2.0))) if np.isfinite(error) else 0
+        """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks.
+
+        ``error`` is that of the level before the fine one.  That of the next may be so much above the accuracy as
+        a halving is sure to gain; where what is hoped for until then does not come, one more halving follows.
+        """
+        hoped = max(2.0, HOPED * gain)
+        wanted = np.log(max(error / (self.accuracy * gain), 1.0)) / np.log(hoped) if np.isfinite(error) else 0.0
         mesh = fine.curve.model.mesh
-        for _ in range(min(halvings, 3)):
+        for _ in range(min(int(np.ceil(wanted - 0.25)) - 1, 3)):
             mesh = self._halved(mesh) if 4 * mesh.elements <= MOST_ELEMENTS else mesh
         return fine if mesh is fine.curve.model.mesh else self._level(mesh)
 
     def _first_mesh(self) -> Mesh:
         """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
         plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
-        if graded.elements <= 2 * plain.elements:
+        if graded.elements <= max(2 * plain.elements, FEW_ELEMENTS):
             return graded
         curve, start, _ = begin_path(self._prepared(plain), self.span)
         met = [point.factor for point in trace(curve, start, self.span, self.analysis.points, self.knots).points]

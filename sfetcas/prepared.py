@@ -102,12 +102,14 @@ class Prepared:
         """The stability test at a state; without a potential no energy tells stable from unstable."""
         return (self._test if self.model.has_potential else self._tangent).test(found.point)
 
-    def inertia(self, point: Point) -> Inertia:
-        """Numbers of negative and of vanishing eigenvalues; paths ask here.
+    def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues, these only where it is ``doubtful``; paths ask here.
 
         Without a potential of those of the tangent, see :class:`~sfetcas.divergence.TangentTest`.
         """
-        return (self._test if self.model.has_potential else self._tangent).inertia(point)
+        return (
+            self._test.inertia(point, doubtful=doubtful) if self.model.has_potential else self._tangent.inertia(point)
+        )
 
     def around_zero(self, point: Point) -> tuple[int, Array, Array]:
         """Eigenvalues around zero, see :class:`~sfetcas.stability.StabilityTest`; real parts without a potential."""

@@ -174,15 +174,15 @@ class StabilityTest:
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
-    def inertia(self, point: Point) -> Inertia:
-        """Numbers of negative and of vanishing eigenvalues alone."""
+    def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues alone; many unknowns: of these only where it is doubtful."""
         if self._n == 0:
             return Inertia(0, 0)
         entries = self._weighted(point)
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
         if not self._is_dense:
             below = self._below(point, entries, -limit)
-            return Inertia(below, self._below(point, entries, limit) - below)
+            return Inertia(below, 0) if not doubtful else Inertia(below, self._below(point, entries, limit) - below)
         values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
         below = int((values < -limit).sum())
         return Inertia(below, int((values <= limit).sum()) - below)
