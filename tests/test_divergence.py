@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 from scenes import made
-from test_paths import curve_of
+from test_paths import PROBLEMS, curve_of
 
-from sfetcas import Scene, SceneError, solve
+from sfetcas import Prepared, Scene, SceneError, load, solve
+from sfetcas.beginning import begin_path
+from sfetcas.mesh import uniform_mesh
+from sfetcas.model import assemble
 from sfetcas.pressure import is_pressure
+from sfetcas.tracing import trace
 
 
 def column(follower, space=False, **analysis):
@@ -118,6 +122,18 @@ def test_tangent_under_pressure_is_symmetric_but_for_the_mesh():
     # Of the lowest shapes; of the highest that a mesh carries it falls more slowly.
     assert skew(ring(), 4) < 1e-2 * skew(ring(), 2)
     assert skew(cantilever, 4) > 0.1
+
+
+def test_ring_that_may_roll_buckles_at_the_twist_of_michell():
+    """A neutral direction all along the path, and two eigenvalues that vanish at once, on one coarse mesh."""
+    scene = load(PROBLEMS / "ring_twisted.toml")
+    prepared = Prepared(assemble(scene, uniform_mesh(scene, 6, 2)))
+    curve, start, _ = begin_path(prepared, scene.analysis.span)
+    assert (start.inertia.negative, start.inertia.zero) == (0, 1)
+    (event,) = trace(curve, start, scene.analysis.span, 200).events
+    assert (event.kind, event.multiplicity) == ("bifurcation", 2)
+    # Eight elements of order 12 leave 4e-9.
+    assert event.standing.factor == pytest.approx(2.0 * np.pi * np.sqrt(3.0) / 0.75, rel=3e-8)
 
 
 def changed(change):
