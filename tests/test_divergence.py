@@ -66,7 +66,7 @@ def test_column_whose_force_follows_more_than_by_half_never_diverges(space):
 
 
 def arch(frame):
-    shape = {"type": "arc", "angle": -0.5}
+    member = {"section": "strip", "shape": {"type": "arc", "angle": -0.5}, "element": "SFET5", "elements": 3}
     return {
         "sections": {"strip": {"EI3": 1.0}},
         "nodes": {
@@ -75,11 +75,11 @@ def arch(frame):
             "right": {"position": [1, 0], "support": "hinge"},
         },
         "members": {
-            "left": {"nodes": ["left", "crown"], "section": "strip", "shape": shape},
-            "right": {"nodes": ["crown", "right"], "section": "strip", "shape": shape},
+            "left": member | {"nodes": ["left", "crown"]},
+            "right": member | {"nodes": ["crown", "right"]},
         },
         "loads": {"crown": {"type": "force", "node": "crown", "value": [0, -1], "frame": frame}},
-        "analysis": {"type": "path", "range": [-60, 60], "points": 60, "accuracy": 1e-8},
+        "analysis": {"type": "path", "range": [-60, 60], "points": 60},
     }
 
 
@@ -127,13 +127,13 @@ def test_tangent_under_pressure_is_symmetric_but_for_the_mesh():
 def test_ring_that_may_roll_buckles_at_the_twist_of_michell():
     """A neutral direction all along the path, and two eigenvalues that vanish at once, on one coarse mesh."""
     scene = load(PROBLEMS / "ring_twisted.toml")
-    prepared = Prepared(assemble(scene, uniform_mesh(scene, 6, 2)))
+    prepared = Prepared(assemble(scene, uniform_mesh(scene, 4, 4)))
     curve, start, _ = begin_path(prepared, scene.analysis.span)
     assert (start.inertia.negative, start.inertia.zero) == (0, 1)
     (event,) = trace(curve, start, scene.analysis.span, 200).events
     assert (event.kind, event.multiplicity) == ("bifurcation", 2)
-    # Eight elements of order 12 leave 4e-9.
-    assert event.standing.factor == pytest.approx(2.0 * np.pi * np.sqrt(3.0) / 0.75, rel=3e-8)
+    # What sixteen elements of order eight leave; the two eigenvalues differed by 1e-5 of it where they were not met.
+    assert event.standing.factor == pytest.approx(2.0 * np.pi * np.sqrt(3.0) / 0.75, rel=2e-7)
 
 
 def changed(change):
