@@ -11,6 +11,7 @@ Multipliers take no part in lengths: where a structure carries more load without
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -40,8 +41,17 @@ TURN = 0.6
 FIRMER = 1e3
 """Times the weight of the proximal term for a second attempt between two points of the curve."""
 
+DOUBT = 30.0
+"""A load of size one that moves more than this may meet an eigenvalue that vanishes: one of 1e-7 answers 1e5 times."""
+
+SHORT = 0.01
+"""Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its shape."""
+
 HELD = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
+
+NEUTRAL_FIRM = 1e3
+"""Times the weight of the proximal term along neutral directions: rounding of 1e-14 then leads 1e-7 rad along them."""
 
 HISTORY = 1e-5
 """Share of the unit of the factor over which loads with histories are differenced: second order, so 1e-10."""
@@ -64,12 +74,13 @@ class Standing:
     state, factor, loading, point
         The equilibrium and the equations there.
     tangent : Tangent
-    inertia : Inertia
-        Numbers of negative and of vanishing eigenvalues of the energy on the closings.
     arc : float
         Arc length from the start of the curve.
     iterations : int
         Newton iterations that led here.
+    prepared : Prepared
+    doubtful : bool
+        Whether an eigenvalue may vanish: something answers more than usual.
     """
 
     state: State
@@ -77,9 +88,15 @@ class Standing:
     loading: Loading
     point: Point
     tangent: Tangent
-    inertia: Inertia
     arc: float
     iterations: int
+    prepared: Prepared
+    doubtful: bool
+
+    @functools.cached_property
+    def inertia(self) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues of the energy on the closings."""
+        return self.prepared.inertia(self.point, doubtful=self.doubtful)
 
 
 class Curve:
@@ -95,7 +112,7 @@ class Curve:
     """
 
     def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
-        self.prepared, self.unit, self.piece = prepared, unit, piece
+        self.prepared, self.unit, self.piece, self.firm = prepared, unit, piece, 1.0
         equations = prepared.equations
         self.equations, self.model = equations, prepared.model
         turning = equations.turning_unknowns
@@ -112,6 +129,12 @@ class Curve:
         """The same curve between two factors."""
         there = copy.copy(self)
         there.piece = piece
+        return there
+
+    def firmer(self) -> Curve:
+        """The same curve where a direction is neutral all along it: rounding must not lead far astray there."""
+        there = copy.copy(self)
+        there.firm = NEUTRAL_FIRM
         return there
 
     # -- lengths --------------------------------------------------------------------------------
@@ -158,8 +181,8 @@ class Curve:
             there = self.loading(factor).plus(rate.scaled(w))
             return self.equations.at(self.equations.holding(state, there), there).residual
 
-        turning = max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven)
-        if turning == 0.0 and rate.nodal:
+        turning, nodal = self._steady if self._linear else _kind(rate)
+        if turning == 0.0 and nodal:
             return self.equations.slope(point, rate)
         if turning == 0.0:
             return np.asarray((residual(self.unit) - point.residual) / self.unit)
@@ -167,26 +190,41 @@ class Curve:
         a, b = ((residual(w) - residual(-w)) / (2.0 * w) for w in (h, 2.0 * h))
         return np.asarray((4.0 * a - b) / 3.0)
 
+    @functools.cached_property
+    def _steady(self) -> tuple[float, bool]:
+        """What :func:`_kind` says where no history changes it."""
+        return _kind(self.model.groups[None])
+
     # -- points ---------------------------------------------------------------------------------
 
     def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
         """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
         entries = point.entries.copy()
-        entries[self._diagonal[0]] += firm * self._proximal
+        entries[self._diagonal[0]] += max(firm, self.firm) * self._proximal
         entries[self._diagonal[1]] -= DUAL
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
-    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> Tangent:
-        """Direction of the curve at a state, to the side of another direction."""
+    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> tuple[Tangent, bool]:
+        """Direction of the curve at a state, to the side of another, and whether an eigenvalue may vanish there."""
         try:
-            rate = self.solved(point, -self.slope(state, factor, point))
+            both = self.solved(point, np.column_stack([-self.slope(state, factor, point), self._probe]))
         except np.linalg.LinAlgError:
-            return along
-        if not np.all(np.isfinite(rate)):
-            return along
+            return along, True
+        if not np.all(np.isfinite(both)):
+            return along, True
+        rate, answer = both[: len(self.weight), 0], both[: self._turning, 1]
         found = self.normed(Tangent(rate, 1.0))
-        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor)
+        doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
+        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor), doubtful
+
+    @functools.cached_property
+    def _probe(self) -> Array:
+        """A load of size one that has a share in every shape: where an eigenvalue vanishes it moves much."""
+        weight, probe = self.prepared.weight, np.zeros(self.equations.total)
+        shape = np.random.default_rng(0).standard_normal(self._turning)
+        probe[: self._turning] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), 1e-300))
+        return probe
 
     def standing(
         self, state: State, factor: float, along: Tangent, *, arc: float = 0.0, iterations: int = 0
@@ -194,8 +232,8 @@ class Curve:
         """Everything that is known of an equilibrium on the curve."""
         loading = self.loading(factor)
         point = self.equations.at(state, loading)
-        tangent = self.tangent(state, factor, point, along)
-        return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, iterations)
+        tangent, doubtful = self.tangent(state, factor, point, along)
+        return Standing(state, factor, loading, point, tangent, arc, iterations, self.prepared, doubtful)
 
     def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
         """State and factor a length along the tangent, bent by the rate of the tangent over the arc."""
@@ -238,7 +276,11 @@ class Curve:
             step = base + change * rate
             length = float(np.abs(step[:n]).max(initial=0.0))
             turned += length
-            if not np.isfinite(length + change) or turned > TURN or (count and residual > 1e-9 and length > last):
+            if (
+                not np.isfinite(length + change)
+                or turned > TURN
+                or (count and residual > 1e-9 and length > max(last, SHORT))
+            ):
                 return None
             last = length
             loading = self.loading(factor + change)
@@ -252,9 +294,9 @@ class Curve:
                 return None
         if not (residual <= TOLERANCE or (not sharp and self._passes(point, residual))):
             return None
-        tangent = self.tangent(state, factor, point, across)
+        tangent, doubtful = self.tangent(state, factor, point, across)
         loading = self.loading(factor)
-        return Standing(state, factor, loading, point, tangent, self.prepared.inertia(point), arc, count)
+        return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
 
     def _passes(self, point: Point, residual: float) -> bool:
         """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
@@ -266,7 +308,7 @@ class Curve:
 
         ``most``: largest turn of a node (rad) from there.
         """
-        found = self.prepared.correct(near.state, self.loading(factor), most=most)
+        found = self.prepared.correct(near.state, self.loading(factor), firm=self.firm, most=most)
         if not found.converged or self.prepared.distance(found.state, near.state) > most:
             return None
         return self.standing(found.state, factor, near.tangent, arc=near.arc)
@@ -294,3 +336,8 @@ class Curve:
         if arc == 0.0:
             return None
         return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
+
+
+def _kind(rate: Loading) -> tuple[float, bool]:
+    """Largest angle or travel of driven nodes and joints, and whether there is nothing but nodal loads and motions."""
+    return max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven), rate.nodal

@@ -366,17 +366,23 @@ def _peak() -> str:
 
 
 def path() -> None:
-    """Equilibria along a path against single solves from the undeformed state, both at the default accuracy."""
-    print("Paths: points, limit points, seconds; milliseconds a point and of a single solve; what 100 points cost\n")
-    courses = {"Lee's frame": (lee_frame(), [-1.5, 2.5], 1.0), "215-degree arch": (arch(), [-100.0, 1000.0], 500.0)}
+    """Equilibria along a path against single solves from the undeformed state, both at the same accuracy."""
+    print("Paths: accuracy, points, limit points, seconds; milliseconds a point and of a single solve; 100 points\n")
+    strip = CrossSection(EI2=14400.0, EI3=1440.0, GJ=3000.0)
+    courses = {
+        "Lee's frame": (lee_frame(), [-1.5, 2.5], 1.0),
+        "the same in space": (lee_frame().replace(dimension="space", sections={"strip": strip}), [-1.5, 2.5], 1.0),
+        "215-degree arch": (arch(), [-100.0, 1000.0], 500.0),
+    }
     for name, (scene, factors, factor) in courses.items():
-        along = scene.replace(analysis=Analysis(type="path", range=factors))
-        seconds, found = _median(lambda along=along: follow_path(along, Settings()), 3)  # type: ignore[misc]
-        single = scene.replace(analysis=Analysis(steps=[factor]))
-        cold, _ = _median(lambda single=single: solve(single), 5)  # type: ignore[misc]
-        count, each = len(found.points), seconds / len(found.points)
-        figures = f"{count:4d} {len(found.limit_points):3d} {seconds:8.3f} s {1e3 * each:8.2f} {1e3 * cold:8.2f} ms"
-        print(f"{name:>16} {figures}   100 points: {100.0 * each / cold:.1f} single solves")
+        for accuracy in (1e-4, 1e-6, 1e-8):
+            along = scene.replace(analysis=Analysis(type="path", range=factors, accuracy=accuracy))
+            seconds, found = _median(lambda along=along: follow_path(along, Settings()), 3)  # type: ignore[misc]
+            single = scene.replace(analysis=Analysis(steps=[factor], accuracy=accuracy))
+            cold, _ = _median(lambda single=single: solve(single), 5)  # type: ignore[misc]
+            count, each = len(found.points), seconds / len(found.points)
+            figures = f"{count:4d} {len(found.limit_points):3d} {seconds:8.3f} s {1e3 * each:8.2f} {1e3 * cold:8.2f} ms"
+            print(f"{name:>18} {accuracy:.0e} {figures}   100 points: {100.0 * each / cold:.1f} single solves")
 
 
 def start() -> None:

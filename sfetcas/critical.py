@@ -21,8 +21,14 @@ __all__ = ["Event", "at_factors", "events_between", "root", "shapes_at"]
 SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
 
+ZERO = 1e-10
+"""Share of a function's values at the two points below which there is nothing but rounding."""
+
 APART = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
+
+CLOSE = 0.1
+"""Share of the arc between the two points within which a point leads to the next that is looked at."""
 
 ASIDE = 0.01
 """Share of the arc at which a bifurcation point is interpolated from both sides."""
@@ -89,7 +95,9 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
             found[found.index(twin)] = Event("bifurcation", twin.standing, twin.multiplicity + 1)
         else:
             found.append(Event("bifurcation", standing))
-    return sorted(found, key=lambda event: event.standing.arc)
+    # Two complex eigenvalues whose real parts change their signs together make nothing singular.
+    met = [event for event in found if curve.prepared.singular(event.standing.point, event.multiplicity)]
+    return sorted(met, key=lambda event: event.standing.arc)
 
 
 def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing:
@@ -135,11 +143,19 @@ def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], f
 
 def _sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float]) -> Standing | None:
     """The point between two others at which a function of the points vanishes."""
-    at = curve.between(a, b)
-    found: dict[float, Standing] = {0.0: a, b.arc - a.arc: b}
+    at, arc = curve.between(a, b), b.arc - a.arc
+    found: dict[float, Standing] = {0.0: a, arc: b}
+
+    def beside(length: float) -> Standing | None:
+        """From the nearest point found so far: from afar Newton's method may miss what is nearly singular."""
+        near = min(found, key=lambda place: abs(place - length))
+        share = curve.inner(found[near].tangent, a.tangent)
+        if near == arc or abs(length - near) > CLOSE * arc or share < 0.5:
+            return None
+        return curve.corrected(*curve.predicted(found[near], (length - near) / share), a.tangent, a.arc + length)
 
     def function(length: float) -> float:
-        standing = at(length)
+        standing = beside(length) or at(length)
         if standing is None:
             return np.nan
         found[length] = standing
@@ -160,6 +176,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
     if a == b or fa * fb >= 0.0 or not np.isfinite(fa * fb):
         return a if abs(fa) < abs(fb) else b
     # b is the latest place, a the other end of the bracket.
+    least_value = ZERO * min(abs(fa), abs(fb))
     tolerance, share = SHARP * abs(b - a), min(max(fa / (fa - fb), 0.05), 0.95)
     for _ in range(60):
         x = a + share * (b - a)
@@ -171,7 +188,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
         else:
             c, fc, b, fb, a, fa = b, fb, a, fa, x, fx
         least = tolerance / max(abs(b - a), 1e-300)
-        if fa == 0.0 or least > 0.5:
+        if abs(fa) <= least_value or least > 0.5:
             break
         share = 0.5
         xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)

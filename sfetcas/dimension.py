@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from .arrays import Array
 from .contacts import Contact
 from .loads import Load, Motion
+from .quaternion import rotate
 from .shapes import CenterLine
 from .springs import Spring
 from .structure import Member, Node
@@ -36,7 +38,7 @@ def out_of_plane(
     findings = (
         _nodes(nodes),
         _members(lines),
-        _loads(loads),
+        _loads(loads, lines),
         _motions(motions),
         _springs(springs),
         _cylindrical(nodes, members),
@@ -82,8 +84,14 @@ def _cylindrical(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> It
             yield ("members", name, "release"), "turns about a line that is not along z"
 
 
-def _loads(loads: Mapping[str, Load]) -> Iterator[Finding]:
+def _loads(loads: Mapping[str, Load], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
     for name, load in loads.items():
+        if load.frame == "section":
+            # Along a plane line the sections turn about z: what leaves x-y at the start does so everywhere.
+            start = lines[str(load.member)].quaternions(np.zeros(1))
+            if _leaves(rotate(start, np.asarray(load.vector))[0]):
+                yield ("loads", name, "value"), "leaves x-y"
+            continue
         if load.type == "moment" and _turns_out(load.vector):
             yield ("loads", name, "value"), "is not about z"
         if load.type != "moment" and _leaves(load.vector):
@@ -120,7 +128,7 @@ def _contacts(contacts: Mapping[str, Contact]) -> Iterator[Finding]:
             yield ("contacts", name, "center"), "has a z component"
 
 
-def _leaves(vector: Triple) -> bool:
+def _leaves(vector: Triple | Array) -> bool:
     return abs(vector[2]) > _ROUNDING * max(abs(vector[0]), abs(vector[1]))
 
 

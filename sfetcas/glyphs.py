@@ -408,7 +408,9 @@ def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> 
         return
     places = sketch.along(load.member, x)
     values = np.broadcast_to(value, places.shape)
-    if load.frame == "follower":
+    if load.frame == "section":
+        values = quaternion.rotate(sketch.step.model.scene.center_lines[load.member].quaternions(x), values)
+    if load.frame != "fixed":
         values = quaternion.rotate(sketch.step.along(load.member, x)["quaternion"], values)
     ends = places - 0.6 * ARROW * sketch.size * (profile / peak)[:, None] * values / norm(value)
     ink = Ink(f"load-{name}", LOAD, 1.0)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from . import quaternion
 from .arrays import Array, Index
 from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
@@ -290,8 +291,15 @@ class _Writer:
         else:
             x = self.places(str(load.member))
             profile = np.ones(x.shape) if load.profile is None else evaluate(load.profile, x.ravel()).reshape(x.shape)
-            density = profile[..., None] * self.vector(load.vector)
+            density = profile[..., None] * self._along(load, x)
             self.spread(group, str(load.member), density, follows=load.follows)
+
+    def _along(self, load: Load, x: Array) -> Array:
+        """Value of a distributed load at places of its member, fixed axes of the undeformed scene."""
+        if load.frame != "section":
+            return self.vector(load.vector)
+        turned = self.scene.center_lines[str(load.member)].quaternions(x.ravel())
+        return quaternion.rotate(turned, np.asarray(load.vector))[:, : self.element.axes].reshape(*x.shape, -1)
 
     def _add_moment(self, group: Loading, name: str, load: Load) -> None:
         value = np.asarray(load.vector) / self.scales.moment

@@ -80,7 +80,8 @@ class Load(Staged):
     node : name of the node it acts on; or
     member, at : name of the member, and the fraction of its length; a distributed load acts along all of it
     value : (3,), fixed axes of the undeformed scene; a moment about z may be one number
-    frame : fixed, or follower: the value turns with the node, or with the section under it
+    frame : fixed, or follower: the value turns with the node, or with the section under it; section, of a
+        distributed load: the value is along b1, b2, b3 of the sections and turns with them
     profile : factor along a distributed load
     history : name of the history that replaces the step's factor
     """
@@ -90,7 +91,7 @@ class Load(Staged):
     member: str | None = None
     at: Fraction | None = None
     value: Turn
-    frame: Literal["fixed", "follower"] = "fixed"
+    frame: Literal["fixed", "follower", "section"] = "fixed"
     profile: Varying | None = None
     history: str | None = None
 
@@ -100,6 +101,8 @@ class Load(Staged):
         if self.type != "moment" and isinstance(self.value, float):
             accepted = "[x, y] or [x, y, z]; only a moment may be one number"
             raise SceneError(f"found {self.value:g}, accepted: {accepted}", ("value",))
+        if self.type != "distributed" and self.frame == "section":
+            raise SceneError(f"found 'section', accepted of a {self.type}: fixed or follower", ("frame",))
         if self.type != "distributed" and self.profile is not None:
             raise SceneError(f"not accepted with a {self.type}; only a distributed load has a profile", ("profile",))
         return self
@@ -129,7 +132,7 @@ class Load(Staged):
     @property
     def follows(self) -> bool:
         """Whether it is a force that turns with what it acts on."""
-        return self.frame == "follower" and self.type != "moment"
+        return self.frame != "fixed" and self.type != "moment"
 
     @property
     def vector(self) -> tuple[float, float, float]:

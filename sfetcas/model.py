@@ -23,6 +23,7 @@ from .errors import SceneError
 from .loading import Followers, Loading, find_followers, unit_loadings
 from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
+from .pressure import is_pressure
 from .records import counted
 from .rotations import Rotations, Turn, number_rotations
 from .scene import Scene
@@ -125,6 +126,11 @@ class Model:
         free = self.rotations.kind == Turn.FREE
         turning = self.space and any(group.moment[free].any() for group in self.groups.values())
         return not turning and not any(group.follows for group in self.groups.values())
+
+    @functools.cached_property
+    def conservative(self) -> bool:
+        """Whether there is an energy: the loads have a potential, or what follows is pressure, which has one too."""
+        return self.has_potential or is_pressure(self.scene)
 
     @functools.cached_property
     def minimisable(self) -> bool:

@@ -39,8 +39,14 @@ LEVELS = 10
 MARGIN = 16.0
 """A halving gains this many times less than its order promises, as far as estimates go."""
 
+HOPED = 4.0
+"""Times more than that is hoped for when meshes are skipped."""
+
 PATIENCE = 5
 """After so many halvings one that does not halve the error is the last."""
+
+FEW_ELEMENTS = 16
+"""A first mesh of so many elements costs less than to look whether fewer would do."""
 
 MOST_ELEMENTS = 3000
 """A mesh that the library chooses does not grow beyond this."""
@@ -190,21 +196,26 @@ class _Run:
             hopeless = count >= PATIENCE and largest > 0.5 * last
             if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
                 break
-            coarse, last = self._next(fine, largest, gain), largest
+            coarse, last = self._next(fine, gain * largest, gain), largest
         return self._answer(fine, errors, begin)
 
     def _next(self, fine: _Level, error: float, gain: float) -> _Level:
-        """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks."""
-        halvings = int(np.log(error / self.accuracy) / np.log(max(gain, 2.0))) if np.isfinite(error) else 0
+        """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks.
+
+        ``error`` is that of the level before the fine one.  That of the next may be so much above the accuracy as
+        a halving is sure to gain; where what is hoped for until then does not come, one more halving follows.
+        """
+        hoped = max(2.0, HOPED * gain)
+        wanted = np.log(max(error / (self.accuracy * gain), 1.0)) / np.log(hoped) if np.isfinite(error) else 0.0
         mesh = fine.curve.model.mesh
-        for _ in range(min(halvings, 3)):
+        for _ in range(min(int(np.ceil(wanted - 0.25)) - 1, 3)):
             mesh = self._halved(mesh) if 4 * mesh.elements <= MOST_ELEMENTS else mesh
         return fine if mesh is fine.curve.model.mesh else self._level(mesh)
 
     def _first_mesh(self) -> Mesh:
         """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
         plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
-        if graded.elements <= 2 * plain.elements:
+        if graded.elements <= max(2 * plain.elements, FEW_ELEMENTS):
             return graded
         curve, start, _ = begin_path(self._prepared(plain), self.span)
         met = [point.factor for point in trace(curve, start, self.span, self.analysis.points, self.knots).points]
@@ -319,7 +330,7 @@ class _Run:
             unit=curve.unit,
             error_estimate=largest if np.isfinite(largest) else None,
             last=last,
-            notes=level.notes,
+            notes=level.notes if curve.model.conservative else (*level.notes, NO_POTENTIAL),
             seconds=self.seconds,
         )
 
@@ -327,19 +338,20 @@ class _Run:
         """The answer of one stretch."""
         traced = stretch.traced
         kinds = {id(event.standing): event for event in traced.events}
-        points = tuple(_point(p, kinds.get(id(p)), curve.model.has_potential) for p in traced.points)
+        energy = curve.model.conservative
+        points = tuple(_point(p, kinds.get(id(p)), energy) for p in traced.points)
 
         def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
             numbered = zip(standings, notes, strict=True)
             return tuple(self._entry(curve, s, errors.get((kind, j)), n) for j, (s, n) in enumerate(numbered))
 
-        bends = [event for event in traced.events if event.kind == "bifurcation"]
-        limits, crossings = stretch.of_kind("limit"), stretch.crossings
+        crossings = stretch.crossings
+        bends, limits = ([e for e in traced.events if e.kind == kind] for kind in ("bifurcation", "limit"))
         return Branch(
             points=points,
             steps=entries("step", crossings, [()] * len(crossings)),
-            limit_points=entries("limit", limits, [()] * len(limits)),
-            bifurcations=entries("bifurcation", [e.standing for e in bends], [_manifold(e) for e in bends]),
+            limit_points=entries("limit", [e.standing for e in limits], [_said(e, energy) for e in limits]),
+            bifurcations=entries("bifurcation", [e.standing for e in bends], [_said(e, energy) for e in bends]),
             end=self._end(traced),
             bifurcation=stretch.bifurcation,
             side=stretch.side,
@@ -376,14 +388,30 @@ def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:
     return largest_difference(Fields(one.equations, a.state, a.loading), Fields(other.equations, b.state, b.loading))
 
 
-def _point(standing: Standing, event: Event | None, has_potential: bool) -> PathPoint:
-    negative, zero = standing.inertia.negative, standing.inertia.zero
-    stable: bool | str = (False if negative else "neutral" if zero else True) if has_potential else "not defined"
+def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:
+    negative, zero = (standing.inertia.negative, standing.inertia.zero) if has_energy else (0, 0)
+    stable: bool | str = (False if negative else "neutral" if zero else True) if has_energy else "not defined"
     kind = "" if event is None else {"limit": "limit point"}.get(event.kind, event.kind)
     return PathPoint(float(standing.factor), standing.state, standing.loading, negative, stable, standing.arc, kind)
 
 
-def _manifold(event: Event) -> tuple[str, ...]:
-    if event.multiplicity == 1:
-        return ()
-    return (f"{event.multiplicity} eigenvalues vanish at once: branches lead off along each combination of shapes",)
+def _said(event: Event, has_energy: bool) -> tuple[str, ...]:
+    """What has to be known of a point where the tangent is singular."""
+    notes: tuple[str, ...] = () if has_energy else (DIVERGENCE,)
+    if event.multiplicity > 1:
+        notes += (
+            f"{event.multiplicity} eigenvalues vanish at once: branches lead off along each combination of shapes, "
+            "those along the first shape alone are followed; switch(path, ..., shape=...) follows another",
+        )
+    return notes
+
+
+DIVERGENCE = (
+    "static divergence: the static tangent is singular, another equilibrium is adjacent; without a potential the "
+    "structure may have become unstable before by flutter, which only shows in dynamics"
+)
+
+NO_POTENTIAL = (
+    "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
+    "tangent is singular (divergence), and flutter would only show in dynamics"
+)

@@ -86,7 +86,7 @@ class Piloting(Meshing):
         if found is None:
             detail = "the loads could not be followed from zero, and without a potential there is no other way"
             raise SolveError(Status.FAILED, detail)
-        if not pilot.model.has_potential:
+        if not pilot.model.conservative:
             found.notes += (NO_POTENTIAL,)
         return found
 

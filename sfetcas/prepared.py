@@ -11,6 +11,7 @@ import numpy as np
 
 from . import quaternion
 from .arrays import Array
+from .divergence import TangentTest
 from .doctor import Diagnosis, contradiction, diagnose
 from .equations import Equations, Point, State
 from .errors import SolveError, Status
@@ -90,27 +91,34 @@ class Prepared:
         """A state to start from, and the gap of its closings."""
         return first_guess(self.equations, loading, self._test.weight)
 
-    def correct(self, state: State, loading: Loading, **limits: Any) -> Corrected:
-        """Newton's method from a near state."""
-        return correct(self.equations, state, loading, self._test.weight, **limits)
+    def correct(self, state: State, loading: Loading, *, firm: float = 1.0, **limits: Any) -> Corrected:
+        """Newton's method from a near state, with a proximal term that may be made firmer."""
+        return correct(self.equations, state, loading, firm * self._test.weight, **limits)
+
+    @functools.cached_property
+    def _tangent(self) -> TangentTest:
+        return TangentTest(self.equations, self._test.weight, self.model.conservative)
 
     def stability(self, found: Corrected) -> Stability:
         """The stability test at a state; without a potential no energy tells stable from unstable."""
-        equations = self.equations
-        if not self.model.has_potential:
-            nothing = np.zeros(equations.turning_unknowns), np.zeros(equations.displacement_unknowns)
-            return Stability("not defined", 0, np.nan, *nothing)
-        return self._test.test(found.point)
+        return (self._test if self.model.has_potential else self._tangent).test(found.point)
 
-    def inertia(self, point: Point) -> Inertia:
-        """Numbers of negative and of vanishing eigenvalues, none where there is no potential; paths ask here."""
-        if not self.model.has_potential:
-            return Inertia(0, 0)
-        return self._test.inertia(point)
+    def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues, these only where it is ``doubtful``; paths ask here.
+
+        Without a potential of those of the tangent, see :class:`~sfetcas.divergence.TangentTest`.
+        """
+        return (
+            self._test.inertia(point, doubtful=doubtful) if self.model.has_potential else self._tangent.inertia(point)
+        )
 
     def around_zero(self, point: Point) -> tuple[int, Array, Array]:
-        """Eigenvalues around zero, see :class:`~sfetcas.stability.StabilityTest`."""
-        return self._test.around_zero(point)
+        """Eigenvalues around zero, see :class:`~sfetcas.stability.StabilityTest`; real parts without a potential."""
+        return (self._test if self.model.has_potential else self._tangent).around_zero(point)
+
+    def singular(self, point: Point, count: int) -> bool:
+        """Whether so many eigenvalues vanish where their real parts do: always where there is an energy."""
+        return self.model.conservative or self._tangent.singular(point, count)
 
     def negative(self, found: Corrected) -> int:
         """Number of negative eigenvalues at a state; none is counted where there is no potential."""

@@ -276,7 +276,7 @@ def _check_loads(scene: Scene) -> None:
     for name, load in scene.loads.items():
         kind = "flexible" if load.member is None else scene.members[load.member].type
         condensed = load.member is not None and scene.members[load.member].stiffness is not None
-        if kind == "small" and (condensed or load.type == "moment" or load.frame == "follower"):
+        if kind == "small" and (condensed or load.type == "moment" or load.frame != "fixed"):
             accepted = "a node there, or a fixed force or distributed load on a small member with a section"
             raise SceneError(f"found the small member {load.member!r}, accepted: {accepted}", ("loads", name, "member"))
         joint = "rigid" if load.node is None else scene.nodes[load.node].joint

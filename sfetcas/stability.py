@@ -21,7 +21,7 @@ from .arrays import Array
 from .equations import Equations, Point
 from .linear import InertiaSolver, pattern
 
-__all__ = ["LIGHT", "Inertia", "Stability", "StabilityTest"]
+__all__ = ["LIGHT", "NEUTRAL", "RANK", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
 
 NEUTRAL = 1e-7
 """Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
@@ -174,15 +174,15 @@ class StabilityTest:
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
-    def inertia(self, point: Point) -> Inertia:
-        """Numbers of negative and of vanishing eigenvalues alone."""
+    def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues alone; many unknowns: of these only where it is doubtful."""
         if self._n == 0:
             return Inertia(0, 0)
         entries = self._weighted(point)
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
         if not self._is_dense:
             below = self._below(point, entries, -limit)
-            return Inertia(below, self._below(point, entries, limit) - below)
+            return Inertia(below, 0) if not doubtful else Inertia(below, self._below(point, entries, limit) - below)
         values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
         below = int((values < -limit).sum())
         return Inertia(below, int((values <= limit).sum()) - below)
@@ -242,7 +242,7 @@ class StabilityTest:
             return self._ldl.neig(matrix)
         schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
         values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
-        return self._ldl.neig(matrix) - int((values < -RANK * np.abs(values).max()).sum())
+        return self._ldl.neig(matrix) - int((values < -REDUNDANT * np.abs(values).max()).sum())
 
     def _below_bordered(self, point: Point, shift: float) -> int:
         """The same from the whole Newton matrix, with closings and displacements very slightly soft.
@@ -333,7 +333,7 @@ class StabilityTest:
         block = np.random.default_rng(0).standard_normal((n, width))
         loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
         shifted = point.entries.copy()
-        shifted[equations.diagonal[self._chosen]] += NEUTRAL**2 * self._weights
+        shifted[equations.diagonal[self._chosen]] += BESIDE * self._weights
         shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
         equations.solver.factor(shifted)
         for _ in range(60):
@@ -348,6 +348,9 @@ class StabilityTest:
             last = values[nearest]
         return values[nearest], block[:, nearest]
 
+
+BESIDE = 1.3e-4
+"""Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
 
 NEAREST = 4
 """Eigenvalues that are looked at around zero where there are many: in space two may vanish at once."""
@@ -372,6 +375,12 @@ FULL = 600
 
 BROKEN = 1e-2
 """Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
+
+REDUNDANT = 1e-13
+"""Eigenvalues of the closings' complement below this, relative to the largest, come of redundant ones: rounding.
+
+A neutral direction shifted by 1e-7 leaves 1e-8 there, while the largest may be 1e3 and more.
+"""
 
 RANK = 1e-10
 """Singular values below this, relative to the largest, are zero."""

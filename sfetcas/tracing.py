@@ -74,7 +74,7 @@ def trace(
 
     At the knots of histories the curve has a corner: it is followed from one to the next.
     """
-    traced = Traced([start], [], "range")
+    traced, curve = Traced([start], [], "range"), curve.firmer() if start.inertia.zero else curve
     stops = [span[0], *knots, span[1]]
     while traced.end == "range":
         now = traced.points[-1]
