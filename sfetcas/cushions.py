@@ -47,6 +47,9 @@ SHRINK, LEAST_SHRINK = 0.1, 0.8
 PUSHED = 1e-3
 """Share of the largest force of a cushion from which a place counts as touching."""
 
+NEARLY = 0.9
+"""Share of a push that counts as all of it."""
+
 TINY = 1e-6
 """Share of the largest push that stands for none where a member lies without pressure."""
 
@@ -267,7 +270,7 @@ class Cushions:
             lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
             for run in runs:
                 node = self._node(run, run.at)
-                if run.to is None and node in lying:
+                if run.to is None and node is not None and node in lying:
                     continue
                 lying |= {node} if run.to is None and node else set()
                 found.append(replace(run, way=self._way(touched, run)))
@@ -304,7 +307,11 @@ class Cushions:
             if self.scene.members[member].type == "rigid":
                 yield from self._of_rigid(contact, member, cuts[a:b], push[a:b])
             elif b - a <= 2:
-                yield Touch(contact, member, float(np.average(cuts[a:b], weights=push[a:b])), number=number)
+                most = float(cuts[a:b][np.argmax(push[a:b])])
+                at = float(np.average(cuts[a:b], weights=push[a:b]))
+                # Nearly all on a node is on the node.
+                on_node = most in (0.0, 1.0) and push[a:b].max() > NEARLY * push[a:b].sum()
+                yield Touch(contact, member, most if on_node else at, number=number)
             else:
                 yield Touch(contact, member, float(cuts[a]), float(cuts[b - 1]), number=number)
 

@@ -261,7 +261,8 @@ class Reviser:
                 x = np.linspace(here, there, 12)[1:]
                 gaps = held.touched.gaps(touch.contact, touch.member, x, way.offsets.get(touch.contact, 0.0))
                 # A member that rises over so short a way is nowhere inside.
-                if np.abs(gaps).max() > limit or gaps[:-1].min() > ROUNDED * self.scene.size:
+                rounded = ROUNDED * self.scene.size
+                if np.abs(gaps).max() > limit or (gaps.max() > rounded and gaps.min() > -rounded):
                     continue
                 gone = next((t for t, x in others if x == there), None)
                 low, high = min(*touch.places, there), max(*touch.places, there)

@@ -212,13 +212,13 @@ class Settler:
             if not np.isfinite(step).all():
                 return None
             step, ran, room = _shortened(held.mesh.touches, free, step)
-            if ran is not None:
-                crowded += 1
-            elif _roomy(held.mesh.touches, free):
-                crowded = 0
+            near = ran is not None or not _roomy(held.mesh.touches, free)
+            crowded = crowded + 1 if near else 0
             end = ran or end
-            if (ran is not None and room < 10.0 * APART) or (end is not None and crowded > PATIENCE):
-                return end
+            if ran is not None and room < 10.0 * APART:
+                return ran
+            if end is not None and crowded > PATIENCE:
+                return replace(end, touches=held.mesh.touches)
             if np.abs(step).max() < SETTLED:
                 # Where places have no say, as along a straight rigid member, no step is no answer.
                 return replace(held, slopes=slopes) if np.abs(here).max() < MISSED else None
