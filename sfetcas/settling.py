@@ -283,9 +283,10 @@ class Settler:
 
 
 def _meet(mesh: Mesh) -> bool:
-    """Whether places within members are so near to each other, or to an end, that they have no cut of their own."""
+    """Whether places have crossed, or are so near to each other or to an end that they have no cut of their own."""
     cuts = [(t.member, mesh.cut_at(t.member, x)) for t in mesh.touches for x in t.places if 0.0 < x < 1.0]
-    at_ends = any(cut in (0, len(mesh.cuts[member]) - 1) for member, cut in cuts)
+    turned = any(t.to is not None and t.to <= t.at for t in mesh.touches)
+    at_ends = turned or any(cut in (0, len(mesh.cuts[member]) - 1) for member, cut in cuts)
     return at_ends or len(set(cuts)) < len(cuts)
 
 
