@@ -13,7 +13,7 @@ import numpy as np
 
 from .arrays import Array
 from .equations import Equations, State
-from .fields import transferred
+from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, Touch, breaks_of
 from .model import Model
@@ -138,6 +138,20 @@ def balanced(equations: Equations, state: State, loading: Loading) -> State:
     return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
 
 
+def _carried(source: tuple[Model, State], loading: Loading, model: Model, state: State) -> State:
+    """The state with nodes where they were: of a body without support another node may lead its places now."""
+    kept, known = model.positions.kept[: len(model.nodes)], set(source[0].positions.unknowns)
+    new = [i for i in np.flatnonzero((kept >= 0).all(axis=1)) if model.positions.unknowns[kept[i, 0]] not in known]
+    if not new:
+        return state
+    fields, y = Fields(Equations(source[0]), source[1], loading), state.y.copy()
+    for i in new:
+        start = np.asarray(model.scene.nodes[model.nodes[i]].position, dtype=float)
+        moved_by = (fields.position(model.nodes[i]) - start) / model.scales.length
+        y[kept[i]] = moved_by[: kept.shape[1]]
+    return replace(state, y=y)
+
+
 def closed(equations: Equations, state: State, loading: Loading) -> State:
     """The state with the displacements kept as unknowns where the members lead: a new mesh has new places."""
     n, positions = equations.unknowns, equations.model.positions
@@ -183,6 +197,7 @@ class Settler:
             state = source[1]
         else:
             state = transferred(source[0], source[1], prepared.model)
+            state = _carried(source, way.loading(source[0]), prepared.model, state)
             state = closed(prepared.equations, prepared.equations.holding(state, loading), loading)
             state = balanced(prepared.equations, state, loading)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
