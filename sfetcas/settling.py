@@ -6,7 +6,7 @@ with differences once and Broyden's updates.  The mesh moves with them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -152,14 +152,16 @@ def _carried(source: tuple[Model, State], loading: Loading, model: Model, state:
     return replace(state, y=y)
 
 
-def closed(equations: Equations, state: State, loading: Loading) -> State:
-    """The state with the displacements kept as unknowns where the members lead: a new mesh has new places."""
+def closed(equations: Equations, state: State, loading: Loading, known: Collection[str]) -> State:
+    """The state with the displacements of places that are not known by name where the members lead."""
     n, positions = equations.unknowns, equations.model.positions
-    rows = len(positions.rows)
-    if not rows or not len(state.y) or rows * len(state.y) > 4_000_000:
+    rows, new = len(positions.rows), [i for i, name in enumerate(positions.unknowns) if name not in known]
+    if not rows or not new or rows * len(new) > 4_000_000:
         return state
     gaps = equations.at(state, loading).residual[n : n + rows]
-    return replace(state, y=state.y - np.linalg.lstsq(positions.W.full(), gaps, rcond=1e-12)[0])
+    y = state.y.copy()
+    y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=1e-12)[0]
+    return replace(state, y=y)
 
 
 class Settler:
@@ -198,7 +200,8 @@ class Settler:
         else:
             state = transferred(source[0], source[1], prepared.model)
             state = _carried(source, way.loading(source[0]), prepared.model, state)
-            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading)
+            known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in self.scene.nodes for axis in "xyz")}
+            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
             state = balanced(prepared.equations, state, loading)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
         if not corrected.converged and corrected.residual > 1e-9:
