@@ -40,6 +40,9 @@ THIRDS = 40
 FIRST_RISE, MOST_RISE = 0.05, 0.9
 """Shares of a stretch: how much of it rises where nothing tells, and at most."""
 
+NEAR = 0.2
+"""Share of the scene's size: a member that is further behind an edge is elsewhere, and not held up by it."""
+
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
 
@@ -494,8 +497,7 @@ class Touched:
         found = []
         for x in self.passing(contact, member):
             gap = float(self.gaps(contact, member, np.array([x]), offset, way)[0])
-            near = abs(gap) < 0.2 * self.model.scene.size
-            if gap < -limit and near:
+            if gap < -limit and abs(gap) < NEAR * self.model.scene.size:
                 found.append(Gap(contact, member, x, x, x, gap, way))
         return found
 
@@ -517,8 +519,9 @@ class Touched:
             x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
             if not sharp:
                 x = self._nearest(contact, member, x)
-            if len(x):
-                gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
+            gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0)) if len(x) else x
+            gaps = gaps[gaps > -NEAR * self.model.scene.size] if sharp else gaps
+            if len(gaps):
                 found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
         return min(found)
 
