@@ -608,6 +608,33 @@ def test_peg_is_not_jumped_over_by_loads_without_potential():
     assert not any("all the way" in note for note in step.notes)
 
 
+def test_member_beside_a_node_on_a_cylinder_is_not_inside_it():
+    """At its end, where another member goes on, a member that bends round is the deeper beside the end."""
+    table = {
+        "dimension": "space",
+        "gravity": [0, 0, -1.367],
+        "sections": {"s": {"EI2": 0.577, "EI3": 1.0, "GJ": 0.884, "rhoA": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0, 0]},
+            "C": {"position": [1.426, -0.4048, 0.1208]},
+        },
+        "members": {
+            "m": {"nodes": ["A", "B"], "section": "s"},
+            "k": {"nodes": ["B", "C"], "section": "s", "b2": [-0.4652, -0.38976, 0.33444]},
+        },
+        "contacts": {
+            "drum": {"type": "cylinder", "center": [0.744, 0, -0.71], "radius": 0.5, "axis": [-0.2891, 0.9573, 0]}
+        },
+        "analysis": {"accuracy": 1e-5, "steps": [0.5]},
+    }
+    table["contacts"]["drum"]["member"] = "m"
+    step = solve(made(table)).last
+    assert step.contacts["drum"]["at"] is not None
+    # The accuracy asked for, of a size of 1.5 m.
+    assert smallest_gap(step) > -1e-5
+
+
 def test_edge_far_from_a_member_has_no_gap():
     """Rolled up, a member shows its other side to an edge beyond its tip, which stops it nowhere: no gap below zero."""
     edge = {"type": "point", "position": [1.09, -0.02], "side": [0, 1], "member": "m"}
