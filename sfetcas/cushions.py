@@ -62,6 +62,9 @@ REACH = 30.0
 FALLS, FALL = 60, (4, 0.1)
 """What falls turns no node by more than 0.1 rad a step; every four steps it is asked whether it passed something."""
 
+FAR = 1e3
+"""Sizes of the scene: what has fallen further falls past everything."""
+
 BEGIN = 0.01
 """Share of the loads under which a mechanism, which has no place of its own without loads, is looked for at first."""
 
@@ -170,8 +173,10 @@ class Cushions:
         loading = prepared.model.loading(factor)
         state = prepared.equations.start(loading)
         for _ in range(FALLS):
-            lower = descend(prepared.equations, state, loading, prepared.weight, iterations=FALL[0], most=FALL[1])
-            if not self._passes(prepared, state, lower, loading):
+            # What falls past everything overflows within a few steps.
+            with np.errstate(over="ignore", invalid="ignore"):
+                lower = descend(prepared.equations, state, loading, prepared.weight, iterations=FALL[0], most=FALL[1])
+            if not np.abs(lower.y).max(initial=0.0) <= FAR or not self._passes(prepared, state, lower, loading):
                 return None
             near = prepared.distance(state, lower) < FALL[1]
             state = lower

@@ -204,7 +204,7 @@ class Settler:
             state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
             state = balanced(prepared.equations, state, loading)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
-        if not corrected.converged and corrected.residual > 1e-9:
+        if not corrected.converged and not corrected.residual <= 1e-9:
             return None
         return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
 
