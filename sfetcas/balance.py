@@ -18,6 +18,7 @@ from .connections import GROUND, Group
 from .equations import Equations, State
 from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
 from .joints import Spring as Tension
+from .linear import SparseMap, smallest
 from .loading import Loading
 from .rotations import STIFF, end_joints
 
@@ -152,8 +153,8 @@ class Balance:
     def _rigid(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Moments on first ends of rigid members, and reactions of nodes that share a rotation.
 
-        From the balance of every node that a rigid member is joined to; where rigid members form loops the
-        moments inside are not unique and the smallest are given.
+        From the balance of every node that a rigid member is joined to.  Where that leaves a choice (rigid members
+        in loops, one body with several supports) the smallest reactions are taken, then the smallest moments inside.
         """
         scene = self.model.scene
         names = [name for name in self.model.members if scene.members[name].type == "rigid"]
@@ -161,33 +162,44 @@ class Balance:
         held = [n for n in nodes if scene.nodes[n].turn not in ("free", "ball")]
         columns = {("member", name): i for i, name in enumerate(names)}
         columns |= {("node", n): len(names) + i for i, n in enumerate(held)}
-        equations = [self._at_node(columns, names, node) for node in nodes]
+        balances = [self._at_node(columns, names, node) for node in nodes]
         for name in names:
             ends = end_joints(scene, scene.members[name])
-            equations += [self._at_pin(columns, name, i) for i, (_, joint) in enumerate(ends) if joint not in STIFF]
-        matrix, right = (np.array(part) for part in zip(*equations, strict=True))
-        solved = np.linalg.lstsq(matrix, right, rcond=1e-10)[0]
+            balances += [self._at_pin(columns, name, i) for i, (_, joint) in enumerate(ends) if joint not in STIFF]
+        rows = [({3 * i + k: gain for i, gain in row.items()}, right[k]) for row, right in balances for k in range(3)]
+        for n in filter(self._turns_freely, held):
+            first, axis = 3 * columns["node", n], np.asarray(scene.nodes[n].turn_axis)
+            rows.append(({first + k: part for k, part in enumerate(axis / np.linalg.norm(axis))}, 0.0))
+        weights = np.repeat([INSIDE, 1.0], [3 * len(names), 3 * len(held)])
+        solved = _smallest(rows, weights).reshape(-1, 3)
         starts = {name: solved[i] for (kind, name), i in columns.items() if kind == "member"}
         return starts, {name: solved[i] for (kind, name), i in columns.items() if kind == "node"}
 
-    def _at_node(self, columns: dict[tuple[str, str], int], rigid: list[str], node: str) -> tuple[Array, Array]:
+    def _turns_freely(self, node: str) -> bool:
+        """A supported hinge that nothing drives: the ground exerts no moment about its axis."""
+        scene = self.model.scene
+        driven = any(m.node == node and m.rotation is not None and m.between is None for m in scene.motions.values())
+        return scene.nodes[node].turn == "hinge" and not driven
+
+    def _at_node(
+        self, columns: dict[tuple[str, str], int], rigid: list[str], node: str
+    ) -> tuple[dict[int, float], Array]:
         """All that takes moments at a node, the reaction on the other side."""
-        row, known = np.zeros(len(columns)), self._node_known(node)
+        row, known = dict[int, float](), self._node_known(node)
         for name in rigid:
             for i, at in enumerate(self.model.scene.members[name].nodes):
                 if at == node:
-                    row[columns["member", name]] += 1.0 - 2.0 * i
+                    row[columns["member", name]] = 1.0 - 2.0 * i
                     known = known + i * self._gain(name)
         if ("node", node) in columns:
             row[columns["node", node]] = -1.0
         return row, -known
 
-    def _at_pin(self, columns: dict[tuple[str, str], int], member: str, i: int) -> tuple[Array, Array]:
+    def _at_pin(self, columns: dict[tuple[str, str], int], member: str, i: int) -> tuple[dict[int, float], Array]:
         """What the joint at a released end takes, a rigid member does not."""
-        row = np.zeros(len(columns))
-        row[columns["member", member]] = 1.0 - 2.0 * i
         node, turn = self.model.scene.members[member].nodes[i], self.model.rotations.ends[member][i]
-        return row, -self._connected(node, turn) - i * self._gain(member)
+        right = -self._connected(node, turn) - i * self._gain(member)
+        return {columns["member", member]: 1.0 - 2.0 * i}, right
 
     def _connected(self, node: str, turn: int | None = None) -> Array:
         """Moments that joints and springs at a node take from one rotation, or springs and slides from all.
@@ -301,6 +313,19 @@ class Balance:
 
 ONE_SIDED = (TurnSpring, TurnStop, Slide, DrivenSlide)
 """Kinds whose moments on the rotations of a node do not add up to nothing."""
+
+
+def _smallest(rows: Sequence[tuple[dict[int, float], float]], weights: Array) -> Array:
+    """The smallest solution of rows, each its entries by column and its right side."""
+    row = np.repeat(np.arange(len(rows)), [len(entries) for entries, _ in rows])
+    column = np.concatenate([list(entries) for entries, _ in rows])
+    value = np.concatenate([list(entries.values()) for entries, _ in rows])
+    matrix = SparseMap(row, column, value, (len(rows), len(weights)))
+    return smallest(matrix, np.array([right for _, right in rows]), weights)
+
+
+INSIDE = 1e-8
+"""Weight of moments inside rigid members where reactions count 1: reactions are made small first."""
 
 
 def _is_spring(group: Group) -> bool:

@@ -122,12 +122,21 @@ def _run(options: argparse.Namespace) -> int:
             if path.exists() and path.samefile(options.file):
                 raise SceneError(f"{path}: is the scene itself, accepted: another file")
     drawing = _drawing(options.plot, scene.analysis.type == "path")
-    solution, checks = _answered(options.file, scene, settings)
-    if options.json is not None:
-        _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
-    if drawing is not None:
-        _write(options.plot, lambda path: drawing(solution, path))
-    _report(solution, time.perf_counter() - begin)
+
+    def told(solution: Solution | Course) -> None:
+        if options.json is not None:
+            _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
+        if drawing is not None:
+            _write(options.plot, lambda path: drawing(solution, path))
+        _report(solution, time.perf_counter() - begin)
+
+    try:
+        solution, checks = _answered(options.file, scene, settings)
+    except SolveError as error:
+        if isinstance(error.reached, Solution):
+            told(error.reached)
+        raise
+    told(solution)
     _print_checks(checks)
     return SOLVED if solution.status is Status.SOLVED and all(c.passed for c in checks) else SHORT
 

@@ -239,7 +239,7 @@ class _Maker:
         At a universal joint a spring about one of the two axes is put on the side that carries this axis.
         """
         spring, (first, second) = self.scene.springs[name], self.parties(name)
-        axis, node = _unit(spring.axis), self.scene.nodes[spring.node]
+        axis, node = _unit(self.scene.spring_axis(name)), self.scene.nodes[spring.node]
         for pin in self.rotations.pins:
             base = GROUND if pin.base is None else pin.base
             if not self.space or pin.joint != "universal" or {base, pin.turn} != {first, second}:

@@ -108,7 +108,7 @@ def _motions(motions: Mapping[str, Motion]) -> Iterator[Finding]:
 
 def _springs(springs: Mapping[str, Spring]) -> Iterator[Finding]:
     for name, spring in springs.items():
-        if spring.type == "rotational" and _turns_out(spring.axis):
+        if spring.axis is not None and _turns_out(spring.axis):
             yield ("springs", name, "axis"), "is not along z"
         for key in ("anchor", "direction"):
             vector = getattr(spring, key)

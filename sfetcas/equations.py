@@ -128,7 +128,7 @@ class Equations:
         self.unknowns = self.turning_unknowns + self.displacement_unknowns
         about = np.flatnonzero(model.rotations.kind == Turn.AXIS) if model.space else np.array([], dtype=np.intp)
         self._basis = {int(i): _basis(model.rotations.axis[i]) for i in about}
-        self._on_axes = np.argwhere(np.isin(model.rotations.turns, about)).tolist()
+        self._on_axes = [np.flatnonzero(np.isin(turns, about)) for turns in model.rotations.turns.T]
         self._free = np.flatnonzero(self.number[:, 0] >= 0)
 
     @functools.cached_property
@@ -430,8 +430,15 @@ class Equations:
 
     def _turn_bases(self, moments: Array, stiffness: Array, spin: Array) -> None:
         """Turn the components of rotations about a held axis, in place, so that the first is about it."""
-        for e, k in self._on_axes:
-            _to_basis(self._basis[int(self.model.rotations.turns[e, k])], k, moments[e], stiffness[e], spin[e])
+        for k, held in enumerate(self._on_axes):
+            if not len(held):
+                continue
+            part = slice(3 * k, 3 * k + 3)
+            bases = np.array([self._basis[i] for i in self.model.rotations.turns[held, k].tolist()])
+            moments[held, part] = np.einsum("eij,ei->ej", bases, moments[held, part])
+            stiffness[held, part] = np.einsum("eij,eik->ejk", bases, stiffness[held, part])
+            stiffness[held, :, part] = np.einsum("eki,eij->ekj", stiffness[held, :, part], bases)
+            spin[held, part] = np.einsum("eij,eik->ejk", bases, spin[held, part])
 
     def _closing_parts(self, spin: Array) -> list[Array]:
         parts = []

@@ -48,7 +48,11 @@ class SolveError(RuntimeError):
         What was tried.
     last : object or None
         Last iterate as the solver left it; never an answer.
+    reached : object or None
+        The :class:`~sfetcas.solution.Solution` with the steps before the one that failed, where there are any.
     """
+
+    reached: object = None
 
     def __init__(self, status: Status, detail: str = "", last: object = None) -> None:
         super().__init__(status.value + (f" ({detail})" if detail else ""))

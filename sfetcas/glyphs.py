@@ -209,7 +209,7 @@ def _sketch_releases(sketch: Sketch) -> None:
 
 def _sketch_spiral(sketch: Sketch, name: str, spring: Spring) -> None:
     """A spiral about the axis of a rotational spring, as its first party carries it."""
-    axis = quaternion.rotate(_turned(sketch, spring), np.array(unit(spring.axis)))
+    axis = quaternion.rotate(_turned(sketch, spring), np.array(unit(sketch.scene.spring_axis(name))))
     one, two = _pair_across(axis, sketch.leaving(spring.node)[0])
     angle = np.linspace(0.5 * math.pi, 5.0 * math.pi, 121)[:, None]
     radius = SPIRAL * sketch.size * angle / angle[-1]

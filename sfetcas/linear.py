@@ -13,7 +13,7 @@ import numpy as np
 from .arrays import Array
 from .kernels import Batch
 
-__all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "pattern"]
+__all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "pattern", "smallest"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
@@ -247,6 +247,33 @@ TINY = 1e-300
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:
     """Sparsity of a square matrix by the places of its entries, column by column."""
     return ca.Sparsity(n, n, np.searchsorted(column, np.arange(n + 1)).tolist(), row.tolist())
+
+
+def smallest(rows: SparseMap, right: Array, weights: Array) -> Array:
+    """Solution x (columns,) of ``rows @ x = right`` with the smallest sum of ``weights * x**2``.
+
+    Rows may depend on each other if their right sides do so too.  They are taken as slightly soft, which a few rounds
+    of multipliers take back (augmented Lagrangian).
+    """
+    m, n = rows.shape
+    places = np.concatenate([np.arange(n + m), rows.column, n + rows.row])
+    others = np.concatenate([np.arange(n + m), n + rows.row, rows.column])
+    entries = np.concatenate([weights, np.full(m, -YIELDING), rows.value, rows.value])
+    order = np.lexsort((places, others))
+    solver = SparseSolver(n + m, places[order], others[order], m)
+    solver.factor(entries[order])
+    x, multipliers = np.zeros(n), np.zeros(m)
+    for _ in range(ROUNDS):
+        missing = right - rows @ x
+        step = solver.solve(np.concatenate([-weights * x - rows.T @ multipliers, missing]))
+        x, multipliers = x + step[:n], multipliers + step[n:]
+        if np.abs(missing).max(initial=0.0) <= SOLVED * np.abs(right).max(initial=0.0):
+            break
+    return x
+
+
+YIELDING = 1e-3
+"""Softness of rows over that of weights of 1: each round leaves this share of what is missing, or less."""
 
 
 class InertiaSolver:

@@ -235,7 +235,8 @@ def assemble(
     scales, rotations = scales_of(scene), number_rotations(scene, mesh, element)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
     names = ("closing", "nodal") if assembly == "auto" else (assembly,)
-    both = {name: place_nodes(scene, segments, element.axes, name == "closing") for name in names}
+    bodies = {name: ends[0] for name, ends in rotations.ends.items() if scene.members[name].type == "rigid"}
+    both = {name: place_nodes(scene, segments, element.axes, name == "closing", bodies) for name in names}
     if assembly == "auto":
         closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
         assembly = "closing" if closing <= nodal else "nodal"

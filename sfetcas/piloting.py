@@ -26,6 +26,11 @@ NO_POTENTIAL = (
     f"{NO_ENERGY}; the static tangent is regular all the way from zero load, and flutter would only show in dynamics"
 )
 
+TAUT = (
+    "straight between places that come no closer, where an inextensible member cannot bend and takes any force; "
+    "let one end slide"
+)
+
 CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
 """Growth of the loads from step to step where a structure between obstacles becomes unstable."""
 
@@ -42,25 +47,27 @@ class Piloting(Meshing):
         """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
         try:
             return self._on_pilot(pilot, factor, last)
-        except SolveError as found:
-            error = self._named(pilot, found)
+        except SolveError as error:
             if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
-                raise error from None
+                raise
             try:
                 return self._on_pilot(self._prepared(pilot.model.mesh.refined().refined()), factor, None)
             except SolveError:
                 raise error from None
 
     def _named(self, pilot: Prepared, error: SolveError) -> SolveError:
-        """The error with the motions that nothing holds, where there are any."""
+        """The error with the motions that nothing holds, and the members that have no slack, where there are any."""
         try:
-            free = pilot.diagnosis
+            free, taut = pilot.diagnosis, pilot.lacks_slack
         except np.linalg.LinAlgError:
             return error
-        if not free.mobility:
-            return error
-        detail = f"{error.detail}; free to move without load: {'; '.join(free.motions[:3])}"
-        return SolveError(error.status, detail, error.last)
+        details = [error.detail] if error.detail else []
+        if free.mobility:
+            details.append(f"free to move without load: {'; '.join(free.motions[:3])}")
+        if taut and error.status is not Status.INFEASIBLE:
+            rows = ", ".join(dict.fromkeys(free.redundant))
+            details.append(f"{TAUT}: {rows}")
+        return SolveError(error.status, "; ".join(details), error.last)
 
     def _on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         loading = pilot.model.loading(factor)

@@ -15,6 +15,7 @@ Source: Barraco and Munteanu, Part 1, section 1 (the two ways of assembling).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -98,8 +99,8 @@ class _Place:
 class _Placing:
     """The places while they are found one after the other."""
 
-    def __init__(self, scene: Scene, segments: Segments, axes: int, closing: bool) -> None:
-        self.scene, self.segments, self.axes = scene, segments, axes
+    def __init__(self, scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> None:
+        self.scene, self.segments, self.axes, self.bodies = scene, segments, axes, bodies
         self.eye = np.eye(axes)
         self.labels: list[str] = []
         self.rows: list[tuple[str, _Place]] = []
@@ -130,10 +131,32 @@ class _Placing:
             if root not in self.places:
                 self.places[root] = self._unknown(root)
                 self._spread([root])
+        within = self._loops_within_bodies()
         for i, part in enumerate(self.segments.parts):
-            if i not in self._used:
+            if i not in self._used | within:
                 gap = self.places[part.start].plus(self._reach(i)).plus(self.places[part.end], -1.0)
                 self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye)
+
+    def _loops_within_bodies(self) -> set[int]:
+        """Segments that close a loop of rigid members that share one rotation: it stays closed by itself."""
+        parent: dict[Source, Source] = {}
+
+        def root(place: Source) -> Source:
+            while place in parent:
+                place = parent[place]
+            return place
+
+        found = set()
+        for i in sorted(range(len(self.segments.parts)), key=lambda i: i not in self._used):
+            part = self.segments.parts[i]
+            if part.member not in self.bodies:
+                continue
+            start, end = (root((place, self.bodies[part.member])) for place in (part.start, part.end))
+            if start != end:
+                parent[start] = end
+            elif i not in self._used:
+                found.add(i)
+        return found
 
     def _guide(self, name: str) -> Array:
         d = np.asarray(self.scene.nodes[name].direction)[: self.axes]
@@ -207,9 +230,13 @@ class _Placing:
         return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
 
 
-def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool) -> Positions:
-    """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly."""
-    placing = _Placing(scene, segments, axes, closing)
+def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> Positions:
+    """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly.
+
+    ``bodies``: the rotation of each rigid member.  A loop within one rigid body has no equation: of the forces
+    around it there are many, and the last member carries none.
+    """
+    placing = _Placing(scene, segments, axes, closing, bodies)
     sizes = {"E": len(segments.parts) * axes, "Y": len(placing.labels), "B": len(segments.places) * axes}
     in_order = [placing.places[n] for n in segments.places]
     closings = [place for _, place in placing.rows]

@@ -10,6 +10,7 @@ from .accuracy import every_other, largest_difference, roughness
 from .arrays import Array
 from .deflation import deflated
 from .doctor import in_words, moves_nodes
+from .equations import Equations, State
 from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .loading import Loading
@@ -160,8 +161,39 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
         raise SceneError(message)
 
 
+def _least_reactions(equations: Equations, state: State, loading: Loading, loose: Array) -> State:
+    """The state with the reactions of supports whose sum of squares is least, then the least multipliers.
+
+    Moments count over the unit of length.  Loose multipliers change nothing else.
+    """
+    model = equations.model
+    supported = [name for name, node in model.scene.nodes.items() if node.support != "free"]
+    units = np.concatenate([np.full(3, model.scales.force), np.full(3, model.scales.moment)])
+
+    def reactions(lam: Array) -> Array:
+        fields = Fields(equations, replace(state, lam=lam), loading)
+        return np.concatenate([np.concatenate(fields.reaction(name)) / units for name in supported])
+
+    if not supported or loose.shape[1] > MOST_LOOSE:
+        return state
+    own = reactions(state.lam)
+    gains = np.column_stack([reactions(state.lam + column) - own for column in loose.T])
+    left, sizes, right = np.linalg.svd(gains, full_matrices=False)
+    # Columns are of length 1 and reactions dimensionless: what gains less says nothing but rounding.
+    kept = sizes > FELT
+    change = right[kept].T @ ((left[:, kept].T @ own) / sizes[kept])
+    return replace(state, lam=state.lam - loose @ change)
+
+
+FELT = 1e-6
+"""A combination of redundant rows that changes reactions by less than this share changes none."""
+
+MOST_LOOSE = 60
+"""Up to so many redundant rows reactions are made least; beyond, the multipliers only."""
+
+
 def _with_unique_reactions(found: Found, loading: Loading) -> Found:
-    """The same, with the smallest multipliers and a note where closings are redundant.
+    """The same, with the smallest reactions and a note where closings are redundant.
 
     Raises
     ------
@@ -174,7 +206,7 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
         return found
     names = ", ".join(equations.row_names[row] for row in rows_in(loose))
     lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
-    state = replace(corrected.state, lam=lam)
+    state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
     if residual <= SOLVED:

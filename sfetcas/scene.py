@@ -109,6 +109,11 @@ class Scene(Staged):
         points = np.vstack([line.positions(samples) for line in self.center_lines.values()])
         return math.hypot(*np.ptp(points, axis=0))
 
+    def spring_axis(self, name: str) -> tuple[float, float, float]:
+        """Axis of a rotational spring, fixed axes of the undeformed scene: its own, or that of its node's joint."""
+        spring = self.springs[name]
+        return self.nodes[spring.node].joint_axis if spring.axis is None else spring.axis
+
     @property
     def resolved_dimension(self) -> Literal["plane", "space"]:
         """How the scene is modelled: plane or space."""
@@ -302,6 +307,23 @@ def _check_springs(scene: Scene) -> None:
             joint = scene.nodes[spring.node].joint
             message = f"node {spring.node!r} has no rotation of its own, as its joint is a {joint}; name the members"
             raise SceneError(message, ("springs", name, "between"))
+        if spring.axis is not None:
+            _check_spring_axis(name, spring, scene.nodes[spring.node])
+
+
+def _check_spring_axis(name: str, spring: Spring, node: Node) -> None:
+    """A hinge turns about its own axis only: a spring about another one would do nothing."""
+    parties = set(spring.between or ("ground", spring.node))
+    hinged = node.turn == "hinge" if parties == {"ground", spring.node} else node.joint == "hinge"
+    if not hinged or spring.axis is None or ("ground" in parties and spring.node not in parties):
+        return
+    if np.linalg.norm(np.cross(unit(spring.axis), unit(node.joint_axis))) > SKEW:
+        accepted = f"along the axis of the hinge at node {spring.node!r}, {say(node.joint_axis)}, or left out"
+        raise SceneError(f"found {say(spring.axis)}, accepted: {accepted}", ("springs", name, "axis"))
+
+
+SKEW = 1e-6
+"""Sine of the angle up to which an axis is along another one."""
 
 
 def _check_motions(scene: Scene) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,11 +17,11 @@ from .errors import SceneError, SolveError, Status
 from .fields import Fields
 from .loading import Loading
 from .model import Model
-from .records import nearest, plain
+from .records import counted, nearest, plain
 from .stability import Stability
 from .touches import answers
 
-__all__ = ["Certificate", "Equilibrium", "Solution", "equilibrium"]
+__all__ = ["Certificate", "Equilibrium", "Solution", "at_factor", "equilibrium"]
 
 MOST_PLACES = 400
 """Places listed along a member at most; with more elements only their ends, thinned out."""
@@ -206,16 +206,20 @@ class Solution:
     Attributes
     ----------
     status : Status
-        SOLVED, or SHORT where an accuracy that was asked for is not reached on the mesh that was asked for.
+        SOLVED, or SHORT where an accuracy that was asked for is not reached on the mesh that was asked for; of the
+        steps that a :class:`SolveError` reached, why the next one failed.
     steps : tuple of Equilibrium
     seconds : dict
         Time spent on models and on solving.
+    failure : str
+        Where a step failed: which, and what was tried.
     """
 
     scene: Any
     status: Status
     steps: tuple[Equilibrium, ...]
     seconds: Mapping[str, float]
+    failure: str = ""
 
     @property
     def last(self) -> Equilibrium:
@@ -227,12 +231,28 @@ class Solution:
         model = self.last.model
         return {
             "status": self.status.value,
+            **({"failure": self.failure} if self.failure else {}),
             "title": self.scene.title,
             "dimension": model.dimension,
             "unknowns": model.unknowns,
             "seconds": dict(self.seconds),
             "steps": [step.to_dict() for step in self.steps],
         }
+
+
+def at_factor(
+    error: SolveError, scene: Any, factor: float, steps: Sequence[Equilibrium], seconds: Mapping[str, float]
+) -> SolveError:
+    """The error of one of several steps: with its factor, and with the steps before it."""
+    if len(scene.analysis.steps) == 1:
+        return error
+    detail = f"at factor {factor:.10g}" + (f": {error.detail}" if error.detail else "")
+    if steps:
+        detail += f"; {counted(len(steps), 'step', 'steps')} before it solved"
+    named = SolveError(error.status, detail, error.last)
+    if steps:
+        named.reached = Solution(scene, error.status, tuple(steps), seconds, detail)
+    return named
 
 
 def equilibrium(

@@ -45,7 +45,7 @@ class Spring(Staged):
     node : name of the node
     stiffness : N m, or N/m of a translational one
     axis : (3,), fixed axes of the undeformed scene - of a rotational spring; turns with the first party, at a
-        universal joint with the side that has this axis
+        universal joint with the side that has this axis; left out: the axis about which the node's hinge turns
     between : rotational: the two parties, of ground, the node, or members that end there; the angle is that of the
         second against the first since the undeformed scene; left out: the ground and the node
     rest : rad - angle at which it gives no moment; of a translational spring with a direction m, the travel
@@ -59,7 +59,7 @@ class Spring(Staged):
     type: Literal["rotational", "translational"] = "rotational"
     node: str
     stiffness: Annotated[float, BeforeValidator(_stiffness)]
-    axis: Direction = (0.0, 0.0, 1.0)
+    axis: Direction | None = None
     between: Annotated[tuple[str, str], BeforeValidator(_parties)] | None = None
     rest: Number = 0.0
     to: str | None = None

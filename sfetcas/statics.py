@@ -32,7 +32,7 @@ from .settings import Settings
 from .settling import Held
 from .several import Search, long_elements, missing, same, search
 from .single import finished, solve_model
-from .solution import Equilibrium, Solution
+from .solution import Equilibrium, Solution, at_factor
 from .threads import single_threaded
 from .touches import Touched
 
@@ -93,14 +93,18 @@ class _Run(Refining):
         last: tuple[float, Found] | None = None
         contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed) if self.scene.contacts else None
         for factor in self.scene.analysis.steps:
-            if contact is not None:
-                steps.append(self._in_contact(contact, pilot, factor))
-                continue
-            found = self._found(pilot, factor, last)
-            last = (factor, found) if found.prepared is pilot else None
-            steps.append(self._refined(found, factor))
-            if self.scene.analysis.equilibria == "all":
-                steps[-1:] = self._several(found, steps[-1], factor)
+            try:
+                if contact is not None:
+                    steps.append(self._in_contact(contact, pilot, factor))
+                    continue
+                found = self._found(pilot, factor, last)
+                last = (factor, found) if found.prepared is pilot else None
+                steps.append(self._refined(found, factor))
+                if self.scene.analysis.equilibria == "all":
+                    steps[-1:] = self._several(found, steps[-1], factor)
+            except SolveError as error:
+                self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
+                raise at_factor(self._named(pilot, error), self.scene, factor, steps, self.seconds) from None
         self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
         reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
         status = Status.SOLVED if reached or not self.asked else Status.SHORT
@@ -188,10 +192,7 @@ class _Run(Refining):
                 held = None if free_way and over and not self.started else held
         ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
         notes += () if pilot.model.conservative else (NO_ENERGY,)
-        try:
-            return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
-        except SolveError as error:
-            raise self._named(pilot, error) from None
+        return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
 
     def _first_pressed(
         self,

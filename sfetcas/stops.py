@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from .errors import SceneError, SolveError, Status
 from .scene import Scene
-from .solution import Equilibrium, Solution
+from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
 __all__ = ["solve_stopped"]
@@ -35,7 +35,10 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
     stops: Stops = ()
     for factor in scene.analysis.steps:
-        found, stops = _at_stops(scene, settings, factor, stops)
+        try:
+            found, stops = _at_stops(scene, settings, factor, stops)
+        except SolveError as error:
+            raise at_factor(error, scene, factor, steps, seconds) from None
         steps += found.steps
         status = found.status if status is Status.SOLVED else status
         seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
@@ -54,7 +57,7 @@ def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> 
             return found, stops
         stops = change
     names = ", ".join(f"springs.{name}" for name, _ in stops)
-    raise SolveError(Status.FAILED, f"no choice of stops holds at factor {factor:g}: {names}")
+    raise SolveError(Status.FAILED, f"no choice of stops holds: {names}")
 
 
 def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:

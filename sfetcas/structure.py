@@ -132,6 +132,12 @@ class Node(Staged):
         """Axis about which its support lets it turn: the direction of a cylindrical one."""
         return self.direction if self.support == "cylindrical" and self.direction is not None else self.axis
 
+    @property
+    def joint_axis(self) -> tuple[float, float, float]:
+        """Axis about which its support or its joint turns: the direction of a cylindrical one."""
+        cylindrical = self.direction is not None and "cylindrical" in (self.support, self.joint)
+        return self.direction if cylindrical and self.direction is not None else self.axis
+
 
 class Member(Staged):
     """A member between nodes: a flexible inextensible beam, a rigid body, or a body of small deformation.

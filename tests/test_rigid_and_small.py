@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -623,3 +624,93 @@ def test_small_scene_bends():
     """The zoo's small members are tried where frames turn a lot."""
     step = answer(small_space())
     assert 2 * np.arccos(abs(step.quaternion("C")[0])) > 0.25
+
+
+def held_body(nodes, order=1):
+    """A rigid body of members between supported hinges, each its place and axis, with an arm that bends."""
+    names = list(nodes)
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 5.0, "EI3": 5.0, "GJ": 4.0}},
+        "nodes": {n: {"position": at, "support": "hinge", "axis": axis} for n, (at, axis) in nodes.items()},
+        "members": {f"m{i}": {"nodes": [a, b][::order], "type": "rigid"} for i, (a, b) in enumerate(pairwise(names))},
+        "loads": {"f": {"type": "force", "node": "end", "value": [0.3, 0.5, -0.4]}},
+        "analysis": {"accuracy": 1e-6},
+    }
+    table["nodes"]["end"] = {"position": [0.8, 0.1, 1.0]}
+    table["members"]["arm"] = {"nodes": [names[1], "end"], "section": "s"}
+    return table
+
+
+COLLINEAR = {"a": ([0, 0, 0], [0, 0, 1]), "b": ([0, 0, 1], [0, 0, 1]), "c": ([0, 0, 2], [0, 0, 1])}
+SKEW = {"a": ([0, 0, 0], [1, 0, 0]), "b": ([0, 0, 1], [0, 1, 0]), "c": ([0.5, 0, 1.4], [0, 0.6, 0.8])}
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("nodes", [COLLINEAR, SKEW])
+def test_redundant_reactions_are_the_smallest_that_balance(nodes, order):
+    """Against the pseudo-inverse of the six balances of the body; no hinge has a moment about its axis."""
+    table = held_body(nodes, order)
+    if nodes is COLLINEAR:
+        table["springs"] = {"s": {"node": "b", "stiffness": 3.0}}
+    step = sfetcas.solve(made(table)).last
+    at, force, length = step.position("end"), np.array([0.3, 0.5, -0.4]), step.model.scales.length
+    columns, found = [], []
+    for name, (place, axis) in nodes.items():
+        axis, place = np.array(axis), np.array(place)
+        across = np.eye(3) - np.outer(axis, axis)
+        columns += [np.append(e, np.cross(place, e)) for e in np.eye(3)]
+        columns += [np.append(np.zeros(3), length * across @ e) for e in np.eye(3)]
+        reaction, moment = step.reaction(name)
+        assert moment @ axis == pytest.approx(0.0, abs=1e-10)
+        found.append(np.append(reaction, moment / length))
+    load = np.append(force, np.cross(at, force))
+    # What the spring does about the hinges is no reaction.
+    if nodes is COLLINEAR:
+        load[5] += step.spring("s").effort
+    smallest = np.linalg.pinv(np.array(columns).T) @ -load
+    # Moments inside count 1e-8 beside reactions; the arm is balanced to 1e-10.
+    np.testing.assert_allclose(np.concatenate(found), smallest, atol=1e-7)
+    assert any("not unique" in note for note in step.notes)
+
+
+def test_loops_within_one_rigid_body_need_no_closings():
+    """A ladder of rigid members is one body: no redundant rows, and the answer of a single member in its place."""
+    table = {
+        "nodes": {f"n{i}{j}": {"position": [0.5 * i, 0.4 * j]} for i in range(6) for j in range(2)},
+        "members": {f"v{i}": {"nodes": [f"n{i}0", f"n{i}1"], "type": "rigid"} for i in range(6)},
+        "sections": {"s": {"EI3": 1.0}},
+        "springs": {"s": {"node": "n00", "stiffness": 2.0}},
+        "loads": {"f": {"type": "force", "node": "e", "value": [0.4, -0.7]}},
+        "analysis": {"accuracy": 1e-7},
+    }
+    for i, (a, b) in enumerate(pairwise(range(6))):
+        table["members"] |= {f"h{i}{j}": {"nodes": [f"n{a}{j}", f"n{b}{j}"], "type": "rigid"} for j in range(2)}
+    table["nodes"]["n00"]["support"] = "hinge"
+    table["nodes"]["e"] = {"position": [3.2, 0.5]}
+    table["members"]["f"] = {"nodes": ["n51", "e"], "section": "s"}
+    step = sfetcas.solve(made(table)).last
+    assert not step.model.positions.rows
+    table["nodes"] = {n: table["nodes"][n] for n in ("n00", "n51", "e")}
+    table["members"] = {"f": table["members"]["f"], "one": {"nodes": ["n00", "n51"], "type": "rigid"}}
+    alone = sfetcas.solve(made(table)).last
+    # Twice the accuracy asked for, times the size.
+    np.testing.assert_allclose(step.position("e"), alone.position("e"), atol=6e-7)
+    for found, wanted in zip(step.reaction("n00"), alone.reaction("n00"), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_spring_turns_about_the_axis_of_its_hinge():
+    table = {
+        "nodes": {"A": {"position": [0, 0, 0], "support": "hinge", "axis": [0, 1, 0]}, "B": {"position": [1, 0, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"s": {"node": "A", "stiffness": 2.0}},
+        "loads": {"c": {"type": "moment", "node": "B", "value": [0, 0.5, 0]}},
+    }
+    step = sfetcas.solve(made(table)).last
+    assert step.spring("s").travel == pytest.approx(0.25, abs=1e-12)
+    table["springs"]["s"]["axis"] = [0, 0, 1]
+    with pytest.raises(
+        sfetcas.SceneError, match=r"^springs\.s\.axis: found \[0.0, 0.0, 1.0\], accepted: along the axis"
+    ):
+        made(table)

@@ -8,6 +8,7 @@ from scenes import SOFT, UNLIKE, ZOO, arch, bend_45, cantilever, elastica, guide
 
 import sfetcas
 from sfetcas import SolveError, Status, benchmark, meshing
+from sfetcas.cli import main
 from sfetcas.fields import Fields, transferred
 from sfetcas.prepared import Prepared
 from sfetcas.statics import Settings, pilot_of, solve, solve_model
@@ -450,3 +451,54 @@ def test_without_flexible_members_nothing_is_assembled_twice(monkeypatch):
     assert len(assembled) == 1
     assert solve(benchmark.of_all_types(12)).last.certificate.error_estimate > 0.0
     assert len(assembled) == 3
+
+
+def test_failing_step_is_named_and_the_steps_before_it_are_kept(tmp_path, capsys):
+    """A guide that pulls the tip farther than the beam is long: the first two steps are solved."""
+    table = {
+        "sections": {"s": SOFT},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [0.5, 0.5], "support": "slider", "direction": [1, 0]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "motions": {"pull": {"node": "B", "displacement": [0.4, 0]}},
+        "analysis": {"steps": [-0.5, -0.25, 1.0], "accuracy": 1e-5},
+    }
+    with pytest.raises(sfetcas.SolveError, match=r"at factor 1:? .*2 steps before it solved") as caught:
+        sfetcas.solve(made(table))
+    reached = caught.value.reached
+    assert [step.factor for step in reached.steps] == [-0.5, -0.25]
+    # What a motion prescribes holds to rounding.
+    assert reached.last.position("B")[0] == pytest.approx(0.4, abs=1e-12)
+    file, answer = tmp_path / "scene.json", tmp_path / "answer.json"
+    file.write_text(json.dumps(table))
+    assert main(["run", str(file), "--json", str(answer)]) == 3
+    told = json.loads(answer.read_text())
+    assert told["status"] == reached.status.value != "solved"
+    assert told["failure"].startswith("at factor 1")
+    assert len(told["steps"]) == 2
+    assert "no solution" in capsys.readouterr().err
+
+
+def test_taut_member_that_joints_would_bend_is_named():
+    """A straight shaft between universal joints that cannot come closer: it would have to bend."""
+    bend = [0.242535625, -0.9701425, 0]
+    table = {
+        "sections": {"s": {"EI2": 13.0, "EI3": 13.0, "GJ": 10.0}},
+        "nodes": {
+            "in": {"position": [0, 0, 0], "support": "hinge", "axis": [1, 0, 0]},
+            "u1": {"position": [0.1, 0, 0], "joint": "universal", "axis": [0, 0, 1], "axis2": [0, 1, 0]},
+            "u2": {"position": [0.3, 0.05, 0], "joint": "universal", "axis": [0, 0, 1], "axis2": bend},
+            "out": {"position": [0.4, 0.05, 0], "support": "hinge", "axis": [1, 0, 0]},
+        },
+        "members": {
+            "a": {"nodes": ["in", "u1"], "type": "rigid"},
+            "b": {"nodes": ["u1", "u2"], "section": "s"},
+            "c": {"nodes": ["u2", "out"], "type": "rigid"},
+        },
+        "springs": {"load": {"node": "out", "stiffness": 5.0}},
+        "motions": {"drive": {"node": "in", "rotation": 0.3}},
+    }
+    with pytest.raises(sfetcas.SolveError, match=r"cannot bend .* let one end slide: closing of b, x"):
+        sfetcas.solve(made(table))

@@ -24,7 +24,8 @@ def spring_wrench(step, name):
     """What a spring does to its second party: a force or a moment, from the answer and the scene."""
     spring, state = step.model.scene.springs[name], step.spring(name)
     if state.rotational:
-        axis = np.asarray(spring.axis) / np.linalg.norm(spring.axis)
+        axis = np.asarray(step.model.scene.spring_axis(name))
+        axis = axis / np.linalg.norm(axis)
         sides = np.array([rotation_of(step, spring, party) for party in spring.between or ("ground", spring.node)])
         data = np.array([*axis, spring.stiffness, spring.rest, state.travel])
         # Where the joint turns about other axes as well, the moment is not quite along the spring's.
