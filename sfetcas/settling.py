@@ -22,7 +22,7 @@ from .prepared import Prepared
 from .scene import Scene
 from .touches import Touched
 
-__all__ = ["APART", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed"]
+__all__ = ["APART", "SETTLED", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed", "stretched"]
 
 NEAR = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
@@ -109,7 +109,7 @@ def moved(touch: Touch, k: int, x: float) -> Touch:
     return replace(touch, at=x) if k == 0 else replace(touch, to=x)
 
 
-def _stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
+def stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
     """The mesh with its places of contact moved and the cuts between them in proportion; None where they cross."""
     cuts = dict(mesh.cuts)
     for name in {touch.member for touch in touches}:
@@ -245,7 +245,7 @@ class Settler:
         touches = list(held.mesh.touches)
         for (i, k), change in zip(free, step, strict=True):
             touches[i] = moved(touches[i], k, self._beside(touches[i], k, touches[i].places[k] + float(change)))
-        mesh = _stretched(self.scene, held.mesh, tuple(touches))
+        mesh = stretched(self.scene, held.mesh, tuple(touches))
         source = held.prepared.model, held.corrected.state
         if mesh is None:
             if any(min(x, 1.0 - x) < APART for i, k in free for x in [touches[i].places[k]]):
