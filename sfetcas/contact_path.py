@@ -8,10 +8,11 @@ error.  Each point has a mesh of its own, as elements end where something touche
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from . import statics
 from .accuracy import largest_difference
 from .contact_balance import refuse_lost_forces, refuse_unbalanced
 from .contact_curve import Stood
@@ -103,7 +104,7 @@ class _Run(Meshing):
     def _level(self, base: Mesh) -> _Level:
         run = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed)
         tracer = Tracer(run, base, self.span, self.knots)
-        begun = tracer.begin()
+        begun = tracer.begin(self._beside)
         if begun is None:
             raise SolveError(Status.FAILED, "no equilibrium in contact to start the path from at factor 0 or beside it")
         trace = tracer.traced(begun[0], self.analysis.points)
@@ -111,6 +112,11 @@ class _Run(Meshing):
             raise SolveError(Status.FAILED, trace.notes[-1], begun[0].standing.state)
         trace.notes[:0] = begun[1]
         return _Level(tracer, trace, tracer.crossings(trace, self.analysis.steps))
+
+    def _beside(self, factor: float) -> Equilibrium:
+        """The equilibrium at a factor by itself."""
+        analysis = self.scene.analysis.model_copy(update={"type": "static", "steps": (factor,)})
+        return statics.solve(self.scene.model_copy(update={"analysis": analysis}), self.settings).last
 
     # -- errors ---------------------------------------------------------------------------------
 

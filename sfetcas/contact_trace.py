@@ -6,6 +6,7 @@ is then looked for with the factor held, and the path goes on from there, away f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,8 +17,11 @@ from .arrays import Array
 from .contact_curve import ContactCurve, Stood
 from .contact_statics import ContactRun
 from .critical import root
+from .equations import State
 from .mesh import Mesh, Touch
+from .model import Model
 from .settling import Held, Ran, placed
+from .solution import Equilibrium
 
 __all__ = ["Trace", "Tracer"]
 
@@ -96,20 +100,25 @@ class Tracer:
 
     # -- begin ----------------------------------------------------------------------------------
 
-    def begin(self) -> tuple[Stood, tuple[str, ...]] | None:
-        """The first point, looking upwards unless the range ends at 0; beside factor 0 where all is open there."""
+    def begin(self, beside: Callable[[float], Equilibrium]) -> tuple[Stood, tuple[str, ...]] | None:
+        """The first point, looking upwards unless the range ends at 0; beside factor 0 where all is open there.
+
+        ``beside``: the equilibrium at a factor, on any mesh.
+        """
         up = 1.0 if self.span[1] > 0.0 else -1.0
-        beside = up * BEGINNING * (self.span[1] if up > 0.0 else -self.span[0])
-        for factor in (0.0, beside):
-            held = self.run.grown(self.base, factor)
+        factor, notes = 0.0, ()
+        held = self.run.grown(self.base, factor)
+        stood = None if held is None else self._looking(held, factor, up, 0.0)
+        if stood is None:
+            factor = up * BEGINNING * (self.span[1] if up > 0.0 else -self.span[0])
+            notes = (f"at factor 0 nothing tells which way the path goes: it starts at factor {factor:g}",)
+            near = beside(factor)
+            held = self._on_base(near.model, near.state, near.model.mesh.touches, factor)
             stood = None if held is None else self._looking(held, factor, up, 0.0)
-            if stood is None:
-                continue
-            self._choose_unit(stood)
-            stood = self._looking(stood.held, factor, up, 0.0) or stood
-            note = f"at factor 0 nothing tells which way the path goes: it starts at factor {factor:g}"
-            return stood, (note,) if factor else ()
-        return None
+        if stood is None:
+            return None
+        self._choose_unit(stood)
+        return self._looking(stood.held, factor, up, 0.0) or stood, notes
 
     def _choose_unit(self, stood: Stood) -> None:
         """The factor that would turn the structure by a radian were it linear, if that is in the range."""
@@ -186,9 +195,9 @@ class Tracer:
         failed = np.inf
         while length > 0.5 * EVENT:
             there = self.curve.along(now, length, before)
-            if there is not None and self._same(now, there, length, before):
-                if self.wrong(now, there) is None:
-                    return there, length, failed
+            near = there is not None and self._same(now, there, length, before)
+            if there is not None and near and self.wrong(now, there) is None:
+                return there, length, failed
             failed = now.arc + length
             length *= 0.5
         return None, length, failed
@@ -204,10 +213,12 @@ class Tracer:
 
     def wrong(self, now: Stood, there: Stood) -> tuple[Touch, ...] | None:
         """What has to touch otherwise at a point; what touches now where the step leads over an obstacle."""
-        changed = self.run.reviser.wrong(there.held, self.run.at(there.factor))
-        if changed is None and self.run.reviser.ran_over(now.held, there.held):
-            return now.held.mesh.touches
-        return changed
+        held, reviser, way = there.held, self.run.reviser, self.run.at(there.factor)
+        released = reviser.released(held.prepared.model, held.loading, held.mesh.touches, way)
+        if released != held.mesh.touches:
+            return released
+        changed = reviser.wrong(held, way)
+        return now.held.mesh.touches if changed is None and reviser.ran_over(now.held, held) else changed
 
     # -- over changes of what touches -----------------------------------------------------------
 
@@ -276,12 +287,9 @@ class Tracer:
 
     def _renewed(self, now: Stood) -> Stood:
         """The same point on a mesh that is not stretched; itself where it is not found there."""
-        source, sign = (now.held.prepared.model, now.held.corrected.state), float(np.sign(now.tangent.factor))
-        mesh = placed(self.scene, replace(self.base, touches=()), now.held.mesh.touches)
-        held = self.run.settler.settle(mesh, source, self.run.at(now.factor))
-        if not isinstance(held, Held):
-            return now
-        return self._looking(held, now.factor, sign, now.arc) or now
+        held = self.again(now)
+        sign = float(np.sign(now.tangent.factor))
+        return now if held is None else self._looking(held, now.factor, sign, now.arc) or now
 
     def _end(self, now: Stood, there: Stood) -> float | None:
         """The end of the piece that a step passes."""
@@ -333,9 +341,12 @@ class Tracer:
 
     def again(self, point: Stood) -> Held | None:
         """A point of a path on another mesh, settled on this one at the same factor."""
-        mesh = placed(self.scene, replace(self.base, touches=()), point.held.mesh.touches)
-        source = point.held.prepared.model, point.held.corrected.state
-        found = self.run.settler.settle(mesh, source, self.run.at(point.factor))
+        held = point.held
+        return self._on_base(held.prepared.model, held.corrected.state, held.mesh.touches, point.factor)
+
+    def _on_base(self, model: Model, state: State, touches: tuple[Touch, ...], factor: float) -> Held | None:
+        mesh = placed(self.scene, replace(self.base, touches=()), touches)
+        found = self.run.settler.settle(mesh, (model, state), self.run.at(factor))
         return found if isinstance(found, Held) else None
 
 
