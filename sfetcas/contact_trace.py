@@ -20,7 +20,7 @@ from .critical import root
 from .equations import State
 from .mesh import Mesh, Touch
 from .model import Model
-from .settling import Held, Ran, placed
+from .settling import Held, Ran, free_places, moved, placed
 from .solution import Equilibrium
 
 __all__ = ["Trace", "Tracer"]
@@ -39,6 +39,9 @@ FAR = 0.5
 
 EVENT = 1e-3
 """So near to a change of what touches the state beyond it is looked for: rad, or shares of the unit."""
+
+SHORTEST = 1e-5
+"""Shorter steps, rad or shares of the unit, end a path where nothing touches otherwise."""
 
 REACHES = (1.0, 3.0, 10.0, 30.0)
 """Times that distance at which it is looked for."""
@@ -148,8 +151,8 @@ class Tracer:
             there, used, failed = self._step(now, before, length)
             barrier = min(barrier, failed)
             if there is None or barrier - now.arc < EVENT:
-                before, barrier, length = None, np.inf, FIRST * 0.1
-                now = self._over(trace, now, there) or now
+                before, barrier, length = None, np.inf, 0.1 * FIRST
+                now = self._over(trace, now) or now
                 if trace.end == "lost":
                     return trace
                 continue
@@ -193,14 +196,25 @@ class Tracer:
     def _step(self, now: Stood, before: Stood | None, length: float) -> tuple[Stood | None, float, float]:
         """The next point, the length that led to it, and the nearest arc beyond which something changes."""
         failed = np.inf
-        while length > 0.5 * EVENT:
-            there = self.curve.along(now, length, before)
-            near = there is not None and self._same(now, there, length, before)
-            if there is not None and near and self.wrong(now, there) is None:
-                return there, length, failed
-            failed = now.arc + length
+        while length > SHORTEST and failed - now.arc > EVENT:
+            there = self.curve.along(now, length, before) if self._room(now, length) else None
+            if there is not None and self._same(now, there, length, before):
+                if self.wrong(now, there) is None:
+                    return there, length, failed
+                failed = now.arc + length
+            elif not self._room(now, length):
+                failed = now.arc + length
             length *= 0.5
         return None, length, failed
+
+    @staticmethod
+    def _room(now: Stood, length: float) -> bool:
+        """Whether all places stay within their members, and those of a stretch apart."""
+        touches = list(now.held.mesh.touches)
+        for (i, k), rate in zip(free_places(now.held.mesh.touches), now.rates, strict=True):
+            touches[i] = moved(touches[i], k, touches[i].places[k] + length * float(rate))
+        inside = all(0.0 <= x <= 1.0 for touch in touches for x in touch.places)
+        return inside and all(touch.to is None or touch.at < touch.to for touch in touches)
 
     def _same(self, now: Stood, there: Stood, length: float, before: Stood | None) -> bool:
         """Whether a point is on the same curve as the one before."""
@@ -222,7 +236,7 @@ class Tracer:
 
     # -- over changes of what touches -----------------------------------------------------------
 
-    def _over(self, trace: Trace, now: Stood, there: Stood | None) -> Stood | None:
+    def _over(self, trace: Trace, now: Stood) -> Stood | None:
         """The first point beyond a change of what touches, added to the path; None, which ends it, where none is found.
 
         Where the factor turns at the change, this is a limit point with a corner.
@@ -250,7 +264,9 @@ class Tracer:
                 rise = float(np.copysign(1e-3 * reach * self.curve.unit, rise))
             for turned, factor in ((False, now.factor + rise), (True, now.factor - rise)):
                 held = self._resolved(now, there, factor, reach)
-                if held is None or (turned and _kinds(held) == _kinds(now.held)):
+                back = (factor - now.factor) * now.tangent.factor < 0.0
+                # Back at what touches already is the path that led here.
+                if held is None or (back and _kinds(held) == _kinds(now.held)):
                     continue
                 after = self._looking(held, factor, float(np.sign(factor - now.factor)), now.arc + reach)
                 if after is not None:
