@@ -109,7 +109,7 @@ class Tracer:
         ``beside``: the equilibrium at a factor, on any mesh.
         """
         up = 1.0 if self.span[1] > 0.0 else -1.0
-        factor, notes = 0.0, ()
+        factor, notes = 0.0, tuple[str, ...]()
         held = self.run.grown(self.base, factor)
         stood = None if held is None else self._looking(held, factor, up, 0.0)
         if stood is None:
