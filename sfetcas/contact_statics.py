@@ -18,7 +18,7 @@ from .prepared import Prepared
 from .scene import Scene
 from .settling import Held, Way, placed
 from .stability import Stability
-from .touches import COARSE, Touched, edge_sides, obstacles_of
+from .touches import COARSE, NOISE, Touched, edge_sides, obstacles_of
 from .touching import Toucher, can_leave
 
 __all__ = ["ContactRun", "Pressed"]
@@ -233,12 +233,13 @@ class ContactRun:
     def _checked(self, held: Held, way: Way, error: float) -> Held:
         """The state on its fine mesh with what touches looked at as finely as the error of positions allows."""
         self.reviser.limit = max(self.fine, error)
+        self.reviser.noise = min(NOISE, self.accuracy) if self.fine >= COARSE else 0.0
         try:
             if self.reviser.wrong(held, way) is None:
                 return held
             return self._onto(held.mesh, held, way, anew=True)
         finally:
-            self.reviser.limit = COARSE
+            self.reviser.limit, self.reviser.noise = COARSE, NOISE
 
     @property
     def _all_fixed(self) -> bool:

@@ -47,6 +47,9 @@ SHRINK, LEAST_SHRINK = 0.1, 0.8
 PUSHED = 1e-3
 """Share of the largest force of a cushion from which a place counts as touching."""
 
+NEARLY = 0.9
+"""Share of a push that counts as all of it."""
+
 TINY = 1e-6
 """Share of the largest push that stands for none where a member lies without pressure."""
 
@@ -58,6 +61,9 @@ REACH = 30.0
 
 FALLS, FALL = 60, (4, 0.1)
 """What falls turns no node by more than 0.1 rad a step; every four steps it is asked whether it passed something."""
+
+FAR = 1e3
+"""Sizes of the scene: what has fallen further falls past everything."""
 
 BEGIN = 0.01
 """Share of the loads under which a mechanism, which has no place of its own without loads, is looked for at first."""
@@ -167,8 +173,10 @@ class Cushions:
         loading = prepared.model.loading(factor)
         state = prepared.equations.start(loading)
         for _ in range(FALLS):
-            lower = descend(prepared.equations, state, loading, prepared.weight, iterations=FALL[0], most=FALL[1])
-            if not self._passes(prepared, state, lower, loading):
+            # What falls past everything overflows within a few steps.
+            with np.errstate(over="ignore", invalid="ignore"):
+                lower = descend(prepared.equations, state, loading, prepared.weight, iterations=FALL[0], most=FALL[1])
+            if not np.abs(lower.y).max(initial=0.0) <= FAR or not self._passes(prepared, state, lower, loading):
                 return None
             near = prepared.distance(state, lower) < FALL[1]
             state = lower
@@ -267,7 +275,7 @@ class Cushions:
             lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
             for run in runs:
                 node = self._node(run, run.at)
-                if run.to is None and node in lying:
+                if run.to is None and node is not None and node in lying:
                     continue
                 lying |= {node} if run.to is None and node else set()
                 found.append(replace(run, way=self._way(touched, run)))
@@ -304,7 +312,11 @@ class Cushions:
             if self.scene.members[member].type == "rigid":
                 yield from self._of_rigid(contact, member, cuts[a:b], push[a:b])
             elif b - a <= 2:
-                yield Touch(contact, member, float(np.average(cuts[a:b], weights=push[a:b])), number=number)
+                most = float(cuts[a:b][np.argmax(push[a:b])])
+                at = float(np.average(cuts[a:b], weights=push[a:b]))
+                # Nearly all on a node is on the node.
+                on_node = most in (0.0, 1.0) and push[a:b].max() > NEARLY * push[a:b].sum()
+                yield Touch(contact, member, most if on_node else at, number=number)
             else:
                 yield Touch(contact, member, float(cuts[a]), float(cuts[b - 1]), number=number)
 

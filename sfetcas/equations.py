@@ -30,6 +30,9 @@ from .work import Work
 
 __all__ = ["Equations", "Point", "State"]
 
+NOTHING = 1e-12
+"""Share of the stiffness across an axis below which there is none about it."""
+
 
 @dataclass(frozen=True)
 class State:
@@ -100,6 +103,10 @@ class Equations:
         self._noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
         for link in self._linked:
             link.add_noise(self._noise)
+        # About an axis that nothing resists, rounding is that of what is stiff across it.
+        free = self.number[(self.number >= 0).all(axis=1)]
+        across = self._noise[free].max(axis=1, keepdims=True)
+        self._noise[free] = np.where(self._noise[free] > NOTHING * across, self._noise[free], across)
         self._noise[self.unknowns :] = 1.0
 
     # -- numbering ------------------------------------------------------------------------------

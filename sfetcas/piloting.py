@@ -18,11 +18,12 @@ from .scene import Scene
 from .settings import Settings
 from .single import cold
 
-__all__ = ["Piloting"]
+__all__ = ["NO_ENERGY", "NO_POTENTIAL", "Piloting"]
+
+NO_ENERGY = "loads without potential: no energy tells whether this is stable"
 
 NO_POTENTIAL = (
-    "loads without potential: no energy tells whether this is stable; the static tangent is regular all the way "
-    "from zero load, and flutter would only show in dynamics"
+    f"{NO_ENERGY}; the static tangent is regular all the way from zero load, and flutter would only show in dynamics"
 )
 
 CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))

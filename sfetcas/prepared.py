@@ -164,7 +164,8 @@ class Prepared:
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)
-        if not polished.converged and polished.residual > SOLVED:
+        # What falls without end has no finite residual, which no comparison would find too large.
+        if not polished.converged and not polished.residual <= SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
             detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if status is Status.FAILED:

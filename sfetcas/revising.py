@@ -14,7 +14,7 @@ from .model import Model
 from .obstacles import members_of, obstacle, swept, takes_part
 from .scene import Scene
 from .settling import APART, Held, Ran, Way, moved
-from .touches import Gap, Loose, obstacles_of
+from .touches import NOISE, Gap, Loose, obstacles_of
 
 __all__ = ["Reviser"]
 
@@ -41,13 +41,14 @@ class Reviser:
     ----------
     scene : Scene
     limit : float
-        How deep a place may be inside an obstacle, over the size of the scene.
+        How deep a place may be inside an obstacle, over the size of the scene.  ``noise``, an attribute, is the same
+        beside places where a member leaves it.
     sides : mapping
         Of each edge and member where it is allowed, see :func:`~sfetcas.touches.edge_sides`.
     """
 
     def __init__(self, scene: Scene, limit: float, sides: Mapping[tuple[str, str], float]) -> None:
-        self.scene, self.limit, self.sides = scene, limit, sides
+        self.scene, self.limit, self.noise, self.sides = scene, limit, NOISE, sides
 
     def ended(self, ran: Ran, crossed: set[str]) -> Touches:
         """What becomes of a touch one of whose places ran to the end of its member or met the other one.
@@ -145,7 +146,7 @@ class Reviser:
         flatter = self._opened(held) or self._flattened(held) or self._joined(held, way)
         if flatter is not None:
             return flatter
-        gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size)
+        gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size, self.noise * self.scene.size)
         if not gaps:
             return self._lifted(held)
         return _numbered(self._with(held, min(gaps, key=lambda gap: gap.depth)))
@@ -261,7 +262,8 @@ class Reviser:
                 x = np.linspace(here, there, 12)[1:]
                 gaps = held.touched.gaps(touch.contact, touch.member, x, way.offsets.get(touch.contact, 0.0))
                 # A member that rises over so short a way is nowhere inside.
-                if np.abs(gaps).max() > limit or gaps[:-1].min() > ROUNDED * self.scene.size:
+                rounded = ROUNDED * self.scene.size
+                if np.abs(gaps).max() > limit or (gaps.max() > rounded and gaps.min() > -rounded):
                     continue
                 gone = next((t for t, x in others if x == there), None)
                 low, high = min(*touch.places, there), max(*touch.places, there)

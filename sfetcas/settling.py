@@ -6,14 +6,14 @@ with differences once and Broyden's updates.  The mesh moves with them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .arrays import Array
 from .equations import Equations, State
-from .fields import transferred
+from .fields import Fields, transferred
 from .loading import Loading
 from .mesh import Mesh, Touch, breaks_of
 from .model import Model
@@ -138,14 +138,30 @@ def balanced(equations: Equations, state: State, loading: Loading) -> State:
     return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
 
 
-def closed(equations: Equations, state: State, loading: Loading) -> State:
-    """The state with the displacements kept as unknowns where the members lead: a new mesh has new places."""
+def _carried(source: tuple[Model, State], loading: Loading, model: Model, state: State) -> State:
+    """The state with nodes where they were: of a body without support another node may lead its places now."""
+    kept, known = model.positions.kept[: len(model.nodes)], set(source[0].positions.unknowns)
+    new = [i for i in np.flatnonzero((kept >= 0).all(axis=1)) if model.positions.unknowns[kept[i, 0]] not in known]
+    if not new:
+        return state
+    fields, y = Fields(Equations(source[0]), source[1], loading), state.y.copy()
+    for i in new:
+        start = np.asarray(model.scene.nodes[model.nodes[i]].position, dtype=float)
+        moved_by = (fields.position(model.nodes[i]) - start) / model.scales.length
+        y[kept[i]] = moved_by[: kept.shape[1]]
+    return replace(state, y=y)
+
+
+def closed(equations: Equations, state: State, loading: Loading, known: Collection[str]) -> State:
+    """The state with the displacements of places that are not known by name where the members lead."""
     n, positions = equations.unknowns, equations.model.positions
-    rows = len(positions.rows)
-    if not rows or not len(state.y) or rows * len(state.y) > 4_000_000:
+    rows, new = len(positions.rows), [i for i, name in enumerate(positions.unknowns) if name not in known]
+    if not rows or not new or rows * len(new) > 4_000_000:
         return state
     gaps = equations.at(state, loading).residual[n : n + rows]
-    return replace(state, y=state.y - np.linalg.lstsq(positions.W.full(), gaps, rcond=1e-12)[0])
+    y = state.y.copy()
+    y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=1e-12)[0]
+    return replace(state, y=y)
 
 
 class Settler:
@@ -183,10 +199,12 @@ class Settler:
             state = source[1]
         else:
             state = transferred(source[0], source[1], prepared.model)
-            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading)
+            state = _carried(source, way.loading(source[0]), prepared.model, state)
+            known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in self.scene.nodes for axis in "xyz")}
+            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
             state = balanced(prepared.equations, state, loading)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
-        if not corrected.converged and corrected.residual > 1e-9:
+        if not corrected.converged and not corrected.residual <= 1e-9:
             return None
         return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
 
@@ -212,13 +230,13 @@ class Settler:
             if not np.isfinite(step).all():
                 return None
             step, ran, room = _shortened(held.mesh.touches, free, step)
-            if ran is not None:
-                crowded += 1
-            elif _roomy(held.mesh.touches, free):
-                crowded = 0
+            near = ran is not None or not _roomy(held.mesh.touches, free)
+            crowded = crowded + 1 if near else 0
             end = ran or end
-            if (ran is not None and room < 10.0 * APART) or (end is not None and crowded > PATIENCE):
-                return end
+            if ran is not None and room < 10.0 * APART:
+                return ran
+            if end is not None and crowded > PATIENCE:
+                return replace(end, touches=held.mesh.touches)
             if np.abs(step).max() < SETTLED:
                 # Where places have no say, as along a straight rigid member, no step is no answer.
                 return replace(held, slopes=slopes) if np.abs(here).max() < MISSED else None
@@ -283,9 +301,10 @@ class Settler:
 
 
 def _meet(mesh: Mesh) -> bool:
-    """Whether places within members are so near to each other, or to an end, that they have no cut of their own."""
+    """Whether places have crossed, or are so near to each other or to an end that they have no cut of their own."""
     cuts = [(t.member, mesh.cut_at(t.member, x)) for t in mesh.touches for x in t.places if 0.0 < x < 1.0]
-    at_ends = any(cut in (0, len(mesh.cuts[member]) - 1) for member, cut in cuts)
+    turned = any(t.to is not None and t.to <= t.at for t in mesh.touches)
+    at_ends = turned or any(cut in (0, len(mesh.cuts[member]) - 1) for member, cut in cuts)
     return at_ends or len(set(cuts)) < len(cuts)
 
 

@@ -23,6 +23,7 @@ from .fields import transferred
 from .mesh import Mesh
 from .meshing import Found
 from .model import Model
+from .piloting import NO_ENERGY, NO_POTENTIAL
 from .prepared import Prepared
 from .records import counted
 from .refining import LEVELS, Refining
@@ -173,14 +174,20 @@ class _Run(Refining):
             last = None
             if free is not None:
                 there = self._onto(base, free, factor)
-                held, notes = _as_held(there, factor), there.notes
+                held = _as_held(there, factor)
+                # What was seen on the way without obstacles says nothing about the one in contact.
+                notes = tuple(note for note in there.notes if note != NO_POTENTIAL)
                 free_way = contact.reviser.wrong(held, contact.at(factor)) is None
-                if free_way and not contact.reviser.ran_over(None, held):
+                over = contact.reviser.ran_over(None, held)
+                if free_way and not over:
                     answer = self._refined(free, factor)
                     if contact.clear(answer.fields):
                         contact.last = (factor, held)
                         return answer
+                # Beyond an obstacle and clear of it: only a start may choose that.
+                held = None if free_way and over and not self.started else held
         ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
+        notes += () if pilot.model.conservative else (NO_ENERGY,)
         try:
             return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
         except SolveError as error:

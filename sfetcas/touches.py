@@ -26,7 +26,7 @@ from .obstacles import Obstacle, members_of, nearest, obstacle, takes_part
 from .rotations import STIFF, end_joints
 from .scene import Scene
 
-__all__ = ["COARSE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
+__all__ = ["COARSE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
 
 COARSE = 1e-6
 """Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
@@ -39,6 +39,9 @@ THIRDS = 40
 
 FIRST_RISE, MOST_RISE = 0.05, 0.9
 """Shares of a stretch: how much of it rises where nothing tells, and at most."""
+
+NEAR = 0.2
+"""Share of the scene's size: a member that is further behind an edge is elsewhere, and not held up by it."""
 
 SAMPLES = 12
 """Places in each element at which gaps are looked at."""
@@ -403,8 +406,17 @@ class Touched:
         place, tangent = self.fields.positions(member, x), self.fields.tangents(member, x)
         return self.obstacles[contact].gaps(place, tangent, offset, way)
 
-    def inside(self, offsets: Mapping[str, float], ways: Mapping[tuple[str, str], float], limit: float) -> list[Gap]:
-        """All runs of places that are deeper inside an obstacle than the limit (m), where members are free of it."""
+    def inside(
+        self,
+        offsets: Mapping[str, float],
+        ways: Mapping[tuple[str, str], float],
+        limit: float,
+        noise: float = 0.0,
+    ) -> list[Gap]:
+        """All runs of places that are deeper inside an obstacle than the limit (m), where members are free of it.
+
+        Within ``noise`` (m) of it a member may waver beside the places where it leaves.
+        """
         found: list[Gap] = []
         for contact, stop in self.obstacles.items():
             for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
@@ -412,7 +424,7 @@ class Touched:
                 if stop.kind == "sharp":
                     found += self._over_edge(contact, member, offset, ways[contact, member], limit)
                 else:
-                    found += self._runs(contact, member, offset, limit)
+                    found += self._runs(contact, member, offset, limit, noise)
         return found
 
     def takes_part(self, contact: str, node: str) -> bool:
@@ -420,7 +432,7 @@ class Touched:
         scene = self.model.scene
         return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
 
-    def _runs(self, contact: str, member: str, offset: float, limit: float) -> list[Gap]:
+    def _runs(self, contact: str, member: str, offset: float, limit: float, noise: float) -> list[Gap]:
         x = self._with_smallest(contact, member, self.samples(member), offset)
         keep = np.ones(len(x), bool)
         keep[0], keep[-1] = (self.takes_part(contact, node) for node in self.model.scene.members[member].nodes)
@@ -433,8 +445,7 @@ class Touched:
         runs = []
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             i = a + int(np.argmin(gaps[a:b]))
-            small = limit >= COARSE * self.model.scene.size and gaps[i] > -NOISE * self.model.scene.size
-            if small and self._wavers(contact, member, float(x[a]), float(x[b - 1])):
+            if gaps[i] > -noise and self._wavers(contact, member, float(x[a]), float(x[b - 1])):
                 continue
             runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
         return runs
@@ -494,8 +505,7 @@ class Touched:
         found = []
         for x in self.passing(contact, member):
             gap = float(self.gaps(contact, member, np.array([x]), offset, way)[0])
-            near = abs(gap) < 0.2 * self.model.scene.size
-            if gap < -limit and near:
+            if gap < -limit and abs(gap) < NEAR * self.model.scene.size:
                 found.append(Gap(contact, member, x, x, x, gap, way))
         return found
 
@@ -517,8 +527,9 @@ class Touched:
             x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
             if not sharp:
                 x = self._nearest(contact, member, x)
-            if len(x):
-                gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0))
+            gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0)) if len(x) else x
+            gaps = gaps[gaps > -NEAR * self.model.scene.size] if sharp else gaps
+            if len(gaps):
                 found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
         return min(found)
 

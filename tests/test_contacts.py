@@ -514,6 +514,23 @@ def test_rigid_links_hang_over_a_drum():
     np.testing.assert_allclose(balance(step), [0, 3, 0], atol=1e-9)
 
 
+def test_body_that_falls_past_its_obstacle_is_refused():
+    """Nothing is below it but a small drum, which a force along x pushes it off: no rest, and a sentence."""
+    drum = {"type": "circle", "center": [0.262, -0.3594], "radius": 0.05, "members": "all"}
+    table = {
+        "sections": {"s": SOFT},
+        "nodes": {"A": {"position": [0, 0]}, "B": {"position": [1.1226, 0.2653]}, "C": {"position": [1.9707, -0.1681]}},
+        "members": {
+            "m": {"nodes": ["A", "B"], "section": "s"},
+            "r": {"nodes": ["B", "C"], "type": "rigid", "shape": {"type": "arc", "angle": 0.549}},
+        },
+        "loads": {"F": {"type": "force", "node": "B", "value": [-0.1913, -0.3934]}},
+        "contacts": {"drum": drum},
+    }
+    with pytest.raises(SolveError, match="contacts.drum"):
+        solve(made(table))
+
+
 def test_contact_that_cannot_be_satisfied():
     """A clamped end driven into a floor takes its member along."""
     table = above(0.2, motions={"down": {"node": "A", "displacement": [0, -0.5]}})
@@ -574,6 +591,56 @@ def test_small_peg_is_not_jumped_over():
     assert step.along("m", [at])["position"][0][1] > -0.05
     free = solve(made({**table, "contacts": {}})).last
     assert np.interp(0.8, *free.along("m", np.linspace(0, 1, 200))["position"][:, :2].T) < -0.3
+
+
+def test_peg_is_not_jumped_over_by_loads_without_potential():
+    """A moment in space has no potential; about z it leaves the beam in the plane, with the answer found there."""
+    peg = {"center": [0.8, -0.05], "radius": 0.01, "member": "m"}
+    table = above(0.0, loads=tip(10.0) | {"M": {"type": "moment", "node": "B", "value": [0, 0, -0.1]}})
+    table["sections"] = {"s": {"EI2": 1.4, "EI3": 1.0, "GJ": 0.8}}
+    flat = solve(made({**table, "contacts": {"peg": {"type": "circle", **peg}}})).last
+    step = solve(made({**table, "contacts": {"peg": {"type": "cylinder", **peg}}, "dimension": "space"})).last
+    assert step.certificate.stable == "not defined"
+    # Each to the default accuracy of 1e-4.
+    assert step.contacts["peg"]["at"] == pytest.approx(flat.contacts["peg"]["at"], abs=2e-4)
+    np.testing.assert_allclose(step.position("B"), flat.position("B"), atol=2e-4)
+    # The way without the peg, which the note would be about, is not the way taken.
+    assert not any("all the way" in note for note in step.notes)
+
+
+def test_member_beside_a_node_on_a_cylinder_is_not_inside_it():
+    """At its end, where another member goes on, a member that bends round is the deeper beside the end."""
+    table = {
+        "dimension": "space",
+        "gravity": [0, 0, -1.367],
+        "sections": {"s": {"EI2": 0.577, "EI3": 1.0, "GJ": 0.884, "rhoA": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0, 0]},
+            "C": {"position": [1.426, -0.4048, 0.1208]},
+        },
+        "members": {
+            "m": {"nodes": ["A", "B"], "section": "s"},
+            "k": {"nodes": ["B", "C"], "section": "s", "b2": [-0.4652, -0.38976, 0.33444]},
+        },
+        "contacts": {
+            "drum": {"type": "cylinder", "center": [0.744, 0, -0.71], "radius": 0.5, "axis": [-0.2891, 0.9573, 0]}
+        },
+        "analysis": {"accuracy": 1e-5, "steps": [0.5]},
+    }
+    table["contacts"]["drum"]["member"] = "m"
+    step = solve(made(table)).last
+    assert step.contacts["drum"]["at"] is not None
+    # The accuracy asked for, of a size of 1.5 m.
+    assert smallest_gap(step) > -1e-5
+
+
+def test_edge_far_from_a_member_has_no_gap():
+    """Rolled up, a member shows its other side to an edge beyond its tip, which stops it nowhere: no gap below zero."""
+    edge = {"type": "point", "position": [1.09, -0.02], "side": [0, 1], "member": "m"}
+    step = solve(made(above(0.0, contact=edge, loads={"M": {"type": "moment", "node": "B", "value": -9.0}}))).last
+    assert step.contacts["floor"]["at"] is None
+    assert step.contacts["floor"]["gap"] is None
 
 
 def test_ring_is_flattened_on_a_floor():

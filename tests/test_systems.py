@@ -478,6 +478,31 @@ def test_universal_support_of_a_flexible_member():
     np.testing.assert_allclose(start["force"][0] + force, 0.0, atol=1e-10)
 
 
+def test_unloaded_arm_on_a_universal_joint_follows_what_carries_it():
+    """Nothing turns the arm, and nothing but rounding resists a turn of it about its joint's third axis."""
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 1.8, "EI3": 1.0, "GJ": 1.8}},
+        "nodes": {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [1, 0, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"w": {"type": "distributed", "member": "m", "value": [2.0, -1.4, -0.3]}},
+        "analysis": {"accuracy": 1e-6},
+    }
+    alone = sfetcas.solve(made(table)).last
+    table["nodes"]["B"] |= {"joint": "universal", "axis": [0, 1, 0], "axis2": [0, 0, 1]}
+    table["nodes"]["C"] = {"position": [1.4, 0.4, -0.1]}
+    table["members"]["k"] = {"nodes": ["B", "C"], "type": "rigid"}
+    table["springs"] = {
+        name: {"node": "B", "between": ["m", "k"], "stiffness": 2.0, "axis": axis}
+        for name, axis in (("y", [0, 1, 0]), ("z", [0, 0, 1]))
+    }
+    step = sfetcas.solve(made(table)).last
+    # Both to the accuracy asked for.
+    np.testing.assert_allclose(step.position("B"), alone.position("B"), atol=2e-6)
+    for name in ("y", "z"):
+        assert step.spring(name).to_dict()["angle"] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_cylindrical_support_holds_neither_along_nor_about_its_line():
     step = answer(SYSTEMS["small_space"]())
     line = np.asarray(step.model.scene.nodes["D"].direction)
