@@ -26,6 +26,7 @@ from .scene import Scene
 from .settings import Settings
 from .single import finished
 from .solution import Equilibrium
+from .touches import COARSE
 
 __all__ = ["follow_in_contact"]
 
@@ -103,6 +104,8 @@ class _Run(Meshing):
 
     def _level(self, base: Mesh) -> _Level:
         run = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed)
+        # Meshes are made for the accuracy asked for, unless they are prescribed.
+        run.reviser.limit = COARSE if self._prescribed else min(COARSE, self.accuracy)
         tracer = Tracer(run, base, self.span, self.knots)
         begun = tracer.begin(self._beside)
         if begun is None:

@@ -132,11 +132,13 @@ class Tracer:
 
     def _looking(self, held: Held, factor: float, sign: float, arc: float) -> Stood | None:
         """A state from which the factor rises or falls along the curve."""
-        self.curve.piece = self._piece(factor, sign) if self.scene.histories else (-np.inf, np.inf)
+        self.curve.piece = self._piece(factor, sign)
         return self.curve.stood(held, factor, Tangent(np.zeros(held.prepared.equations.total), sign), arc)
 
     def _piece(self, factor: float, sign: float) -> tuple[float, float]:
         """Neighbouring knots, on the side to which the factor goes; the last ones at the ends of the range."""
+        if not self.scene.histories:
+            return -np.inf, np.inf
         pieces = [(a, b) for a, b in zip(self.stops, self.stops[1:], strict=False) if a <= factor <= b]
         return pieces[-1] if sign > 0.0 else pieces[0]
 
@@ -156,11 +158,7 @@ class Tracer:
                 if trace.end == "lost":
                     return trace
                 continue
-            end = self._end(now, there)
-            there = self._at(now, there, end) if end is not None else there
-            if there is None:
-                trace.end = "lost"
-                return trace
+            end = there.factor if there.factor in self.stops else None
             self._take(trace, now, there)
             if end is not None and end in self.span:
                 trace.end = "range"
@@ -194,11 +192,19 @@ class Tracer:
         return float(np.clip(TURNING / max(np.arccos(cosine), 1e-12), 0.3, 2.0))
 
     def _step(self, now: Stood, before: Stood | None, length: float) -> tuple[Stood | None, float, float]:
-        """The next point, the length that led to it, and the nearest arc beyond which something changes."""
+        """The next point, the length that led to it, and the nearest arc beyond which something changes.
+
+        A step over the end of a piece ends there: beyond it loads and motions are others.
+        """
         failed = np.inf
         while length > SHORTEST and failed - now.arc > EVENT:
             there = self.curve.along(now, length, before) if self._room(now, length) else None
             if there is not None and self._same(now, there, length, before):
+                end = self._end(now, there)
+                there = there if end is None else self._at(now, there, end)
+            else:
+                there = None
+            if there is not None:
                 if self.wrong(now, there) is None:
                     return there, length, failed
                 failed = now.arc + length
@@ -337,10 +343,14 @@ class Tracer:
             held = self.run.settler.settle(near.held.mesh, source, self.run.at(factor))
         if not isinstance(held, Held) or largest_difference(near.held.touched.fields, held.touched.fields) > FAR:
             return None
-        along = near.tangent
-        if len(along.z) != held.prepared.equations.total:
-            along = Tangent(np.zeros(held.prepared.equations.total), along.factor)
-        return self.curve.stood(held, factor, along, arc)
+        if len(near.tangent.z) != held.prepared.equations.total:
+            return self.curve.stood(held, factor, Tangent(np.zeros(held.prepared.equations.total), near.tangent.factor), arc)
+        there = self.curve.stood(held, factor, near.tangent, arc)
+        if there is not None:
+            return there
+        # Without any load the direction may be open: that of the point beside it is as good.
+        state, plain = held.corrected.state, self.curve.plain(held.prepared)
+        return replace(near, held=held, standing=plain.standing(state, factor, near.tangent, arc=arc), arc=arc)
 
     def crossings(self, trace: Trace, factors: tuple[float, ...]) -> list[Stood]:
         """The points of a path at factors, in the order in which they are met."""
@@ -349,6 +359,7 @@ class Tracer:
         for a, b in zip(trace.points, trace.points[1:], strict=False):
             low, high = min(a.factor, b.factor), max(a.factor, b.factor)
             here = [f for f in dict.fromkeys(factors) if low < f < high or f == b.factor]
+            self.curve.piece = self._piece(0.5 * (low + high), 1.0)
             for factor in sorted(here, reverse=bool(b.factor < a.factor)):
                 found = self._at(a, b, factor)
                 if found is not None:
