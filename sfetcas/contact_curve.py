@@ -113,7 +113,7 @@ class ContactCurve:
     def _with_tangent(self, held: Held, standing: Standing, along: Tangent, arc: float) -> Stood | None:
         curve, inner = self.plain(held.prepared), standing.tangent
         free = free_places(held.mesh.touches)
-        ahead = self._conditions_ahead(curve, standing)
+        ahead = self._conditions_ahead(curve, standing) if free else np.zeros(0)
         beside = [self._beside(held, standing, free, j) for j in range(len(free))]
         if ahead is None or any(part is None for part in beside):
             return None

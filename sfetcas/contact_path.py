@@ -39,6 +39,9 @@ MARGIN = 16.0
 SAMPLES = 8
 """Points that are compared between two meshes, beside those that were asked for."""
 
+DEEP = 1e-7
+"""Share of the scene's size from which on a path sees what is inside: on its coarser mesh members waver by less."""
+
 STEADY = 0.3
 """Share of the factor in the tangent from which on a point may be compared at its factor."""
 
@@ -104,8 +107,7 @@ class _Run(Meshing):
 
     def _level(self, base: Mesh) -> _Level:
         run = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed)
-        # Meshes are made for the accuracy asked for, unless they are prescribed.
-        run.reviser.limit = COARSE if self._prescribed else min(COARSE, self.accuracy)
+        run.reviser.limit = COARSE if self._prescribed else float(np.clip(run.fine, DEEP, COARSE))
         tracer = Tracer(run, base, self.span, self.knots)
         begun = tracer.begin(self._beside)
         if begun is None:

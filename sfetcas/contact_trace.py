@@ -323,7 +323,9 @@ class Tracer:
         if factor in (a.factor, b.factor):
             return a if factor == a.factor else b
         if len(b.standing.state.q) != len(a.standing.state.q) or _kinds(a.held) != _kinds(b.held):
-            return self._settled(a, factor, a.arc)
+            # Between them something begins or ends to touch: on which side of that the factor is, is asked.
+            sides = (self._settled(near, factor, near.arc) for near in (a, b))
+            return next((there for there in sides if there is not None and self.wrong(a, there) is None), None)
         arc = b.arc - a.arc
         rise, left, right = b.factor - a.factor, arc * a.tangent.factor, arc * b.tangent.factor
 
@@ -344,7 +346,9 @@ class Tracer:
         if not isinstance(held, Held) or largest_difference(near.held.touched.fields, held.touched.fields) > FAR:
             return None
         if len(near.tangent.z) != held.prepared.equations.total:
-            return self.curve.stood(held, factor, Tangent(np.zeros(held.prepared.equations.total), near.tangent.factor), arc)
+            return self.curve.stood(
+                held, factor, Tangent(np.zeros(held.prepared.equations.total), near.tangent.factor), arc
+            )
         there = self.curve.stood(held, factor, near.tangent, arc)
         if there is not None:
             return there

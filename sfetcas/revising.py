@@ -31,7 +31,7 @@ LOADS = 1e-6
 """Share of the largest force or moment from which a load may open a stretch."""
 
 BEHIND = 1e-3
-"""Share of the size of the scene by which an edge that is left counts as farther away: what is deeper is inside anyway."""
+"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
 
 CORNER = 1e-4
 """Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
@@ -136,7 +136,9 @@ class Reviser:
 
     def _behind(self, now: Held | None, contact: str, member: str, stop: Obstacle) -> Obstacle:
         """An edge that a member begins to leave a little behind where it is: on the edge itself no side can be told."""
-        for touch in () if now is None or stop.kind != "sharp" else now.mesh.touches:
+        if now is None or stop.kind != "sharp":
+            return stop
+        for touch in now.mesh.touches:
             if (touch.contact, touch.member) == (contact, member):
                 shift = BEHIND * self.scene.size * now.touched.normal(touch, touch.at)
                 return replace(stop, place=stop.place - shift)

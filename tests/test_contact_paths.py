@@ -8,7 +8,6 @@ import pytest
 
 from sfetcas import Scene, SceneError, SolveError, Status, load, solve, switch
 from sfetcas.charts import chart
-from sfetcas.checks import look_up
 from sfetcas.cli import main
 
 PROBLEMS = File(__file__).parent.parent / "problems"
@@ -48,10 +47,6 @@ def half_beam(**analysis):
     del found["motions"]
     found["loads"] = {"F": {"type": "force", "node": "middle", "value": [0, -0.5]}}
     return found
-
-
-def falling_on_floor(height=0.2):
-    return table("floor_heavy_cantilever")
 
 
 @pytest.fixture(scope="module")
@@ -157,9 +152,10 @@ def test_free_then_a_place_then_a_stretch(heavy):
     path, statics = heavy
     (start, *free), (touch, *place), (lies, *stretch) = kinds(path)
     assert (start, free, place, stretch) == (0.0, [0, 0], [1, 0], [0, 1])
-    # From 1.653 the tip rests on the floor, from 15.03 a stretch lies flat; the path passes each within its reach.
+    # From 1.653 the tip rests on the floor, from 15.0276 (its angle vanishes) a stretch lies flat: within the reach of
+    # the path.
     assert touch == pytest.approx(1.653, rel=5e-3)
-    assert lies == pytest.approx(15.03, rel=5e-3)
+    assert lies == pytest.approx(15.0276, rel=5e-3)
     for ours, theirs in zip(path.steps, statics.steps, strict=True):
         # The accuracy asked for, twice.
         assert ours.position("tip") == pytest.approx(theirs.position("tip"), abs=2e-7)
@@ -182,6 +178,34 @@ def test_a_stretch_becomes_a_place_and_lifts_off():
     # The state beyond a change is looked for at a distance of up to 1 percent.
     assert hangs == pytest.approx(drop, rel=0.01)
     assert path.positions("tip")[-1][1] == pytest.approx(0.85 - drop, abs=1e-5)
+
+
+@pytest.mark.parametrize("factor", [15.03, 15.05, 15.08])
+def test_stretches_may_be_as_short_as_one_likes(factor):
+    """Beside where the stretch begins its length grows with the weight as on the way to twice as much."""
+    found = solve(Scene.from_dict(table("floor_heavy_cantilever", steps=[factor, 15.2], accuracy=1e-7)))
+    (begin, end), (later, _) = (entry.contacts["floor"]["at"] for entry in found.steps)
+    assert end == 1.0
+    # From 15.0276 to 15.2 the length is 2.8e-3: linear in the weight but for a percent.
+    share = (factor - 15.02757) / (15.2 - 15.02757)
+    assert 1.0 - begin == pytest.approx(share * (1.0 - later), rel=0.02)
+
+
+def test_a_member_leaves_an_edge():
+    """A cantilever pressed on an edge by a force that falls off again: free where it would be alone."""
+    found = table("drum_cantilever_tip_force", type="path", range=[0, 2], accuracy=1e-6, steps=[0.5, 2.0])
+    found["contacts"] = {"edge": {"type": "point", "position": [0.6, -0.01], "side": [0, 1], "member": "beam"}}
+    found["nodes"] = {"clamp": {"position": [0, 0], "support": "clamped"}, "tip": {"position": [1, 0]}}
+    found["members"] = {"beam": {"nodes": ["clamp", "tip"], "section": "strip"}}
+    found["sections"] = {"strip": {"EI3": 1.0}}
+    found["histories"] = {"on_off": {"t": [0, 1, 2], "value": [0, 1, 0.01]}}
+    found["loads"] = {"F": {"type": "force", "node": "tip", "value": [0.3, -1], "history": "on_off"}}
+    path = solve(Scene.from_dict(found))
+    assert path.status is Status.SOLVED
+    assert [entry[1:] for entry in kinds(path)] == [(0, 0), (1, 0), (0, 0)]
+    alone = solve(Scene.from_dict({**found, "contacts": {}, "analysis": {"accuracy": 1e-6, "steps": [2.0]}})).last
+    # Twice the accuracy asked for.
+    assert path.steps[-1].position("tip") == pytest.approx(alone.position("tip"), abs=2e-6)
 
 
 def test_histories_with_knots_are_passed():
