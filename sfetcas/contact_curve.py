@@ -113,7 +113,8 @@ class ContactCurve:
     def _with_tangent(self, held: Held, standing: Standing, along: Tangent, arc: float) -> Stood | None:
         curve, inner = self.plain(held.prepared), standing.tangent
         free = free_places(held.mesh.touches)
-        ahead = self._conditions_ahead(curve, standing) if free else np.zeros(0)
+        # Without places it tells whether the curve goes on at all: not so at the start of what is straight and pressed.
+        ahead = self._conditions_ahead(curve, standing)
         beside = [self._beside(held, standing, free, j) for j in range(len(free))]
         if ahead is None or any(part is None for part in beside):
             return None
