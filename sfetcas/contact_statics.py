@@ -32,6 +32,9 @@ WEAK = 1e-9
 IDLE = 1e-7
 """Share of the force on a stretch below which it is without pressure between its ends."""
 
+STRAIGHT = 1e-4
+"""Curvatures, times the length of the scene, below this are those of a straight member on a coarse mesh."""
+
 STAYS = "unstable, and no stable equilibrium was found along its escape shape"
 """A note."""
 
@@ -273,6 +276,17 @@ class ContactRun:
             notes.append(f"touches without force: {', '.join(weak)}")
         return stability, notes
 
+    def certified(self, held: Held, factor: float) -> tuple[Stability, tuple[str, ...]]:
+        """Stability of a state on its mesh with sliding places, also where these take stability away, and notes."""
+        way = self.at(factor)
+        stability, notes = self._stability(held, way)
+        judged = held.prepared.stability(held.corrected)
+        freed = self._freed(held, way) if judged.stable in (True, False) else 0
+        if freed:
+            ways_out = max(judged.negative + freed, 0)
+            stability = replace(judged, stable=ways_out == 0, negative=ways_out)
+        return stability, tuple(notes)
+
     def _judged(self, held: Held, way: Way) -> Stability:
         """Stability on what touches with a force, at places that slide.
 
@@ -337,6 +351,8 @@ class ContactRun:
         touched, touches = held.touched, held.mesh.touches
         free = [(i, k) for i, t in enumerate(touches) for k, x in enumerate(t.places) if 0.0 < x < 1.0]
         single = [j for j, (i, _) in enumerate(free) if touches[i].to is None and not touches[i].flat]
+        # Where the member is straight at an edge, as before an end that hangs over, sliding changes nothing.
+        single = [j for j in single if not self._straight_over_edge(held, touches[free[j][0]])]
         if not single:
             return 0
         slopes = self.settler.slopes(held, way)
@@ -349,6 +365,11 @@ class ContactRun:
         last = weight[:, None] * slopes[np.ix_(single, single)]
         first = np.where(sharp, push * own, -push * own)
         return int((np.linalg.eigvalsh(0.5 * (last + last.T)) < 0.0).sum()) - int((first < 0.0).sum())
+
+    @staticmethod
+    def _straight_over_edge(held: Held, touch: Touch) -> bool:
+        bent = abs(held.touched.gap_curvature(touch)) * held.prepared.model.scales.length
+        return held.touched.obstacles[touch.contact].kind == "sharp" and bent < STRAIGHT
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:

@@ -17,7 +17,13 @@ from .model import Model
 from .prepared import Prepared
 from .solution import Equilibrium
 
-__all__ = ["Branch", "Path", "PathPoint"]
+__all__ = ["NO_POTENTIAL", "Branch", "Path", "PathPoint"]
+
+NO_POTENTIAL = (
+    "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
+    "tangent is singular (divergence), and flutter would only show in dynamics"
+)
+"""A note."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +42,9 @@ class PathPoint:
         Arc length from the start, see :class:`Path`.
     kind : str
         ``""``, ``"limit point"`` or ``"bifurcation"``.
+    prepared : Prepared, optional
+        Its own discretisation, where that is not the one of the whole path: in contact elements end where something
+        touches.
     """
 
     factor: float
@@ -45,6 +54,7 @@ class PathPoint:
     stable: bool | str
     arc: float
     kind: str = ""
+    prepared: Prepared | None = field(repr=False, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +132,7 @@ class Path:
 
     @property
     def model(self) -> Model:
-        """Discretisation that the points are on."""
+        """Discretisation that the points are on, or the last one in contact."""
         return self.prepared.model
 
     @property
@@ -152,7 +162,7 @@ class Path:
 
     def fields(self, point: PathPoint) -> Fields:
         """Everything by name at a point."""
-        return Fields(self.prepared.equations, point.state, point.loading)
+        return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
 
     def positions(self, node: str, branch: int = 0) -> Array:
         """Positions of a node along the path or a branch, (points, 3) m."""

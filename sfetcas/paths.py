@@ -17,13 +17,14 @@ import numpy as np
 from .accuracy import largest_difference
 from .arclength import Curve, Standing, Tangent
 from .beginning import begin_path, check_slack
+from .contact_path import follow_in_contact
 from .critical import Event, at_factors, shapes_at
 from .errors import SceneError, SolveError, Status
 from .fields import Fields, transferred
 from .mesh import Mesh
 from .model import assemble
 from .newton import Corrected, relative_residual
-from .path import Branch, Path, PathPoint
+from .path import NO_POTENTIAL, Branch, Path, PathPoint
 from .prepared import Prepared
 from .scene import Scene
 from .solution import Equilibrium, equilibrium
@@ -86,6 +87,8 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     """
     if scene.analysis.type != "path":
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
+    if scene.contacts:
+        return follow_in_contact(scene, replace(settings or Settings(), **changes))
     return _Run(scene, replace(settings or Settings(), **changes)).path()
 
 
@@ -409,9 +412,4 @@ def _said(event: Event, has_energy: bool) -> tuple[str, ...]:
 DIVERGENCE = (
     "static divergence: the static tangent is singular, another equilibrium is adjacent; without a potential the "
     "structure may have become unstable before by flutter, which only shows in dynamics"
-)
-
-NO_POTENTIAL = (
-    "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
-    "tangent is singular (divergence), and flutter would only show in dynamics"
 )

@@ -11,7 +11,7 @@ from .errors import SolveError, Status
 from .loading import Loading
 from .mesh import SAME, Touch
 from .model import Model
-from .obstacles import members_of, obstacle, swept, takes_part
+from .obstacles import Obstacle, members_of, obstacle, swept, takes_part
 from .scene import Scene
 from .settling import APART, Held, Ran, Way, moved
 from .touches import NOISE, Gap, Loose, obstacles_of
@@ -29,6 +29,9 @@ ROUNDED = 1e-14
 
 LOADS = 1e-6
 """Share of the largest force or moment from which a load may open a stretch."""
+
+BEHIND = 1e-3
+"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
 
 CORNER = 1e-4
 """Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
@@ -127,9 +130,19 @@ class Reviser:
             for member in members_of(self.scene.contacts[contact], self.scene.members):
                 line = self.scene.center_lines[member]
                 begin = line.positions(np.linspace(0.0, 1.0, 65)) if now is None else now.touched.course(member)
-                if swept(stop, begin, there.touched.course(member)):
+                if swept(self._behind(now, contact, member, stop), begin, there.touched.course(member)):
                     return True
         return False
+
+    def _behind(self, now: Held | None, contact: str, member: str, stop: Obstacle) -> Obstacle:
+        """An edge that a member begins to leave a little behind where it is: on the edge itself no side can be told."""
+        if now is None or stop.kind != "sharp":
+            return stop
+        for touch in now.mesh.touches:
+            if (touch.contact, touch.member) == (contact, member):
+                shift = BEHIND * self.scene.size * now.touched.normal(touch, touch.at)
+                return replace(stop, place=stop.place - shift)
+        return stop
 
     def wrong(self, held: Held, way: Way) -> Touches | None:
         """What has to touch otherwise at this state; None where all is right."""
@@ -300,6 +313,8 @@ class Reviser:
             if (touch.contact, touch.member) != (gap.contact, gap.member):
                 continue
             beside = [x for x in touch.places if gap.begin - width <= x <= gap.end + width]
+            if not beside and touch.at in (0.0, 1.0) and touch.to is None and self._sinks(held, touch, gap.at):
+                beside = [touch.at]
             if not beside:
                 continue
             rest = touches[:i] + touches[i + 1 :]
@@ -319,6 +334,12 @@ class Reviser:
         if 0.0 < at < 1.0:
             at = float(np.clip(at, 2.0 * APART, 1.0 - 2.0 * APART))
         return (*touches, Touch(gap.contact, gap.member, at, way=gap.way))
+
+    @staticmethod
+    def _sinks(held: Held, touch: Touch, at: float) -> bool:
+        """Whether a member is inside an obstacle all the way from where it touches to another place."""
+        x = np.linspace(touch.at, at, 12)[1:]
+        return bool(held.touched.gaps(touch.contact, touch.member, x, touch.offset, touch.way).max() < 0.0)
 
     @staticmethod
     def _bend(held: Held, touch: Touch) -> float:

@@ -351,9 +351,11 @@ def _check_contacts(scene: Scene) -> None:
         if spring.stop is not None and scene.analysis.type == "path":
             message = "found a stop on a path, accepted: with analysis.type = 'static' and steps"
             raise SceneError(message, ("springs", name, "stop"))
-    if scene.contacts and scene.analysis.type == "path":
-        message = "found 'path' with contacts, accepted: 'static' with steps of a motion, which pass limit loads too"
-        raise SceneError(message, ("analysis", "type"))
+    if scene.contacts and scene.analysis.branches:
+        message = (
+            f"found {scene.analysis.branches} with contacts, accepted: 0, as bifurcations in contact are not located"
+        )
+        raise SceneError(message, ("analysis", "branches"))
     if scene.contacts and scene.analysis.equilibria == "all":
         message = "found 'all' with contacts, accepted: 'one'; a node's 'start' chooses among several"
         raise SceneError(message, ("analysis", "equilibria"))

@@ -22,7 +22,7 @@ from .prepared import Prepared
 from .scene import Scene
 from .touches import Touched
 
-__all__ = ["APART", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed"]
+__all__ = ["APART", "SETTLED", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed", "stretched"]
 
 NEAR = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
@@ -44,6 +44,9 @@ MOST_STEPS = 40
 
 PATIENCE = 8
 """Steps in a row in which a place may want beyond its room, before it counts as having got there."""
+
+ARRIVING = 0.01
+"""A step that is so much shorter than the one before leads to a root within its member, however near to an end."""
 
 MOST_TURN = 0.8
 """A step along the way is too long when its corrections turn a node by more, rad."""
@@ -109,7 +112,7 @@ def moved(touch: Touch, k: int, x: float) -> Touch:
     return replace(touch, at=x) if k == 0 else replace(touch, to=x)
 
 
-def _stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
+def stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
     """The mesh with its places of contact moved and the cuts between them in proportion; None where they cross."""
     cuts = dict(mesh.cuts)
     for name in {touch.member for touch in touches}:
@@ -215,7 +218,7 @@ class Settler:
             return None
         slopes: Array | None = None
         end: Ran | None = None
-        last, crowded = np.inf, 0
+        last, size, crowded = np.inf, np.inf, 0
         for _ in range(MOST_STEPS):
             free = free_places(held.mesh.touches)
             if not free:
@@ -230,14 +233,15 @@ class Settler:
             if not np.isfinite(step).all():
                 return None
             step, ran, room = _shortened(held.mesh.touches, free, step)
-            near = ran is not None or not _roomy(held.mesh.touches, free)
+            near = ran is not None or _nearest_end(held.mesh.touches, free) is not None
             crowded = crowded + 1 if near else 0
             end = ran or end
             if ran is not None and room < 10.0 * APART:
                 return ran
-            if end is not None and crowded > PATIENCE:
-                return replace(end, touches=held.mesh.touches)
-            if np.abs(step).max() < SETTLED:
+            size, before = float(np.abs(step).max()), size
+            if end is not None and crowded > PATIENCE and size > ARRIVING * before:
+                return _nearest_end(held.mesh.touches, free) or replace(end, touches=held.mesh.touches)
+            if size < SETTLED:
                 # Where places have no say, as along a straight rigid member, no step is no answer.
                 return replace(held, slopes=slopes) if np.abs(here).max() < MISSED else None
             there = self._stepped(held, free, step, way)
@@ -263,7 +267,7 @@ class Settler:
         touches = list(held.mesh.touches)
         for (i, k), change in zip(free, step, strict=True):
             touches[i] = moved(touches[i], k, self._beside(touches[i], k, touches[i].places[k] + float(change)))
-        mesh = _stretched(self.scene, held.mesh, tuple(touches))
+        mesh = stretched(self.scene, held.mesh, tuple(touches))
         source = held.prepared.model, held.corrected.state
         if mesh is None:
             if any(min(x, 1.0 - x) < APART for i, k in free for x in [touches[i].places[k]]):
@@ -312,9 +316,13 @@ def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
     return np.array([touches[i].places[k] for i, k in free])
 
 
-def _roomy(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> bool:
-    """Whether no place is so near to an end of its member that rounding may lead it to and fro there."""
-    return all(CLOSE < touches[i].places[k] < 1.0 - CLOSE for i, k in free)
+def _nearest_end(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Ran | None:
+    """The place that is nearest to an end of its member, if so near that rounding may lead it to and fro there."""
+    room = {(i, k): min(touches[i].places[k], 1.0 - touches[i].places[k]) for i, k in free}
+    i, k = min(room, key=lambda place: room[place])
+    touch, x = touches[i], touches[i].places[k]
+    collapsed = touch.to is not None and (touch.places[1 - k] > x) == (x > 0.5)
+    return Ran(touches, i, k, collapsed) if room[i, k] <= CLOSE else None
 
 
 def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array) -> tuple[Array, Ran | None, float]:

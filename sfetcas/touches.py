@@ -31,6 +31,9 @@ __all__ = ["COARSE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "e
 COARSE = 1e-6
 """Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
 
+BESIDE = np.geomspace(1e-5, 1e-2, 10)
+"""Fractions of the length from an end that touches at which gaps are looked at too."""
+
 NOISE = 1e-4
 """On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
 
@@ -433,7 +436,7 @@ class Touched:
         return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
 
     def _runs(self, contact: str, member: str, offset: float, limit: float, noise: float) -> list[Gap]:
-        x = self._with_smallest(contact, member, self.samples(member), offset)
+        x = self._with_smallest(contact, member, self._beside_ends(contact, member, self.samples(member)), offset)
         keep = np.ones(len(x), bool)
         keep[0], keep[-1] = (self.takes_part(contact, node) for node in self.model.scene.members[member].nodes)
         for touch in self.model.mesh.touches:
@@ -449,6 +452,12 @@ class Touched:
                 continue
             runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
         return runs
+
+    def _beside_ends(self, contact: str, member: str, x: Array) -> Array:
+        """The samples, and some close to ends that touch: what begins to lie there dips in over a short way."""
+        touches = [t for t in self.model.mesh.touches if (t.contact, t.member) == (contact, member) and t.to is None]
+        close = [abs(touch.at - BESIDE) for touch in touches if touch.at in (0.0, 1.0)]
+        return np.unique(np.concatenate([x, *close]))
 
     def _wavers(self, contact: str, member: str, begin: float, end: float) -> bool:
         """Whether a run is in the element beside a place where curvatures already say that the member leaves.

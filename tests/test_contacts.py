@@ -558,7 +558,7 @@ def test_plane_may_be_given_by_its_other_normal():
 @pytest.mark.parametrize(
     ("analysis", "sentence"),
     [
-        ({"type": "path", "range": [0, 1]}, r"^analysis\.type: found 'path' with contacts"),
+        ({"type": "path", "range": [0, 1], "branches": 1}, r"^analysis\.branches: found 1 with contacts"),
         ({"equilibria": "all"}, r"^analysis\.equilibria: found 'all' with contacts"),
     ],
 )

@@ -1,0 +1,261 @@
+"""Paths in contact: against repeated solves, closed forms and a limit load; what begins and ends to touch; refusals."""
+
+import json
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+
+from sfetcas import Scene, SceneError, SolveError, Status, load, solve, switch
+from sfetcas.charts import chart
+from sfetcas.cli import main
+
+PROBLEMS = File(__file__).parent.parent / "problems"
+LIMIT, DEFLECTION, ARC = 1.66795210859543, 0.476377597825455, 1.13015070107339
+"""Limit load of a beam between knife edges at -1 and 1, its deflection, and the beam's length from middle to edge."""
+
+
+def table(name, **analysis):
+    """The scene of a problem file as a dictionary, with another analysis and nothing expected."""
+    found = load(PROBLEMS / f"{name}.toml").to_dict()
+    found.pop("expect")
+    found["analysis"] = analysis
+    return found
+
+
+def path_and_statics(found, span, steps, accuracy=1e-7):
+    """The path of a scene, and its equilibria at some factors by themselves."""
+    path = {"type": "path", "range": span, "steps": steps, "accuracy": accuracy}
+    statics = {"steps": steps, "accuracy": accuracy}
+    return [solve(Scene.from_dict({**found, "analysis": analysis})) for analysis in (path, statics)]
+
+
+def kinds(path):
+    """What touches along a path, each change once: (factor, number of places, number of stretches)."""
+    told = []
+    for point in path.points:
+        touches = point.prepared.model.mesh.touches
+        entry = sum(t.to is None for t in touches), sum(t.to is not None for t in touches)
+        if not told or told[-1][1:] != entry:
+            told.append((point.factor, *entry))
+    return told
+
+
+def half_beam(**analysis):
+    """Half of the beam over knife edges, its middle a sleeve, under half of the force as the factor."""
+    found = table("knife_edge_half_beam", **analysis)
+    del found["motions"]
+    found["loads"] = {"F": {"type": "force", "node": "middle", "value": [0, -0.5]}}
+    return found
+
+
+@pytest.fixture(scope="module")
+def half_path():
+    return solve(Scene.from_dict(half_beam(type="path", range=[0, 2], accuracy=1e-8, steps=[1.0])))
+
+
+@pytest.fixture(scope="module")
+def heavy():
+    return path_and_statics(table("floor_heavy_cantilever"), [0, 30], [1.0, 6.0, 30.0])
+
+
+# -- limit points ---------------------------------------------------------------------------------
+
+
+def test_limit_load_between_knife_edges(half_path):
+    (limit,) = half_path.limit_points
+    # The accuracy asked for is 1e-8.
+    assert limit.factor == pytest.approx(LIMIT, rel=1e-8)
+    # Beside its limit the factor is flat: an error e of it goes with the root of e in the position.
+    assert limit.position("middle")[1] == pytest.approx(-DEFLECTION, abs=1e-6)
+    assert limit.contacts["edge"]["at"] == pytest.approx(ARC / 3.0, abs=1e-6)
+    assert limit.certificate.error_estimate <= 1e-8
+    assert half_path.status is Status.SOLVED
+
+
+def test_stability_is_lost_at_the_limit_point(half_path):
+    number = next(i for i, point in enumerate(half_path.points) if point.kind == "limit point")
+    assert {point.stable for point in half_path.points[:number]} == {True}
+    assert {point.negative for point in half_path.points[number + 1 :]} == {1}
+    before, after = half_path.steps
+    assert (before.certificate.stable, after.certificate.stable) == (True, False)
+
+
+def test_path_over_the_force_is_that_over_the_displacement(half_path):
+    """The same equilibria with the middle pressed down, which has no limit point: the force is the reaction."""
+    pressed = [-entry.position("middle")[1] for entry in half_path.steps]
+    found = solve(Scene.from_dict(table("knife_edge_half_beam", steps=pressed, accuracy=1e-8)))
+    for ours, theirs in zip(half_path.steps, found.steps, strict=True):
+        # 1e-8 asked for, times forces of 1 and what the place of contact gives.
+        assert theirs.reaction("middle")[0][1] == pytest.approx(-0.5 * ours.factor, abs=1e-6)
+        assert ours.contacts["edge"]["at"] == pytest.approx(theirs.contacts["edge"]["at"], abs=1e-6)
+
+
+def test_work_of_the_loads_is_stored_along_the_path(half_path):
+    """Frictionless obstacles that stand still do no work: the elastic energy is the integral of force over way."""
+    factors = half_path.main.factors
+    way = -half_path.positions("middle")[:, 1]
+    done = np.concatenate([[0.0], np.cumsum(0.25 * (factors[1:] + factors[:-1]) * np.diff(way))])
+    for entry in half_path.steps:
+        near = np.interp(-entry.position("middle")[1], way, done)
+        # The trapezoidal rule over some fifty points: 1e-3 of the energy.
+        assert entry.energy["elastic"] == pytest.approx(near, rel=5e-3)
+
+
+# -- against repeated solves ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "span", "steps"),
+    [
+        ("drum_cantilever_tip_force", [0, 6], [1.2, 6.0]),
+        ("floor_cantilever_tip_moment", [0, 2], [0.4, 1.0, 2.0]),
+        ("floor_rod_lifted_by_one_end", [0, 1.6], [0.4, 1.6]),
+        ("wall_hinged_beam_end_shortening", [0, 0.04], [0.015, 0.028, 0.04]),
+    ],
+)
+def test_path_meets_the_equilibria_of_repeated_solves(name, span, steps):
+    path, statics = path_and_statics(table(name), span, steps)
+    assert [entry.factor for entry in path.steps] == steps
+    assert path.status is Status.SOLVED
+    for ours, theirs in zip(path.steps, statics.steps, strict=True):
+        for node in path.scene.nodes:
+            # Twice the accuracy asked for, times the largest size among these scenes.
+            assert ours.position(node) == pytest.approx(theirs.position(node), abs=6e-7)
+        for contact, entry in theirs.contacts.items():
+            assert np.shape(ours.contacts[contact]["force"]) == np.shape(entry["force"])
+            # Forces of order 10: a hundred times the accuracy asked for.
+            assert np.asarray(ours.contacts[contact]["force"]) == pytest.approx(np.asarray(entry["force"]), abs=1e-4)
+        assert ours.certificate.stable is theirs.certificate.stable is True
+
+
+def test_points_of_the_path_are_equilibria(heavy):
+    path = heavy[0]
+    for point in path.points[::7]:
+        load = path.fields(point).total_load[1]
+        clamp = path.fields(point).reaction("clamp")[0][1]
+        floor = look_up_force(path, point)
+        # Forces of up to 30, in balance to rounding of Newton's method.
+        assert clamp + floor + load == pytest.approx(0.0, abs=1e-9)
+
+
+def look_up_force(path, point):
+    from sfetcas.touches import answers
+
+    return np.reshape(answers(path.fields(point))["floor"]["force"], (-1, 3)).sum(axis=0)[1]
+
+
+# -- what begins and ends to touch ----------------------------------------------------------------
+
+
+def test_free_then_a_place_then_a_stretch(heavy):
+    path, statics = heavy
+    (start, *free), (touch, *place), (lies, *stretch) = kinds(path)
+    assert (start, free, place, stretch) == (0.0, [0, 0], [1, 0], [0, 1])
+    # From 1.653 the tip rests on the floor, from 15.0276 (its angle vanishes) a stretch lies flat: within the reach of
+    # the path.
+    assert touch == pytest.approx(1.653, rel=5e-3)
+    assert lies == pytest.approx(15.0276, rel=5e-3)
+    for ours, theirs in zip(path.steps, statics.steps, strict=True):
+        # The accuracy asked for, twice.
+        assert ours.position("tip") == pytest.approx(theirs.position("tip"), abs=2e-7)
+
+
+def test_a_stretch_becomes_a_place_and_lifts_off():
+    """A heavy cantilever whose clamp is raised from near the floor: it lies, then touches with its tip, then hangs."""
+    found = table("floor_heavy_cantilever", type="path", range=[0, 0.8], accuracy=1e-6)
+    found["nodes"]["clamp"]["position"] = [0, 0.05]
+    found["nodes"]["tip"]["position"] = [1, 0.05]
+    found["loads"]["weight"] |= {"value": [0, -10], "history": "steady"}
+    found["histories"] = {"steady": {"t": [0], "value": [1]}}
+    found["motions"] = {"raised": {"node": "clamp", "displacement": [0, 1]}}
+    path = solve(Scene.from_dict(found))
+    assert [entry[1:] for entry in kinds(path)] == [(0, 1), (1, 0), (0, 0)]
+    hangs = kinds(path)[-1][0] + 0.05
+    # From there on the tip is as far below the clamp as that of a free cantilever, whatever the height.
+    free = {**found, "contacts": {}, "motions": {}, "analysis": {"accuracy": 1e-6}}
+    drop = 0.05 - solve(Scene.from_dict(free)).last.position("tip")[1]
+    # The state beyond a change is looked for at a distance of up to 1 percent.
+    assert hangs == pytest.approx(drop, rel=0.01)
+    assert path.positions("tip")[-1][1] == pytest.approx(0.85 - drop, abs=1e-5)
+
+
+@pytest.mark.parametrize("factor", [15.03, 15.05, 15.08])
+def test_stretches_may_be_as_short_as_one_likes(factor):
+    """Beside where the stretch begins its length grows with the weight as on the way to twice as much."""
+    found = solve(Scene.from_dict(table("floor_heavy_cantilever", steps=[factor, 15.2], accuracy=1e-7)))
+    (begin, end), (later, _) = (entry.contacts["floor"]["at"] for entry in found.steps)
+    assert end == 1.0
+    # From 15.0276 to 15.2 the length is 2.8e-3: linear in the weight but for a percent.
+    share = (factor - 15.02757) / (15.2 - 15.02757)
+    assert 1.0 - begin == pytest.approx(share * (1.0 - later), rel=0.02)
+
+
+def test_a_member_leaves_an_edge():
+    """A cantilever pressed on an edge by a force that falls off again: free where it would be alone."""
+    found = table("drum_cantilever_tip_force", type="path", range=[0, 2], accuracy=1e-6, steps=[0.5, 2.0])
+    found["contacts"] = {"edge": {"type": "point", "position": [0.6, -0.01], "side": [0, 1], "member": "beam"}}
+    found["nodes"] = {"clamp": {"position": [0, 0], "support": "clamped"}, "tip": {"position": [1, 0]}}
+    found["members"] = {"beam": {"nodes": ["clamp", "tip"], "section": "strip"}}
+    found["sections"] = {"strip": {"EI3": 1.0}}
+    found["histories"] = {"on_off": {"t": [0, 1, 2], "value": [0, 1, 0.01]}}
+    found["loads"] = {"F": {"type": "force", "node": "tip", "value": [0.3, -1], "history": "on_off"}}
+    path = solve(Scene.from_dict(found))
+    assert path.status is Status.SOLVED
+    assert [entry[1:] for entry in kinds(path)] == [(0, 0), (1, 0), (0, 0)]
+    alone = solve(Scene.from_dict({**found, "contacts": {}, "analysis": {"accuracy": 1e-6, "steps": [2.0]}})).last
+    # Twice the accuracy asked for.
+    assert path.steps[-1].position("tip") == pytest.approx(alone.position("tip"), abs=2e-6)
+
+
+def test_histories_with_knots_are_passed():
+    """The force grows to its full value until 1 and falls again: the way back meets the same states."""
+    found = half_beam(type="path", range=[0, 2], accuracy=1e-6, steps=[0.5, 1.5])
+    found["loads"]["F"] |= {"value": [0, -0.7], "history": "up_and_down"}
+    found["histories"] = {"up_and_down": {"t": [0, 1, 2], "value": [0, 1, 0]}}
+    up, down = solve(Scene.from_dict(found)).steps
+    # Twice the accuracy asked for, times the size.
+    assert up.position("end") == pytest.approx(down.position("end"), abs=6e-6)
+    assert abs(up.position("middle")[1]) > 0.05
+
+
+# -- answers and refusals -------------------------------------------------------------------------
+
+
+def test_answers_as_those_of_other_paths(half_path, tmp_path):
+    told = half_path.to_dict()
+    assert json.loads(json.dumps(told))["limit_points"][0]["contacts"]["edge"]["member"] == "half"
+    assert len(told["path"]["factor"]) == len(told["path"]["nodes"]["middle"]["position"]) == len(half_path.points)
+    assert chart(half_path).axes
+    assert any("bifurcations and branches are not looked for" in note for note in half_path.notes)
+    with pytest.raises(SceneError, match="bifurcation: the path has none"):
+        switch(half_path)
+
+
+def test_end_that_slips_through_ends_the_path(tmp_path, capsys):
+    """Without loads from below the end of the beam comes to the edge: there the path ends, and says so."""
+    found = half_beam(type="path", range=[-1, 2], accuracy=1e-6)
+    file = tmp_path / "half.json"
+    file.write_text(json.dumps(found))
+    assert main(["run", str(file)]) == 1
+    told = capsys.readouterr().out
+    assert "the path ends at factor -0.19" in told
+    assert "it could not be followed beyond factor -0.19" in told
+
+
+def test_pulled_off_its_only_hold():
+    """Pulled up the beam leaves the edge at once, and nothing else holds it."""
+    with pytest.raises(SolveError, match="the path ends at factor"):
+        solve(Scene.from_dict(half_beam(type="path", range=[-1, 0])))
+
+
+def test_prescribed_elements_are_used():
+    path = solve(Scene.from_dict(half_beam(type="path", range=[0, 2], accuracy=1e-2, points=12)), elements=4)
+    # One more where the edge touches, which may make way for another.
+    assert path.model.mesh.elements in (4, 5)
+    assert len(path.points) == 12
+
+
+def test_branches_are_refused():
+    with pytest.raises(SceneError, match=r"^analysis\.branches: found 2 with contacts, accepted: 0"):
+        Scene.from_dict(half_beam(type="path", range=[0, 2], branches=2))
