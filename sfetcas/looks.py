@@ -33,26 +33,34 @@ def _state(step: Equilibrium) -> str:
 
 def _remark(step: Equilibrium) -> str:
     """What is said besides the factor: nothing of what is stable."""
-    return "" if step.certificate.stable is True else ", ".join(["", *filter(None, [_state(step)])])
+    state = _state(step)
+    return "" if state in ("", "stable") else f", {state}"
 
 
 def looks_of_steps(steps: Sequence[Equilibrium]) -> list[Look]:
     """Earlier steps paler the earlier, and what the legend says of the last one."""
-    shades = _shades(len(steps) - 1)
-    last, factors = steps[-1], [step.factor for step in steps[:-1]]
-    if len(factors) <= 5:
-        texts = [f"factor {in_short(step.factor)}{_remark(step)}" for step in steps[:-1]]
-    else:
-        texts = [""] * len(factors)
-        many = f"{len(factors)} other factors, {in_short(min(factors))} to {in_short(max(factors))}"
-        texts[len(factors) // 2] = many
+    *earlier, last = steps
+    texts = [f"factor {in_short(step.factor)}{_remark(step)}" for step in earlier]
+    if len(earlier) > 5:
+        texts = _together(earlier)
     looks = [
         Look(shade, dashes_of(step.certificate.stable), text)
-        for shade, step, text in zip(shades, steps[:-1], texts, strict=True)
+        for shade, step, text in zip(_shades(len(earlier)), earlier, texts, strict=True)
     ]
-    said = len(steps) > 1 or last.factor != 1.0 or bool(_remark(last))
-    bold = f"{'bold: ' if len(steps) > 1 else ''}factor {in_short(last.factor)}{_remark(last)}"
+    said = bool(earlier) or last.factor != 1.0 or bool(_remark(last))
+    bold = f"{'bold: ' if earlier else ''}factor {in_short(last.factor)}{_remark(last)}"
     return [*looks, Look(BOLD, "-", bold if said else "")]
+
+
+def _together(steps: Sequence[Equilibrium]) -> list[str]:
+    """One text for all steps of the same stability, at the middle one of them."""
+    texts = [""] * len(steps)
+    for remark in dict.fromkeys(map(_remark, steps)):
+        alike = [i for i, step in enumerate(steps) if _remark(step) == remark]
+        factors = [steps[i].factor for i in alike]
+        span = f"{in_short(min(factors))} to {in_short(max(factors))}"
+        texts[alike[len(alike) // 2]] = f"{len(alike)} other factors, {span}{remark}"
+    return texts
 
 
 def _shades(count: int) -> list[str]:

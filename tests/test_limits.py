@@ -239,6 +239,14 @@ def test_the_default_equilibrium_is_bold_with_its_reactions(seven):
     assert "2 (bold): stable" in legend(second)
 
 
+def test_many_equilibria_have_their_numbers_and_one_entry_a_kind(seven):
+    """As many lines as a rich scene has, here the same ones again."""
+    figure = picture(seven, steps=[*range(7), *range(7), 0])
+    entries = [text for text in legend(figure) if "stable" in text]
+    assert entries == ["others, stable", "others, unstable", "1 (bold): stable"]
+    assert {text.get_text() for text in figure.axes[0].texts} >= {"2", "7"}
+
+
 def test_undeformed_lines_do_not_look_like_unstable_ones(seven):
     figure = picture(seven)
 
@@ -248,6 +256,22 @@ def test_undeformed_lines_do_not_look_like_unstable_ones(seven):
 
     (rest,) = named(figure, "undeformed", Collection)
     assert all(longest_dash(lines) > 3.0 * longest_dash(rest) for lines in named(figure, "earlier", Collection))
+
+
+def test_many_steps_have_one_entry_for_each_stability():
+    """A strut beyond its Euler load, told to stay straight."""
+    analysis = {"unstable": "stay", "steps": [1, 1.5, 2, 2.2, 3, 3.5, 4, 5]}
+    loads = {"f": {"type": "force", "node": "B", "value": [-1, 0]}}
+    figure = picture(solve(scenes.made(scenes.cantilever((0, 0), loads=loads, analysis=analysis))))
+    # Euler: pi^2/4 times the stiffness over the length squared.
+    critical = np.pi**2 / 4 * scenes.SOFT["EI3"]
+    factors = np.array(analysis["steps"][:-1])
+    below, above = factors[factors < critical], factors[factors > critical]
+    entries = [text for text in legend(figure) if "other factors" in text]
+    assert entries == [
+        f"{len(below)} other factors, {below.min():g} to {below.max():g}",
+        f"{len(above)} other factors, {above.min():g} to {above.max():g}, unstable",
+    ]
 
 
 # -- charts of paths ------------------------------------------------------------------------------
