@@ -365,6 +365,7 @@ def _info(options: argparse.Namespace) -> int:
     for name, member in scene.members.items():
         made = counted(len(mesh.cuts[name]) - 1, "element") if member.type == "flexible" else member.type
         print(f"  member {name}: {made}, length {scene.center_lines[name].length:.9g} m")
-    print(f"  {Prepared(model).diagnosis.sentence}")
+    driven = " (what motions drive counts as held)" if scene.motions else ""
+    print(f"  {Prepared(model).diagnosis.sentence}{driven}")
     print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")
     return SOLVED

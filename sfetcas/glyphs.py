@@ -14,14 +14,14 @@ import numpy as np
 
 from . import quaternion
 from .arrays import Array
+from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
 from .loads import Load, Motion
-from .obstacles import Obstacle, obstacle
+from .obstacles import obstacle
 from .sections import evaluate
 from .sketch import (
     LOAD,
     MOTION,
     REACTION,
-    SUPPORT,
     Ink,
     Sketch,
     amount,
@@ -34,7 +34,7 @@ from .sketch import (
 )
 from .solution import Equilibrium
 from .springs import Spring
-from .structure import Node, unit
+from .structure import SLIDING, Node, unit
 
 __all__ = ["sketch_all"]
 
@@ -55,13 +55,17 @@ TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
 def sketch_all(sketch: Sketch) -> None:
     """Sketch everything but the centre lines; what comes first has the free choice of place."""
     scene, largest = sketch.scene, _largest_force(sketch)
+    for name, contact in scene.contacts.items():
+        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
     for name, node in scene.nodes.items():
         _sketch_support(sketch, name, node)
         if node.joint != "rigid":
             sketch.dot(sketch.at(name), f"joint-{name}")
     _sketch_releases(sketch)
+    sketch_slots(sketch)
     for name, spring in scene.springs.items():
         (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
+        sketch_stops(sketch, name, spring)
     for name, motion in scene.motions.items():
         _sketch_motion(sketch, name, motion)
     for name, load in scene.loads.items():
@@ -69,8 +73,8 @@ def sketch_all(sketch: Sketch) -> None:
     for name, node in scene.nodes.items():
         if node.support != "free":
             _sketch_reaction(sketch, name, largest)
-    for name, contact in scene.contacts.items():
-        _sketch_contact(sketch, name, obstacle(contact, sketch.step.model.space), largest)
+    for name in scene.contacts:
+        _sketch_pushes(sketch, name, largest)
 
 
 def _factor(step: Equilibrium, history: str | None) -> float:
@@ -137,7 +141,13 @@ def _sketch_support(sketch: Sketch, name: str, node: Node) -> None:
     elif node.support == "ball":
         symbol.area(_circle(0.5, (0.0, 0.5)))
         symbol.ground(1.0)
-    elif node.direction is not None:
+    elif node.support == "universal":
+        for axis in filter(None, (node.axis, node.axis2)):
+            _sketch_rod(sketch, name, axis, 1.4)
+        symbol.area(_circle(0.3, (0.0, 0.0)))
+        symbol.line([[0.0, 0.3], [0.0, 1.2]])
+        symbol.ground(1.2)
+    elif node.slides and node.direction is not None:
         _sketch_slider(sketch, name, node, unit(node.direction))
 
 
@@ -155,19 +165,9 @@ def _sketch_clamp(sketch: Sketch, name: str) -> None:
         _symbol(sketch, name, flat_unit(sketch.view.flat(into), (0.0, -1.0))).ground(0.0, half=1.4)
         return
     normal = into / norm(into) if norm(into) > 0.05 else np.array([0.0, 0.0, 1.0])
-    one, two = _pair_across(normal, np.array([0.0, 0.0, 1.0]))
+    one, two = across(normal, np.array([0.0, 0.0, 1.0]))
     corners = np.array([one + two, one - two, -one - two, two - one])
     sketch.area(sketch.at(name) + SYMBOL * sketch.size * corners, f"support-{name}", "#BBBBBBB0", 2.0)
-
-
-def _pair_across(normal: Array, near: Array) -> tuple[Array, Array]:
-    """Two unit vectors (3,) that form a right-handed frame with a normal, the first as near as can be to ``near``."""
-    for first in (near, *np.eye(3)):
-        across = first - (first @ normal) * normal
-        if norm(across) > 0.05 * norm(first) > 0.0:
-            one = across / norm(across)
-            break
-    return one, np.cross(normal, one)
 
 
 def _sketch_rod(sketch: Sketch, name: str, direction: Iterable[float], half: float) -> None:
@@ -199,7 +199,7 @@ def _sketch_releases(sketch: Sketch) -> None:
     """A small circle in the member, just beside the node."""
     for name, line in zip(sketch.course.members, sketch.course.last, strict=True):
         for end, points in zip((0, 1), (line, line[::-1]), strict=True):
-            if sketch.scene.members[name].release[end] != "rigid":
+            if sketch.scene.members[name].release[-end] not in ("rigid", *SLIDING):
                 beside = np.linalg.norm(points - points[0], axis=1) > 0.02 * sketch.size
                 sketch.dot(points[int(np.argmax(beside))], f"joint-{name}")
 
@@ -209,23 +209,13 @@ def _sketch_releases(sketch: Sketch) -> None:
 
 def _sketch_spiral(sketch: Sketch, name: str, spring: Spring) -> None:
     """A spiral about the axis of a rotational spring, as its first party carries it."""
-    axis = quaternion.rotate(_turned(sketch, spring), np.array(unit(sketch.scene.spring_axis(name))))
-    one, two = _pair_across(axis, sketch.leaving(spring.node)[0])
+    carrier = (spring.between or ("ground",))[0]
+    axis = quaternion.rotate(turned_party(sketch, carrier, spring.node), np.array(unit(sketch.scene.spring_axis(name))))
+    one, two = across(axis, sketch.leaving(spring.node)[0])
     angle = np.linspace(0.5 * math.pi, 5.0 * math.pi, 121)[:, None]
     radius = SPIRAL * sketch.size * angle / angle[-1]
     points = sketch.at(spring.node) + radius * (np.cos(angle) * one + np.sin(angle) * two)
     sketch.line(points, f"spring-{name}", colour=SPRING, width=0.9, level=4.5)
-
-
-def _turned(sketch: Sketch, spring: Spring) -> Array:
-    """Rotation of the first party of a rotational spring, (4,)."""
-    party = (spring.between or ("ground",))[0]
-    if party in sketch.scene.members:
-        end = sketch.scene.members[party].nodes.index(spring.node)
-        x = end / (len(sketch.scene.members[party].nodes) - 1)
-        return np.asarray(sketch.step.along(party, np.array([x]))["quaternion"][0])
-    turned = None if party == "ground" else sketch.step.quaternion(party)
-    return np.array([1.0, 0.0, 0.0, 0.0]) if turned is None else turned
 
 
 def _sketch_zigzag(sketch: Sketch, name: str, spring: Spring) -> None:
@@ -331,26 +321,8 @@ def _sketch_reaction(sketch: Sketch, name: str, largest: float) -> None:
         _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
 
 
-def _sketch_contact(sketch: Sketch, name: str, stop: Obstacle, largest: float) -> None:
-    """An obstacle as far as it is near the structure, in the plane, and what it pushes with."""
-    unit, everything = sketch.course.unit, sketch.course.everything
-    middle, reach = everything.mean(axis=0), 0.6 * sketch.size
-    if stop.kind == "flat":
-        foot = middle - ((middle - stop.place / unit) @ stop.normal) * stop.normal
-        along = np.cross([0.0, 0.0, 1.0], stop.normal)
-        outline = foot + np.linspace(-reach, reach, 41)[:, None] * along
-    elif stop.kind == "round":
-        angle = np.linspace(0.0, 2.0 * math.pi, 181)
-        turns = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-        outline = (stop.place + stop.radius * turns) / unit
-    else:
-        outline = stop.place[None, :] / unit
-    if not sketch.step.model.space:
-        if len(outline) == 1:
-            sketch.dot(outline[0], f"contact-{name}", SUPPORT)
-        near = np.linalg.norm(outline - middle, axis=1) <= 1.3 * reach
-        if near.sum() > 1:
-            sketch.line(np.where(near[:, None], outline, np.nan), f"contact-{name}")
+def _sketch_pushes(sketch: Sketch, name: str, largest: float) -> None:
+    """What an obstacle pushes with."""
     entry = sketch.step.contacts[name]
     several = isinstance(entry["member"], list)
     for member, at, force in zip(
@@ -391,7 +363,7 @@ def _sketch_turn(sketch: Sketch, point: Array, along: Array, vector: Array, lett
     if size == 0.0:
         return
     radius = TURNS[ink.colour]
-    one, two = _pair_across(vector / size, along)
+    one, two = across(vector / size, along)
     angle = np.radians(np.linspace(50.0, 310.0, 60))[:, None]
     sketch.arrow(point + radius * sketch.size * (np.cos(angle) * one + np.sin(angle) * two), ink)
     away = flat_unit(-sketch.view.flat(one), (0.0, 1.0))

@@ -2,7 +2,7 @@
 
 The order of the stages: centre lines are sampled, all else is sketched as marks and labels in fixed axes
 (:mod:`~sfetcas.sketch`, :mod:`~sfetcas.glyphs`); axes are made and filled, marks are drawn and labels put where they
-hide least (:mod:`~sfetcas.sheet`).
+hide least (:mod:`~sfetcas.sheet`).  How lines tell steps or equilibria apart stands in :mod:`~sfetcas.looks`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from matplotlib.figure import Figure
 
 from .errors import SceneError
 from .glyphs import sketch_all
+from .looks import looks_of_equilibria, looks_of_steps, number_of
 from .records import say
 from .sheet import DPI, Colour, sheet_of
 from .sketch import Sketch, course_of, view_of
-from .solution import Equilibrium, Solution
+from .solution import Solution
 
 __all__ = ["ENDINGS", "picture", "save_picture"]
 
@@ -54,8 +55,9 @@ def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: C
     ----------
     solution : Solution
     steps : sequence of int, optional
-        Numbers of the steps to draw, as indices of ``solution.steps``; the last one is drawn in colour, with its
-        loads and reactions, the others pale.  Default: all.
+        Numbers of the steps to draw, as indices of ``solution.steps``; the last one is drawn bold and in colour, with
+        its loads and reactions, the others thin.  Default: all; where all equilibria are asked for those of the last
+        factor, the first of them bold.
     colour : str
         ``moment``: bending moment, in the plane about z with its sign; ``magnitude``: its magnitude; ``none``.
 
@@ -71,21 +73,28 @@ def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: C
     """
     if colour not in COLOURS:
         raise SceneError(f"found {say(colour)}, accepted: {', '.join(COLOURS)}", ("colour",))
-    chosen = _chosen(solution, steps)
+    numbers = _chosen(solution, steps)
+    chosen = [solution.steps[number] for number in numbers]
     course = course_of(solution.scene, chosen, colour)
     view = view_of(chosen[-1].model.space, [*course.rest, *course.last])
     sketch = Sketch(solution.scene, chosen[-1], course, view)
     sketch_all(sketch)
-    sheet = sheet_of(sketch, chosen, colour)
+    several = solution.scene.analysis.equilibria == "all"
+    looks = looks_of_equilibria(sketch, solution, numbers) if several else looks_of_steps(chosen)
+    sheet = sheet_of(sketch, looks, colour)
     sheet.finish()
     return sheet.figure
 
 
-def _chosen(solution: Solution, steps: Sequence[int] | None) -> list[Equilibrium]:
+def _chosen(solution: Solution, steps: Sequence[int] | None) -> list[int]:
+    """Indices of the steps to draw, the bold one last."""
     count = len(solution.steps)
     numbers = list(range(count)) if steps is None else list(steps)
     if not numbers or any(not -count <= number < count for number in numbers):
         accepted = f"numbers of steps from 0 to {count - 1}, or from the end: -1"
         raise SceneError(f"found {say(numbers)}, accepted: {accepted}", ("steps",))
+    if steps is None and solution.scene.analysis.equilibria == "all":
+        first = count - number_of(solution, count - 1)
+        numbers = [*range(first + 1, count), first]
     thinned = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_STEPS)).round().astype(int))
-    return [solution.steps[numbers[i]] for i in thinned]
+    return [numbers[i] % count for i in thinned]

@@ -18,37 +18,40 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
-from matplotlib.patches import FancyArrowPatch, Polygon
+from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
-from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
 
 from .arrays import Array
 from .sketch import (
+    BEHIND,
     LOAD,
     MOTION,
     REACTION,
     REST,
+    SUPPORT,
     Label,
+    Look,
     Mark,
     Sketch,
     dense,
     flat_unit,
-    in_short,
     norm,
     prefix,
     rounded,
     thinned,
 )
-from .solution import Equilibrium
 from .structure import unit
 
 __all__ = ["DPI", "Colour", "Sheet", "sheet_of"]
 
 Colour = Literal["moment", "magnitude", "none"]
+DOTTED = (0, (1, 2))
+"""Of the undeformed structure; dashes are for what is unstable."""
 WIDTH, HEIGHT, DPI = 7.0, 5.0, 150
 MANY = 14
 """Labels; of more than that, those with the same text as another are left out."""
@@ -59,20 +62,23 @@ SIGNED = LinearSegmentedColormap.from_list("signed", ["#5E1A70", "#9970AB", "#D8
 SIZES = LinearSegmentedColormap.from_list("sizes", ["#D8D8D8", "#7FBF9B", "#2A788E", "#404688", "#4B0C5C"])
 
 
-def sheet_of(sketch: Sketch, steps: Sequence[Equilibrium], colour: Colour) -> Sheet:
-    """A figure with axes, centre lines, colour bar, title and legend; :meth:`Sheet.finish` draws the sketch on it."""
+def sheet_of(sketch: Sketch, looks: Sequence[Look], colour: Colour) -> Sheet:
+    """A figure with axes, centre lines, colour bar, title and legend; :meth:`Sheet.finish` draws the sketch on it.
+
+    ``looks`` are those of the earlier lines and of the last.
+    """
     figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
     paper = figure.add_subplot()
     axes = paper if sketch.view.angles is None else _space_axes(figure, paper, sketch)
     if axes is paper:
         _fill_plane(axes, sketch)
-    lines, values = _add_lines(axes, sketch)
+    lines, values = _add_lines(axes, sketch, looks)
     if values is not None:
         _add_bar(figure, paper, lines, values, sketch, colour)
     title = _title(sketch.scene.title)
     if title:
         figure.suptitle(title, fontsize=11, parse_math=False)
-    handles = _legend(sketch, steps)
+    handles = _legend(sketch, looks)
     if handles:
         figure.legend(
             handles=handles, loc="outside lower center", ncols=min(4, len(handles)), fontsize=8, frameon=False
@@ -110,7 +116,9 @@ def _space_axes(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
     paper.set_zorder(axes.get_zorder() + 1)
     axes.set_proj_type("ortho")
     axes.view_init(*sketch.view.angles)
-    low, high = sketch.course.everything.min(axis=0), sketch.course.everything.max(axis=0)
+    behind = [mark.points[np.isfinite(mark.points[:, 0])] for mark in sketch.marks if mark.level <= BEHIND]
+    shown = np.vstack([sketch.course.everything, *behind])
+    low, high = shown.min(axis=0), shown.max(axis=0)
     half = 0.52 * np.maximum(high - low, 0.3 * float((high - low).max()))
     middle = 0.5 * (low + high)
     axes.set(xlim=_interval(middle, half, 0), ylim=_interval(middle, half, 1), zlim=_interval(middle, half, 2))
@@ -118,6 +126,8 @@ def _space_axes(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
         axis.set_label_text(f"{letter}, {sketch.course.letter}m")
         axis.set_rotate_label(False)
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
+        # Axes in space take no other word for the look of their grid.
+        axis._axinfo["grid"].update(color="#DCDCDC", linewidth=0.6)
     axes.set_box_aspect(half)
     return axes
 
@@ -126,7 +136,7 @@ def _interval(middle: Array, half: Array, i: int) -> tuple[float, float]:
     return (middle[i] - half[i], middle[i] + half[i])
 
 
-def _add_lines(axes: Any, sketch: Sketch) -> tuple[Any, Array | None]:
+def _add_lines(axes: Any, sketch: Sketch, looks: Sequence[Look]) -> tuple[Any, Array | None]:
     """Undeformed, earlier and last lines; the last ones, and the values (n,) N m to colour their pieces by."""
     course, space = sketch.course, sketch.view.angles is not None
 
@@ -136,9 +146,9 @@ def _add_lines(axes: Any, sketch: Sketch) -> tuple[Any, Array | None]:
         axes.add_collection(found, **({} if space else {"autolim": False}))
         return found
 
-    add(course.rest, "undeformed", colors=REST, linewidths=1.0, linestyles=(0, (5, 3)), zorder=2)
-    for lines, shade in zip(course.earlier, _shades(len(course.earlier)), strict=True):
-        add(lines, "earlier", colors=shade, linewidths=1.3, zorder=2.5)
+    add(course.rest, "undeformed", colors=REST, linewidths=1.2, linestyles=DOTTED, zorder=2)
+    for lines, look in zip(course.earlier, looks[:-1], strict=True):
+        add(lines, "earlier", colors=look.colour, linewidths=1.3, linestyles=look.dashes, zorder=2.5)
     add(course.last, "outline", colors="#222222", linewidths=3.8, capstyle="round", zorder=3)
     style: dict[str, Any] = {"linewidths": 2.4, "capstyle": "round", "zorder": 3.5}
     if not course.values:
@@ -163,40 +173,26 @@ def _add_bar(figure: Figure, paper: Axes, lines: Any, values: Array, sketch: Ske
     bar.set_label(f"{name}, {letter}N m")
 
 
-def _shades(count: int) -> list[tuple[float, float, float]]:
-    """Colours of earlier steps, paler the earlier."""
-    pale, firm = np.array([0.80, 0.85, 0.90]), np.array([0.42, 0.53, 0.65])
-    shares = np.linspace(0.0, 1.0, count) if count > 1 else np.ones(count)
-    return [tuple(float(c) for c in pale + share * (firm - pale)) for share in shares]  # type: ignore[misc]
-
-
-def _legend(sketch: Sketch, steps: Sequence[Equilibrium]) -> list[Line2D]:
+def _legend(sketch: Sketch, looks: Sequence[Look]) -> list[Any]:
     """What the lines and arrows are; the last line only where there is something to say about it."""
-    last, drawn = steps[-1], {mark.name.partition("-")[0] for mark in sketch.marks if mark.kind == "arrow"}
-    handles = [Line2D([], [], color=REST, linewidth=1.0, linestyle=(0, (5, 3)), label="undeformed")]
-    handles += _legend_of_steps([step.factor for step in steps[:-1]])
-    stable = {False: ", unstable", "neutral": ", neutral"}.get(last.certificate.stable, "")
-    if len(steps) > 1 or last.factor != 1.0 or stable:
-        handles.append(Line2D([], [], color="#222222", linewidth=3.0, label=f"factor {in_short(last.factor)}{stable}"))
+    handles: list[Any] = [Line2D([], [], color=REST, linewidth=1.2, linestyle=DOTTED, label="undeformed")]
+    said: dict[str, Any] = {}
+    for look, width in zip(looks, [*[1.3] * (len(looks) - 1), 3.0], strict=True):
+        said.setdefault(
+            look.text, Line2D([], [], color=look.colour, linewidth=width, linestyle=look.dashes, label=look.text)
+        )
+    said.pop("", None)
+    handles += said.values()
+    drawn = {mark.name.partition("-")[0] for mark in sketch.marks}
     arrows = {"load": (LOAD, "load"), "reaction": (REACTION, "reaction"), "motion": (MOTION, "prescribed motion")}
     for name, (colour, text) in arrows.items():
         if name in drawn:
             line = Line2D([], [], color=colour, marker=">", markersize=5, label=text)
             line.set_linestyle(":" if name == "motion" else "-")
             handles.append(line)
+    if "contact" in drawn:
+        handles.append(Patch(facecolor="white", edgecolor=SUPPORT, hatch="////", linewidth=0.7, label="obstacle"))
     return handles
-
-
-def _legend_of_steps(factors: Sequence[float]) -> list[Line2D]:
-    shades = _shades(len(factors))
-    if len(factors) <= 5:
-        texts = [f"factor {in_short(factor)}" for factor in factors]
-    else:
-        shades, texts = (
-            [shades[len(shades) // 2]],
-            [f"{len(factors)} other factors, {in_short(min(factors))} to {in_short(max(factors))}"],
-        )
-    return [Line2D([], [], color=c, linewidth=1.3, label=text) for c, text in zip(shades, texts, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +290,7 @@ class Sheet:
         sketch = self.sketch
         parts = [self.pixels(sketch.course.everything)]
         parts += [self.pixels(mark.points[np.isfinite(mark.points).all(axis=1)]) for mark in sketch.marks]
-        parts += [box.corners for _, box in self._placed([])]
+        parts += [box.corners for _, box in self._placed([], framed=False)]
         pixels = np.vstack(parts)
         margin = 9.0 * self._point()
         return np.array([pixels.min(axis=0) - margin, pixels.max(axis=0) + margin])
@@ -353,6 +349,8 @@ class Sheet:
     # -- marks ------------------------------------------------------------------------------------
 
     def _draw(self, mark: Mark) -> None:
+        if mark.level <= BEHIND and self.axes is not self.paper:
+            return self._draw_behind(mark)
         points = self._projected(mark.points)
         style: dict[str, Any] = {
             "transform": self.axes.transData,
@@ -370,6 +368,15 @@ class Sheet:
                 style |= {"marker": "o", "markersize": 5.5, "markerfacecolor": mark.fill}
             line = Line2D(points[:, 0], points[:, 1], color=mark.colour, linewidth=mark.width, **style)
             self.paper.add_line(line)
+
+    def _draw_behind(self, mark: Mark) -> None:
+        """Draw among the lines in space, which the paper is in front of."""
+        style: dict[str, Any] = {"zorder": mark.level, "gid": mark.name, "clip_on": False, "linewidth": mark.width}
+        if mark.kind == "area":
+            area = Poly3DCollection([mark.points], facecolor=mark.fill, edgecolor=mark.colour, **style)
+            self.axes.add_collection3d(area, autolim=False)
+        else:
+            self.axes.plot(*mark.points.T, color=mark.colour, **style)
 
     def _gravity(self) -> list[_Box]:
         """Draw gravity in the corner that is the emptiest; what it covers."""
@@ -412,7 +419,8 @@ class Sheet:
             (1.0, [self.pixels(line) for line in (*sketch.course.rest, *earlier)]),
             (2.5, [self.pixels(line) for line in sketch.course.last]),
             (1.5, [self.axes.transData.transform(line) for line in self._axis_lines()]),
-            (4.0, [self.pixels(mark.points) for mark in sketch.marks]),
+            (4.0, [self.pixels(mark.points) for mark in sketch.marks if mark.level > BEHIND]),
+            (0.5, [self.pixels(mark.points) for mark in sketch.marks if mark.level <= BEHIND]),
         ]
         parts = [
             (cost, thinned(np.vstack([dense(line, spacing) for line in lines]), spacing))
@@ -452,23 +460,31 @@ class Sheet:
                 own += [tight] if label.get_visible() else []
             shown += own
 
-    def _placed(self, taken: Sequence[_Box]) -> list[tuple[Label, _Box]]:
-        """The labels in turn where they hide least; of many alike only the first."""
+    def _placed(self, taken: Sequence[_Box], *, framed: bool = True) -> list[tuple[Label, _Box]]:
+        """The labels in turn where they hide least, and within the frame where there is one; of many alike one."""
+        cell = self.paper.get_window_extent()
+        frame = (
+            np.array([cell.min, cell.max]) if framed and self.axes is self.paper else np.array([[-np.inf], [np.inf]])
+        )
         labels, crowd, found = self.sketch.labels, self._crowd(), []
         boxes = [*taken, *self._writings()]
         if len(labels) > MANY:
             labels = list({(label.text, label.colour): label for label in reversed(labels)}.values())[::-1]
         for label in labels:
             choices = [
-                (cost + self._cost(box, crowd, boxes), i, box) for i, (cost, box) in enumerate(self._choices(label))
+                (cost + self._cost(box, crowd, boxes, frame), i, box)
+                for i, (cost, box) in enumerate(self._choices(label))
             ]
             box = min(choices)[2]
             boxes.append(box)
             found.append((label, box))
         return found
 
-    def _cost(self, box: _Box, crowd: tuple[Array, Array], boxes: Sequence[_Box]) -> float:
-        return float(crowd[1][box.holds(crowd[0])].sum()) + 80.0 * sum(box.meets(other) for other in boxes)
+    def _cost(self, box: _Box, crowd: tuple[Array, Array], boxes: Sequence[_Box], frame: Array) -> float:
+        low, high = box.corners
+        outside = bool((low < frame[0]).any() or (high > frame[1]).any())
+        met = sum(box.meets(other) for other in boxes)
+        return float(crowd[1][box.holds(crowd[0])].sum()) + 80.0 * met + 40.0 * outside
 
     def _choices(self, label: Label) -> Iterator[tuple[float, _Box]]:
         """Places round the anchor, the preferred ones first and cheap."""

@@ -20,6 +20,7 @@ from .scene import Scene
 from .solution import Equilibrium
 
 __all__ = [
+    "BEHIND",
     "LOAD",
     "MOTION",
     "REACTION",
@@ -28,6 +29,7 @@ __all__ = [
     "Course",
     "Ink",
     "Label",
+    "Look",
     "Mark",
     "Sketch",
     "View",
@@ -48,6 +50,8 @@ __all__ = [
 
 LOAD, REACTION, MOTION = "#D55E00", "#0072B2", "#8F3B76"
 REST, SUPPORT = "#8C8C8C", "#333333"
+BEHIND = 1.5
+"""Level of marks that are drawn behind the structure, also in space."""
 PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T", 15: "P"}
 
 
@@ -198,6 +202,15 @@ def _breadth(flat: Array) -> float:
 
 
 # What is sketched: marks and labels
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the lines of an equilibrium look, and what the legend says of them: nothing where ``text`` is empty."""
+
+    colour: str
+    dashes: Any
+    text: str
 
 
 @dataclass(frozen=True)

@@ -135,7 +135,8 @@ def check_motion(motion: Motion, node: Node, dimension: str, reason: str) -> Non
         Place within the motion.
     """
     if node.support == "free":
-        raise SceneError(f"found {motion.node!r}, which is free; only held nodes can be moved", ("node",))
+        accepted = "a node with a support (a slider leaves it one direction), or a joint with the key 'between'"
+        raise SceneError(f"found {motion.node!r}, which is free and cannot be moved, accepted: {accepted}", ("node",))
     if motion.rotation is not None:
         _check_rotation(motion, node, dimension, reason)
 

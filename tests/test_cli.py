@@ -277,7 +277,15 @@ def test_info_needs_no_load(scene, capsys):
     assert "angles: 1 for each" in printed
     assert "mobility 0" in printed
     assert main(["info", str(scene(UNLOADED, ('"clamped"', '"hinge"')))]) == 0
-    assert "mobility 1: member beam turning with node B moving" in capsys.readouterr().out
+    free = capsys.readouterr().out
+    assert "mobility 1: member beam turning with node B moving" in free
+    assert "counts as held" not in free
+    driven = (
+        '[loads.tip]\ntype = "force"\nnode = "B"\nvalue = [0, 1]\n',
+        '[motions.turn]\nnode = "A"\nrotation = 0.1\n',
+    )
+    assert main(["info", str(scene(driven, ('"clamped"', '"hinge"')))]) == 0
+    assert "mobility 0 (what motions drive counts as held)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("file", sorted(PROBLEMS.glob("*.toml")), ids=lambda file: file.stem)

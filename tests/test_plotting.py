@@ -112,7 +112,7 @@ def test_earlier_steps_are_pale_and_only_the_chosen_ones_are_drawn():
     assert len(named(figure, "earlier")) == 3
     shades = [sum(lines.get_color()[0][:3]) for lines in named(figure, "earlier")]
     assert sorted(shades, reverse=True) == shades
-    assert {"factor 0.5", "factor 1", "factor 2", "factor 4"} <= set(texts(figure))
+    assert {"factor 0.5", "factor 1", "factor 2", "bold: factor 4"} <= set(texts(figure))
     some = picture(solution, steps=[0, 1])
     np.testing.assert_allclose(segments(some, "deformed")[-1][1], solution.steps[1].position("B")[:2], atol=1e-12)
     np.testing.assert_allclose(segments(some, "earlier")[0][-1], solution.steps[0].position("B")[:2], atol=1e-12)
@@ -122,7 +122,7 @@ def test_earlier_steps_are_pale_and_only_the_chosen_ones_are_drawn():
 def test_many_steps_are_one_entry_of_the_legend():
     figure = picture(beam(analysis={"steps": np.linspace(0.02, 1, 50).tolist()}))
     assert 30 < len(named(figure, "earlier")) < 50
-    assert [text for text in texts(figure) if "factor" in text] == ["39 other factors, 0.02 to 0.98", "factor 1"]
+    assert [text for text in texts(figure) if "factor" in text] == ["39 other factors, 0.02 to 0.98", "bold: factor 1"]
 
 
 @pytest.mark.parametrize("steps", [[], [1], [-2], [0, 3]])

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sfetcas import Scene, solve
+from sfetcas.checks import look_up
 from sfetcas.records import Record, plain
 
 if sys.version_info >= (3, 11):
@@ -161,3 +162,125 @@ def test_system_of_the_readme_drives_its_joint():
 def test_path_of_the_readme_is_an_analysis():
     (path,) = (block["analysis"] for block in blocks() if block.get("analysis", {}).get("type") == "path")
     assert RECORDS["Analysis"].from_dict(path).span == (-1.5, 2.5)
+
+
+# -- the answer by name -----------------------------------------------------------------------------
+
+
+def named_places():
+    """Names of the table of the answer, as (table, key) or (table,)."""
+    section = README.read_text(encoding="utf-8").partition("## The answer by name")[2].partition("\n## ")[0]
+    found = set()
+    for line in section.splitlines():
+        if line.startswith("| `"):
+            first, *others = re.findall(r"`([\w.]+)`", line.split("|")[1])
+            *start, _ = first.split(".")
+            found |= {first, *(".".join([*start, key.strip(".")]) for key in others)}
+    return found
+
+
+def places(step):
+    """Names of the places of an answer."""
+    found = {"factor"}
+    for table, entries in step.to_dict().items():
+        for name, entry in entries.items() if isinstance(entries, dict) else ():
+            found |= {f"{table}.NAME.{key}" for key in entry} if isinstance(entry, dict) else {f"{table}.{name}"}
+    return found
+
+
+def every_kind():
+    """Answers with all kinds of places."""
+    plane = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+    }
+    force = {"f": {"type": "force", "node": "B", "value": [0, -1]}}
+    stopped = {"k": {"node": "A", "stiffness": 2.0, "stop": [-0.1, 0.1]}}
+    pulled = {"k": {"type": "translational", "node": "B", "anchor": [1, 1], "stiffness": 1.0}}
+    clamped = {**plane, "nodes": {**plane["nodes"], "A": {"position": [0, 0], "support": "clamped"}}}
+    floor = {"floor": {"type": "plane", "point": [0, -0.1], "normal": [0, 1], "members": "all"}}
+    moved = {"m": {"node": "A", "displacement": [0, 0.1], "rotation": 0.2}}
+    for table in (
+        {**plane, "springs": stopped, "loads": force},
+        {**clamped, "springs": pulled, "motions": moved},
+        {**clamped, "contacts": floor, "loads": force},
+    ):
+        yield solve(Scene.from_dict(table)).last
+
+
+def test_table_of_the_answer_names_all_that_there_is_and_nothing_else():
+    answers = list(every_kind())
+    assert named_places() == set().union(*map(places, answers))
+
+
+def test_names_of_the_answer_can_be_expected():
+    """But for the list of places along a member: there an expect has its fraction."""
+    met = set()
+    for step in every_kind():
+        names = {
+            "nodes": "B",
+            "members": "m",
+            "reactions": "A",
+            **{t: n for t in LATER for n in getattr(step.model.scene, t)},
+        }
+        for place in places(step) - {"members.NAME.s"}:
+            table = place.partition(".")[0]
+            look_up(step, place.replace("NAME", names.get(table, "")), 0.5)
+            met.add(place)
+    assert met == named_places() - {"members.NAME.s"}
+
+
+LATER = ("springs", "motions", "contacts")
+"""Tables of a scene whose names are those of the answer."""
+
+
+def turned(motions, springs, **node):
+    """A rigid rod on a node that a motion drives, with a spring that resists."""
+    table = {
+        "nodes": {"A": {"position": [0, 0], **node}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "type": "rigid"}},
+        "motions": {"d": motions},
+        "springs": {"k": springs},
+    }
+    return solve(Scene.from_dict(table)).last
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_signs_of_springs_and_motions_are_as_said(sign):
+    hinge = {"support": "hinge", "axis": [0, 0, sign]}
+    spring = {"node": "A", "stiffness": 2.0, "rest": 0.1, "axis": [0, 0, 1]}
+    step = turned({"node": "A", "rotation": 0.5}, spring, **hinge)
+    # prescribed: right to rounding
+    assert step.angle("A") == pytest.approx(0.5 * sign, abs=1e-12)
+    state = step.spring("k").to_dict()
+    assert state == pytest.approx({"angle": 0.5 * sign, "moment": -2.0 * (0.5 * sign - 0.1)}, abs=1e-12)
+    # The ground makes the motion against the spring, about the hinge's own axis.
+    assert step.motion("d")["moment"] == pytest.approx(-sign * state["moment"], abs=1e-12)
+    slider = {"support": "slider", "direction": [sign, 0]}
+    along = {"type": "translational", "node": "B", "stiffness": 3.0, "direction": [1, 0], "rest": 0.05}
+    step = turned({"node": "A", "displacement": [0.2, 0]}, along, **slider)
+    assert step.spring("k").to_dict() == pytest.approx({"travel": 0.2, "force": -3.0 * 0.15}, abs=1e-12)
+    assert step.motion("d")["force"][0] == pytest.approx(0.45, abs=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_driven_slides_go_by_the_component_along_the_direction(sign):
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [1, 0], "direction": [sign, 0]},
+            "C": {"position": [2, 0]},
+        },
+        "members": {
+            "a": {"nodes": ["A", "B"], "type": "rigid"},
+            "b": {"nodes": ["B", "C"], "section": "s", "release": ["slider", "rigid"]},
+        },
+        "motions": {"d": {"node": "B", "between": ["a", "b"], "displacement": [0.2, 0]}},
+        "loads": {"pull": {"type": "force", "node": "C", "value": [0.3, 0]}},
+    }
+    step = solve(Scene.from_dict(table)).last
+    assert step.along("b", [0.0])["position"][0, 0] == pytest.approx(1.2, abs=1e-12)
+    # On the second member, along the direction: it holds what pulls away.
+    assert step.motion("d")["force"] == pytest.approx(-0.3 * sign, abs=1e-9)

@@ -214,7 +214,7 @@ def test_unknown_keys(place, sentence):
         (
             "motions/m",
             {"node": "B", "displacement": [1, 0]},
-            "motions.m.node: found 'B', which is free; only held nodes can be moved",
+            "motions.m.node: found 'B', which is free and cannot be moved, accepted: a node with a support",
         ),
         (
             "analysis/type",
