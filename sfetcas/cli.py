@@ -214,11 +214,11 @@ def _report_path(path: Course) -> None:
         low, high = branch.factors.min(), branch.factors.max()
         print(f"{name}: {counted(len(branch.points), 'point')}, factors {low:.6g} to {high:.6g}; {branch.end}")
         for stable, first, last in branch.stretches():
-            ends = " to ".join(f"{branch.points[i].factor:.9g}" for i in (first, last))
+            ends = list(dict.fromkeys(f"{branch.points[i].factor:.9g}" for i in (first, last)))
             kind = {"True": "stable", "False": "unstable", "not defined": "stability not defined"}.get(
                 str(stable), "neutral"
             )
-            print(f"  {kind} from factor {ends}")
+            print(f"  {kind} from factor {ends[0]} to {ends[1]}" if len(ends) > 1 else f"  {kind} at factor {ends[0]}")
         _report_events(branch)
     if path.error_estimate is not None:
         print(f"  estimated error along it {path.error_estimate:.1e}")
@@ -289,14 +289,17 @@ def _kind(step: Equilibrium) -> str:
 
 def _report_contact(name: str, entry: dict[str, Any]) -> None:
     if entry["at"] is None:
-        print(f"  contact {name}: none" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
+        print(f"  contact {name}: nothing touches it" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
         return
     several = isinstance(entry["member"], list)
     for member, at, force in zip(
         *(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True
     ):
-        where = f"from {at[0]:.9g} to {at[1]:.9g}" if isinstance(at, list) else f"at {at:.9g}"
-        print(f"  contact {name}: {member} {where}, force {_vector(force)} N")
+        lies = isinstance(at, list)
+        where = (
+            f"lies on it from {at[0]:.9g} to {at[1]:.9g}, force over this" if lies else f"touches it at {at:.9g}, force"
+        )
+        print(f"  contact {name}: {member} {where} {_vector(force)} N")
 
 
 UNITS = {"moment": "N m", "force": "N"}

@@ -16,6 +16,7 @@ from .arrays import Array
 from .equations import State
 from .fields import rotations_along
 from .model import Model
+from .rotations import Turn
 
 __all__ = ["Mirror", "mirrored", "mirrors"]
 
@@ -86,5 +87,16 @@ def mirrored(model: Model, state: State, mirror: Mirror) -> State:
         else:
             values = sign * mirror.matrix[2, 2] * values
         q[model.chain(name)] = values
+    if model.space:
+        _onto_axes(model, q)
     nothing = {name: np.zeros_like(getattr(state, name)) for name in ("y", "lam", "wound")}
     return replace(state, q=q, **nothing)
+
+
+def _onto_axes(model: Model, q: Array) -> None:
+    """Leave of rotations about held axes what is about these, in place: nothing else would bring them back."""
+    about = np.flatnonzero(model.rotations.kind == Turn.AXIS)
+    axis = model.rotations.axis[about]
+    q[about, 1:] = (q[about, 1:] * axis).sum(axis=1, keepdims=True) * axis
+    size = np.linalg.norm(q[about], axis=1, keepdims=True)
+    q[about] = np.where(size > 0.0, q[about] / np.where(size > 0.0, size, 1.0), [1.0, 0.0, 0.0, 0.0])

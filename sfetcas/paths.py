@@ -114,6 +114,9 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
     SolveError
         No branch was found there.
     """
+    if not isinstance(path, Path):
+        accepted = "the answer of a scene whose analysis is a path, whole and not a branch of it"
+        raise SceneError(f"path: found a {type(path).__name__}, accepted: {accepted}")
     count = len(path.main.bifurcations)
     if count == 0:
         raise SceneError("bifurcation: the path has none, accepted: a path with bifurcations")

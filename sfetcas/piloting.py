@@ -18,7 +18,9 @@ from .scene import Scene
 from .settings import Settings
 from .single import cold
 
-__all__ = ["NO_ENERGY", "NO_POTENTIAL", "Piloting"]
+__all__ = ["KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting"]
+
+KEPT = "the loads growing from zero lead to this unstable equilibrium, and no way from it to a stable one was found"
 
 NO_ENERGY = "loads without potential: no energy tells whether this is stable"
 
@@ -135,7 +137,7 @@ class Piloting(Meshing):
             return self._grown_from_bent(pilot, factor)
         if self.scene.histories and factor != 0.0:
             # With histories the way leads through the factors, after the loads of factor 0 have grown.
-            first = self._followed(pilot, lambda t: model.loading(0.0, t), zero)
+            first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None)
             if first is None:
                 return None
             zero = first.corrected.state
@@ -149,7 +151,7 @@ class Piloting(Meshing):
         stops = [begin, *sorted(knots, reverse=end < begin), end]
         found: Found | None = None
         for a, b in zip(stops, stops[1:], strict=False):
-            part = self._followed(pilot, lambda t, a=a, b=b: pilot.model.loading(a + t * (b - a)), state)
+            part = self._followed(pilot, lambda t, a=a, b=b: pilot.model.loading(a + t * (b - a)), state, (a, b))
             if part is None:
                 return None
             found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
@@ -167,15 +169,32 @@ class Piloting(Meshing):
                 state = pilot.leave(state, bent.stability, pilot.model.loading(begin))[0].state
             except SolveError:
                 return None
-        return self._followed(pilot, lambda t: pilot.model.loading(begin + t * (factor - begin)), state)
+        way = (begin, factor)
+        return self._followed(pilot, lambda t: pilot.model.loading(begin + t * (factor - begin)), state, way)
 
-    def _followed(self, pilot: Prepared, way: Any, state: State) -> Found | None:
-        result = follow(pilot, way, state, leave=self.leave and pilot.model.minimisable)
+    def _followed(self, pilot: Prepared, way: Any, state: State, factors: tuple[float, float] | None) -> Found | None:
+        """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
+        leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
+        result = follow(pilot, way, state, leave=leave)
+        if not result.reached and leave and not energy_known:
+            # What cannot be minimised has this one way: better an unstable state that says so than none.
+            result = follow(pilot, way, state, leave=False)
         if not result.reached:
             return None
         corrected = pilot.correct(result.state, way(1.0))
+        stability = pilot.stability(corrected)
         notes = tuple(
-            f"left an unstable equilibrium along its escape shape at {100.0 * part:.3g} % of the way to these loads"
+            f"jumped {_at(part, factors)}: left an unstable equilibrium there along its escape shape"
             for part in result.left
         )
-        return Found(pilot, corrected, pilot.stability(corrected), notes, left=result.left)
+        if stability.negative and self.leave and not energy_known:
+            notes += (KEPT,)
+        return Found(pilot, corrected, stability, notes, left=result.left)
+
+
+def _at(part: float, factors: tuple[float, float] | None) -> str:
+    """Where on a way something was, in words; parts of the way are known to a few percent of them."""
+    if factors is None:
+        return f"near {100.0 * part:.2g} % of the loads of factor 0"
+    begin, end = factors
+    return f"near factor {begin + part * (end - begin):.3g}"

@@ -13,6 +13,7 @@ from . import quaternion
 from .arrays import Array
 from .divergence import TangentTest
 from .doctor import Diagnosis, contradiction, diagnose
+from .downhill import flow
 from .equations import Equations, Point, State
 from .errors import SolveError, Status
 from .guess import first_guess, lacks_slack, restore
@@ -26,6 +27,9 @@ from .records import counted
 from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
+
+MOST_COUNTED = 600
+"""Up to this many unknowns the eigenvalues of a tangent, all of them, take less than a second."""
 
 SOLVED = 1e-9
 """Relative residual after the last Newton steps that is taken for an equilibrium; usual are 1e-13 to 1e-16."""
@@ -99,9 +103,13 @@ class Prepared:
     def _tangent(self) -> TangentTest:
         return TangentTest(self.equations, self._test.weight, self.model.conservative)
 
+    @property
+    def _tester(self) -> StabilityTest | TangentTest:
+        return self._test if self.model.has_potential else self._tangent
+
     def stability(self, found: Corrected) -> Stability:
         """The stability test at a state; without a potential no energy tells stable from unstable."""
-        return (self._test if self.model.has_potential else self._tangent).test(found.point)
+        return self._tester.test(found.point)
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
         """Numbers of negative and of vanishing eigenvalues, these only where it is ``doubtful``; paths ask here.
@@ -114,17 +122,26 @@ class Prepared:
 
     def around_zero(self, point: Point) -> tuple[int, Array, Array]:
         """Eigenvalues around zero, see :class:`~sfetcas.stability.StabilityTest`; real parts without a potential."""
-        return (self._test if self.model.has_potential else self._tangent).around_zero(point)
+        return self._tester.around_zero(point)
 
     def singular(self, point: Point, count: int) -> bool:
         """Whether so many eigenvalues vanish where their real parts do: always where there is an energy."""
         return self.model.conservative or self._tangent.singular(point, count)
 
     def negative(self, found: Corrected) -> int:
-        """Number of negative eigenvalues at a state; none is counted where there is no potential."""
-        if not self.model.has_potential:
+        """Number of negative eigenvalues at a state; none is counted where :attr:`leaves` is false."""
+        if not self.leaves:
             return 0
-        return self._test.negative(found.point)
+        return (
+            self._test.negative(found.point)
+            if self.model.has_potential
+            else self._tangent.inertia(found.point).negative
+        )
+
+    @property
+    def leaves(self) -> bool:
+        """Whether unstable states can be left: there is an energy and, where its value is not known, not too much."""
+        return self.model.minimisable or (self.model.conservative and self.equations.unknowns <= MOST_COUNTED)
 
     def spectrum(self, found: Corrected, count: int) -> tuple[Array, Array]:
         """Eigenvalues and lowest shapes at a state, see :meth:`StabilityTest.spectrum`."""
@@ -186,8 +203,11 @@ class Prepared:
         amplitude = 0.2
         for _ in range(ESCAPES):
             try:
-                found, _ = self.minimise(loading, self._nudged(state, stability, loading, amplitude))
+                found = self._fallen(self._nudged(state, stability, loading, amplitude), loading)
             except SolveError:
+                if not self.model.minimisable:
+                    # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
+                    break
                 amplitude *= 1.7
                 continue
             there = self.stability(found)
@@ -197,6 +217,16 @@ class Prepared:
             amplitude = 1.7 * amplitude if same else 0.2
             state, stability = found.state, there
         raise SolveError(Status.FAILED, "no stable equilibrium found along the escape shapes", state)
+
+    def _fallen(self, state: State, loading: Loading) -> Corrected:
+        """The equilibrium below a state."""
+        if self.model.minimisable:
+            return self.minimise(loading, state)[0]
+        there = flow(self.equations, state, loading, lambda point: self._tester.test(point))
+        found = None if there is None else self.correct(there, loading)
+        if found is None or not found.converged:
+            raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
+        return found
 
     def _nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
         """The state moved along the escape shape to the side of lower energy, closings restored."""
@@ -210,8 +240,11 @@ class Prepared:
             if equations.rows:
                 moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
             sides.append((equations.at(moved, loading).potential, moved))
-        # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
+        # A symmetric pair differs by rounding only: then the first side, so that answers repeat.  Loads that follow
+        # are not in the potential: from an unstable state both sides go down.
         (up, first), (down, second) = sides
+        if not self.model.has_potential:
+            return first
         return second if up - down > 1e-9 * max(abs(up), abs(down)) else first
 
     def load_size(self, found: Corrected) -> float:

@@ -17,7 +17,7 @@ from .loading import Loading
 from .mesh import Mesh
 from .meshing import Found
 from .newton import Corrected, loose_rows, relative_residual, rows_in
-from .piloting import Piloting
+from .piloting import KEPT, Piloting
 from .prepared import SOLVED, Prepared
 from .single import finished
 from .solution import Equilibrium
@@ -116,7 +116,7 @@ class Refining(Piloting):
         loading = prepared.model.loading(factor)
         if not found.kept:
             _refuse_free(prepared, found.corrected, stability)
-        if stability.negative > 0 and self.leave and prepared.model.minimisable and not found.kept:
+        if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             found = replace(found, corrected=corrected, notes=(*found.notes, note))

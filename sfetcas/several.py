@@ -1,8 +1,10 @@
 """A search for further equilibria under the same loads.
 
 Newton runs, with and without deflation (see :mod:`~sfetcas.deflation`), begin at the undeformed scene, at its
-lowest shapes, at known equilibria nudged along their lowest shapes, mirrored, or half-way to each other.  What the
-search does not find may still exist: it counts what it did, and says so.
+lowest shapes, at known equilibria nudged along their lowest shapes, mirrored, or half-way to each other.  From each
+unstable equilibrium the energy falls to both sides of its escape shape: what lies down there is found as well, as
+is what larger and reversed loads lead to when they come back.  What the search does not find may still exist: it
+counts what it did, and says so.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from .equations import State
 from .guess import restore
 from .loading import Loading
 from .mirrors import Mirror, mirrored, mirrors
-from .newton import Corrected
+from .newton import Corrected, descend
 from .prepared import Prepared
 from .records import counted
 from .solution import Equilibrium
@@ -39,8 +41,8 @@ APART = 1e-4
 SHAPES = 4
 """Lowest shapes, of each equilibrium and of the undeformed scene, along which states are moved."""
 
-NUDGE = 0.5
-"""Largest rotation of a nudge, rad."""
+NUDGE, FARTHER_NUDGE = 0.5, 1.5
+"""Largest rotation of a nudge, rad, and of one when all else was tried."""
 
 BENT = (2.0, -2.0, 4.0, -4.0, 6.5, -6.5)
 """Largest rotations of the shapes of the undeformed scene that a run begins with, rad."""
@@ -65,7 +67,16 @@ LAYERS = 1.2
 MOST_ELEMENTS = 80
 """The mesh of the search is not refined beyond this."""
 
-KINDS = ("carried", "given", "mirrored", "nudged", "bent", "half-way")
+DOWN = 0.3
+"""Largest rotation of the step off an unstable equilibrium, to where the energy falls, rad."""
+
+DESCENT = 60
+"""Steps downhill at most."""
+
+BEYOND = (3.162, 10.0, -1.0, -10.0)
+"""Shares of the loads from which states come back: larger ones snap, reversed ones snap to the other side."""
+
+KINDS = ("carried", "returned", "given", "mirrored", "downhill", "nudged", "bent", "half-way", "farther")
 """Kinds of starts in the order of what they bring for their cost (measured)."""
 
 
@@ -199,6 +210,11 @@ class Search:
     def _mirrored(self, state: State, image: Mirror) -> State:
         return self.closed(mirrored(self.prepared.model, state, image))
 
+    def _downhill(self, state: State, shape: Array) -> State:
+        """Where the energy falls to from the state moved along a shape."""
+        prepared = self.prepared
+        return descend(prepared.equations, self.moved(state, shape), self.loading, prepared.weight, iterations=DESCENT)
+
     def _shapes(self, found: Corrected, count: int) -> Array:
         if self.prepared.equations.turning_unknowns > LARGE:
             return self.prepared.stability(found).shape[None, :]
@@ -221,9 +237,13 @@ class Search:
         equations, state = self.prepared.equations, found.state
         for image in self.images:
             self.offer("mirrored", partial(self._mirrored, state, image), deflate=False)
-        for shape in self._shapes(found, SHAPES):
-            sides = (partial(self.moved, state, size * shape) for size in (NUDGE, -NUDGE))
-            self.offer("nudged", *sides, deflate=True)
+        shapes = self._shapes(found, SHAPES)
+        if self.prepared.negative(found):
+            sides = (partial(self._downhill, state, size * shapes[0]) for size in (DOWN, -DOWN))
+            self.offer("downhill", *sides, deflate=False)
+        for kind, size in (("nudged", NUDGE), ("farther", FARTHER_NUDGE)):
+            sides = (partial(self.moved, state, way * shape) for shape in shapes for way in (size, -size))
+            self.offer(kind, *sides, deflate=True)
         for other in self.found:
             if other is not found:
                 half = 0.5 * turned_between(equations, other.state, state)
@@ -289,7 +309,8 @@ def search(
         carried = _carried(part, loading.scaled(share * FARTHER))
     result = Search(prepared, loading, left, images, [first])
     result.offer_around(first)
-    for kind, states in (("carried", carried), ("given", starts)):
+    returned = _returned(prepared, loading, first) if left else []
+    for kind, states in (("carried", carried), ("returned", returned), ("given", starts)):
         result.offer(kind, *(partial(result.closed, state) for state in states), deflate=False)
     result.smaller = runs - left
     result.look()
@@ -305,6 +326,21 @@ def _carried(smaller: Search, loading: Loading) -> list[State]:
         if followed.reached:
             states.append(followed.state)
     return states
+
+
+def _returned(prepared: Prepared, loading: Loading, first: Corrected) -> list[State]:
+    """What larger and reversed loads lead to by a jump, as far as it stays when they come back; motions keep."""
+    alone = loading.plus(loading.unloaded().scaled(-1.0))
+    found = (_there_and_back(prepared, loading, alone.scaled(share - 1.0), first.state) for share in BEYOND)
+    return [state for state in found if state is not None]
+
+
+def _there_and_back(prepared: Prepared, loading: Loading, more: Loading, state: State) -> State | None:
+    out = follow(prepared, lambda t: loading.plus(more.scaled(t)), state)
+    if not (out.reached and out.left):
+        return None
+    back = follow(prepared, lambda t: loading.plus(more.scaled(1.0 - t)), out.state, leave=False)
+    return back.state if back.reached else None
 
 
 def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dict[str, Array]:

@@ -89,6 +89,8 @@ class _Run(Refining):
         """All steps."""
         begin = time.perf_counter()
         pilot = self._prepared(self.pilot_mesh)
+        if self.scene.analysis.equilibria == "all":
+            self._refuse_all(pilot.model)
         steps: list[Equilibrium] = []
         last: tuple[float, Found] | None = None
         contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed) if self.scene.contacts else None
@@ -113,10 +115,7 @@ class _Run(Refining):
     # -- several equilibria ---------------------------------------------------------------------
 
     def _several(self, found: Found, answer: Equilibrium, factor: float) -> list[Equilibrium]:
-        """The answer, then further equilibria of the same factor with rising energy."""
-        if not found.prepared.model.minimisable:
-            accepted = "'one', as loads without potential have no energy to search by"
-            raise SceneError(f"found 'all', accepted: {accepted}", ("analysis", "equilibria"))
+        """The answer, which tells of the search, then further equilibria of the same factor with rising energy."""
         result = self._searched(found, factor)
         answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
         for number, corrected in enumerate(result.found[1:], start=1):
@@ -131,8 +130,24 @@ class _Run(Refining):
         if dropped:
             coarse = counted(dropped, "equilibrium", "equilibria")
             note += f"; {coarse} of the mesh of the search not found on finer ones"
-        answers[1:] = sorted(answers[1:], key=lambda other: other.potential)
-        return [replace(other, notes=(*other.notes, note)) for other in answers]
+        answers[0] = replace(answers[0], notes=(*answers[0].notes, note))
+        return [answers[0], *sorted(answers[1:], key=lambda other: other.potential)]
+
+    @staticmethod
+    def _refuse_all(model: Model) -> None:
+        """Refuse to search under loads whose energy is not there, or not known.
+
+        Raises
+        ------
+        SceneError
+            Such loads.
+        """
+        if model.has_potential:
+            return
+        why = "loads without potential have no energy to search by"
+        if model.conservative:
+            why = "the energy of pressure, by which equilibria are sorted and told apart, is not evaluated"
+        raise SceneError(f"found 'all', accepted: 'one', as {why}", ("analysis", "equilibria"))
 
     def _further(self, candidate: Found, factor: float) -> Equilibrium | None:
         """The answer to what a search found; None where finer meshes do not have it."""

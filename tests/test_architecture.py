@@ -57,6 +57,7 @@ ORDER = [
     "guess",
     "stability",
     "divergence",
+    "downhill",
     "problem",
     "prepared",
     "arclength",
