@@ -9,6 +9,7 @@ import numpy as np
 
 from .accuracy import largest_difference, roughness
 from .arrays import Array
+from .continuation import JUMPED, near_factor
 from .cushions import Cushions
 from .errors import SolveError, Status
 from .fields import Fields
@@ -74,11 +75,13 @@ class ContactRun:
         self.fine = max(INSIDE, 0.1 * accuracy)
         self.prepare = prepare
         self.last: tuple[float, Held] | None = None
+        self.jumps: list[float] = []
 
     # -- ways -----------------------------------------------------------------------------------
 
     def continued(self, base: Mesh, factor: float) -> Held | None:
         """From the contact of the last factor, where that lies on the way from zero."""
+        self.jumps = []
         if self.last is None or self.last[0] * (factor - self.last[0]) < 0.0 or not self.last[1].mesh.touches:
             return None
         return self._through(base, self.last[0], factor, self.last[1])
@@ -107,8 +110,14 @@ class ContactRun:
             held = self.toucher.follow(base, way, start)
             if held is None:
                 return None
+            self.jumps += [a + part * (b - a) for part in self.toucher.snapped]
             start = held
         return held
+
+    @property
+    def jumped(self) -> tuple[str, ...]:
+        """What is to be said of states that the last way left."""
+        return tuple(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps)
 
     def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
         """From the state without obstacles, these coming back from where they do not reach it."""
@@ -127,6 +136,7 @@ class ContactRun:
         found = self.cushions.found(base, self._factors(0.0, factor))
         if found is None:
             return None
+        self.jumps = list(self.cushions.left)
         return self.toucher.resolved(base, found.held, found.touches, self.at(factor))
 
     def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
@@ -188,7 +198,9 @@ class ContactRun:
             ways.insert(0, lambda: self.grown(base, factor))
             if free is not None:
                 ways.insert(0 if nearer else 2, lambda: self.retracted(base, factor, free))
-        return (way() for way in ways)
+        for way in ways:
+            self.jumps = []
+            yield way()
 
     def named(self, failure: SolveError | None) -> list[str]:
         """What may be in the way, for a sentence."""

@@ -19,7 +19,7 @@ from .loading import Loading
 from .newton import Corrected
 from .prepared import Prepared
 
-__all__ = ["Followed", "follow"]
+__all__ = ["JUMPED", "Followed", "follow", "near_factor"]
 
 STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
@@ -63,6 +63,15 @@ class Followed:
     state: State
     reached: bool
     left: tuple[float, ...]
+
+
+def near_factor(factor: float) -> str:
+    """Where on the way of the loads a state was left, which is known to a few percent."""
+    return f"near factor {factor:.3g}"
+
+
+JUMPED = "left an unstable equilibrium there along its escape shape"
+"""What became of it."""
 
 
 def follow(

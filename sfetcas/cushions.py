@@ -95,11 +95,17 @@ class Cushions:
         self.scene, self.prepare, self.sides = scene, prepare, sides
         space = scene.resolved_dimension == "space"
         self.obstacles = {name: obstacle(contact, space) for name, contact in scene.contacts.items()}
+        self.left: list[float] = []
+        self._parts: tuple[float, ...] = ()
 
     # -- the state ------------------------------------------------------------------------------
 
     def found(self, base: Mesh, factors: Sequence[float]) -> Cushioned | None:
-        """The state that the loads lead to through these factors, and what touches in it."""
+        """The state that the loads lead to through these factors, and what touches in it.
+
+        ``left``, an attribute, is then the factors at which an unstable state was left on the way.
+        """
+        self.left = []
         mesh = self._divided(base)
         # What is free to move without obstacles; cushions themselves count as springs.
         bare = self.prepare(base)
@@ -141,6 +147,7 @@ class Cushions:
             reached = self._followed(prepared, _between(model, a, b), state)
             if reached is None:
                 return None
+            self.left += [a + part * (b - a) for part in self._parts]
             state = reached
         return self._settled(prepared, state, model.loading(factors[-1]))
 
@@ -151,6 +158,7 @@ class Cushions:
             return self._passes(prepared, before, after, way(1.0))
 
         result = follow(prepared, way, state, leave=leave, allowed=allowed)
+        self._parts = result.left
         return result.state if result.reached else None
 
     def _passes(self, prepared: Prepared, before: State, after: State, loading: Loading) -> bool:

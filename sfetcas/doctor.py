@@ -144,13 +144,11 @@ def in_words(equations: Equations, motion: Array) -> str:
     by_member = {name: float(sizes[list(ends)].max()) for name, ends in model.rotations.ends.items()}
     largest = max(by_member.values(), default=0.0)
     turning = [name for name, size in by_member.items() if size > SHARE * largest > 0.0]
-    moving = [
-        name
-        for name, size in zip(model.nodes, _node_travel(equations, motion), strict=True)
-        if size > 1e-6 * max(largest, 1.0)
-    ]
+    travels = _node_travels(equations, motion)
+    moved = np.linalg.norm(travels, axis=1) > 1e-6 * max(largest, 1.0)
+    moving = [name for name, moves in zip(model.nodes, moved, strict=True) if moves]
     words = [f"{_listed('member', turning)} turning"] if turning else []
-    words += [f"{_listed('node', moving)} moving"] if moving else []
+    words += [f"{_listed('node', moving)} moving{_together(travels[moved])}"] if moving else []
     return " with ".join(words) or "a rotation that nothing is joined to"
 
 
@@ -159,15 +157,29 @@ def _listed(kind: str, names: list[str]) -> str:
     return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(names[:4])}{more}"
 
 
-def _node_travel(equations: Equations, motion: Array, state: State | None = None) -> Array:
-    """How far each node travels per unit of a motion, by a small step both ways."""
+def _together(travels: Array) -> str:
+    """The direction in words, where all travel alike."""
+    first = travels[0] / np.linalg.norm(travels[0])
+    if np.abs(travels - travels[0]).max() > ALIKE * np.linalg.norm(travels[0]):
+        return ""
+    first = np.where(np.abs(first) > ALIKE, first, 0.0)
+    largest = first[np.argmax(np.abs(first))]
+    return f" along [{', '.join(f'{part:.3g}' for part in first * np.sign(largest))}]"
+
+
+ALIKE = 1e-6
+"""Difference of directions that counts as none; the central difference leaves out 1e-10."""
+
+
+def _node_travels(equations: Equations, motion: Array, state: State | None = None) -> Array:
+    """Where each node travels per unit of a motion (nodes, axes), by a small step both ways."""
     state = _undeformed(equations) if state is None else state
     loading = equations.model.loading(0.0, 0.0)
     step = np.zeros(equations.total)
     step[: equations.unknowns] = STEP * motion
     ahead, behind = (equations.places(equations.moved(state, sign * step), loading) for sign in (1.0, -1.0))
     travel = (ahead - behind) / (2.0 * STEP)
-    return np.linalg.norm(travel.reshape(-1, equations.model.element.axes)[: len(equations.model.nodes)], axis=1)
+    return np.asarray(travel.reshape(-1, equations.model.element.axes)[: len(equations.model.nodes)])
 
 
 STEP = 1e-5
@@ -247,4 +259,6 @@ def moves_nodes(equations: Equations, motion: Array, state: State) -> bool:
     """Whether a motion moves any node, or in the plane turns any member: a spin about its own axis does not."""
     if not equations.model.space and np.abs(motion[: equations.turning_unknowns]).max(initial=0.0) > 0.0:
         return True
-    return bool(_node_travel(equations, motion, state).max(initial=0.0) > 1e-6 * np.abs(motion).max(initial=1.0))
+    return bool(
+        np.abs(_node_travels(equations, motion, state)).max(initial=0.0) > 1e-6 * np.abs(motion).max(initial=1.0)
+    )

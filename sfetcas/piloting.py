@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .continuation import follow
+from .continuation import JUMPED, follow, near_factor
 from .equations import State
 from .errors import SolveError, Status
 from .loading import Loading
@@ -183,10 +183,7 @@ class Piloting(Meshing):
             return None
         corrected = pilot.correct(result.state, way(1.0))
         stability = pilot.stability(corrected)
-        notes = tuple(
-            f"jumped {_at(part, factors)}: left an unstable equilibrium there along its escape shape"
-            for part in result.left
-        )
+        notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
         if stability.negative and self.leave and not energy_known:
             notes += (KEPT,)
         return Found(pilot, corrected, stability, notes, left=result.left)
@@ -197,4 +194,4 @@ def _at(part: float, factors: tuple[float, float] | None) -> str:
     if factors is None:
         return f"near {100.0 * part:.2g} % of the loads of factor 0"
     begin, end = factors
-    return f"near factor {begin + part * (end - begin):.3g}"
+    return near_factor(begin + part * (end - begin))

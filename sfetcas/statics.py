@@ -207,6 +207,8 @@ class _Run(Refining):
                 held = None if free_way and over and not self.started else held
         ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
         notes += () if pilot.model.conservative else (NO_ENERGY,)
+        # Of what is free to move nothing else says more: without obstacles it falls, whatever they hold.
+        failure = None if pilot.diagnosis.mobility else failure
         return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
 
     def _first_pressed(
@@ -224,7 +226,7 @@ class _Run(Refining):
             if held is None:
                 continue
             try:
-                answer = self._pressed(contact.answered(held, factor, self.target, notes), factor)
+                answer = self._pressed(contact.answered(held, factor, self.target, (*notes, *contact.jumped)), factor)
             except SolveError as error:
                 refused = refused or error
                 continue

@@ -105,7 +105,11 @@ class Toucher:
         return None
 
     def follow(self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...]) -> Held | None:
-        """Follow from the begin of a way to its end; from a state there, or from the undeformed scene."""
+        """Follow from the begin of a way to its end; from a state there, or from the undeformed scene.
+
+        ``snapped``, an attribute, is then the parts of the way at which a state was left that ceased to be.
+        """
+        self.snapped = []
         now = start if isinstance(start, Held) else None
         touches = start.mesh.touches if isinstance(start, Held) else start
         done, step = 0.0, 0.5
