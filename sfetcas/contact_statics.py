@@ -16,6 +16,7 @@ from .fields import Fields
 from .mesh import Mesh, Touch
 from .obstacles import members_of, nearest, obstacle, takes_part
 from .prepared import Prepared
+from .rolling import rolling
 from .scene import Scene
 from .settling import Held, Way, placed
 from .stability import Stability
@@ -117,7 +118,7 @@ class ContactRun:
     @property
     def jumped(self) -> tuple[str, ...]:
         """What is to be said of states that the last way left."""
-        return tuple(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps)
+        return tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
 
     def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
         """From the state without obstacles, these coming back from where they do not reach it."""
@@ -292,7 +293,7 @@ class ContactRun:
         """Stability of a state on its mesh with sliding places, also where these take stability away, and notes."""
         way = self.at(factor)
         stability, notes = self._stability(held, way)
-        judged = held.prepared.stability(held.corrected)
+        judged = held.prepared.stability(rolling(held))
         freed = self._freed(held, way) if judged.stable in (True, False) else 0
         if freed:
             ways_out = max(judged.negative + freed, 0)
@@ -305,7 +306,7 @@ class ContactRun:
         A stretch without pressure may leave its obstacle between its ends: only these hold it.
         """
         held = self._pressing(held, way)
-        stability = held.prepared.stability(held.corrected)
+        stability = held.prepared.stability(rolling(held))
         if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
             stability = replace(stability, stable=True, negative=0)
         return stability
@@ -362,7 +363,11 @@ class ContactRun:
         """
         touched, touches = held.touched, held.mesh.touches
         free = [(i, k) for i, t in enumerate(touches) for k, x in enumerate(t.places) if 0.0 < x < 1.0]
-        single = [j for j, (i, _) in enumerate(free) if touches[i].to is None and not touches[i].flat]
+        # Rolling on planes is among the entries already.
+        kinds = [touched.obstacles[touches[i].contact].kind for i, _ in free]
+        single = [
+            j for j, (i, _) in enumerate(free) if touches[i].to is None and not touches[i].flat and kinds[j] != "flat"
+        ]
         # Where the member is straight at an edge, as before an end that hangs over, sliding changes nothing.
         single = [j for j in single if not self._straight_over_edge(held, touches[free[j][0]])]
         if not single:

@@ -123,7 +123,8 @@ class Cushions:
             if there is None:
                 shrink = np.sqrt(shrink)
                 continue
-            prepared, found, thickness = stiffer, there, trial
+            # What soft cushions hold thin ones may not: it rolls away over them, which what touches at places cannot.
+            prepared, found, thickness = stiffer, self._rolled(stiffer, there, factors[-1]), trial
         loading = prepared.model.loading(factors[-1])
         held = Held(prepared, found, loading, Touched(prepared.equations, found.state, loading))
         return Cushioned(held, self._touches(held))
@@ -205,6 +206,21 @@ class Cushions:
         start = prepared.equations.start(model.loading(0.0, 0.0))
         return found if found is not None and self._passes(prepared, start, found.state, loading) else None
 
+    def _rolled(self, prepared: Prepared, found: Corrected, factor: float) -> Corrected:
+        """Where an unstable state goes to, if that is not over an obstacle; else the state."""
+        leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
+        if not leave or not prepared.negative(found):
+            return found
+        loading = prepared.model.loading(factor)
+        try:
+            there = prepared.leave(found.state, prepared.stability(found), loading)[0]
+        except SolveError:
+            return found
+        if not self._passes(prepared, found.state, there.state, loading):
+            return found
+        self.left.append(factor)
+        return there
+
     def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium near a state; downhill from there where Newton's method does not find it, if not far."""
         found = prepared.correct(state, loading, iterations=25, most=0.8)
@@ -281,17 +297,28 @@ class Cushions:
                 for run in self._runs(held, contact, member, pushed)
             ]
             lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
-            for run in runs:
-                node = self._node(run, run.at)
-                if run.to is None and node is not None and node in lying:
+            # A place beside a node counts the push on the node too: the farthest from it stands for all of them.
+            beside = [(run, *self._beside(held, run)) for run in runs]
+            for run, near, _ in sorted(beside, key=lambda entry: -entry[2]):
+                if run.to is None and near is not None and near in lying:
                     continue
-                lying |= {node} if run.to is None and node else set()
+                lying |= {near} if run.to is None and near else set()
                 found.append(replace(run, way=self._way(touched, run)))
         return tuple(found)
 
     def _node(self, touch: Touch, x: float) -> str | None:
         """The node at a place of a touch."""
         return self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
+
+    def _beside(self, held: Held, touch: Touch) -> tuple[str | None, float]:
+        """The node within one element of a place, and how far it is, m."""
+        member, cuts = self.scene.members[touch.member], held.mesh.cuts[touch.member]
+        length = self.scene.center_lines[touch.member].length
+        if member.type != "rigid" and touch.at <= cuts[1]:
+            return member.nodes[0], touch.at * length
+        if member.type != "rigid" and touch.at >= cuts[-2]:
+            return member.nodes[-1], (1.0 - touch.at) * length
+        return self._node(touch, touch.at), 0.0
 
     def _runs(self, held: Held, contact: str, member: str, pushed: Mapping[Cushion, float]) -> Iterator[Touch]:
         """Places of a member next to each other that are pushed; a node counts for each member that ends there.

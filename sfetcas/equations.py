@@ -313,6 +313,10 @@ class Equations:
         slope[self.unknowns : self.unknowns + len(positions.rows)] = positions.BZ @ rate.shift
         return slope
 
+    def basis(self, rotation: int) -> Array | None:
+        """Axes (3, 3), columns, of a rotation that is held to the first of them; None of one that is not."""
+        return self._basis.get(rotation)
+
     def places(self, state: State, loading: Loading) -> Array:
         """Displacements of all places at a state, (places * axes,), dimensionless."""
         self._kernel.set(0, state.q[self.model.rotations.turns])

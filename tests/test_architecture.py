@@ -79,6 +79,7 @@ ORDER = [
     "accuracy",
     "several",
     "contact_balance",
+    "rolling",
     "contact_statics",
     "settings",
     "single",

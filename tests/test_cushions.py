@@ -99,3 +99,43 @@ def test_cushions_say_what_touches():
     (touch,) = found.touches
     begin, end = solve(scene).last.contacts["floor"]["at"]
     assert (touch.at, touch.to) == (pytest.approx(begin, abs=1.5 / 48), end)
+
+
+def ring_on_floor(force, nodes):
+    """A ring that is pressed down by its top, in a sleeve there; ``nodes``: angles of further nodes from the top."""
+    radius = 0.1
+    angles = [0.0, *nodes, 2.0 * np.pi]
+    names = ["top", *(f"n{i}" for i in range(len(nodes))), "top"]
+    table = {
+        "sections": {"s": {"EI3": 0.175}},
+        "nodes": {"top": {"position": [0, 0.2], "support": "slider", "direction": [0, 1]}},
+        "members": {},
+        "loads": {"p": {"type": "force", "node": "top", "value": [0, -force]}},
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}},
+        "analysis": {"accuracy": 1e-5},
+    }
+    for name, angle in zip(names[1:-1], nodes, strict=True):
+        table["nodes"][name] = {"position": [-radius * np.sin(angle), radius * (1.0 + np.cos(angle))]}
+    for i, (a, b) in enumerate(zip(angles[:-1], angles[1:], strict=True)):
+        shape = {"type": "arc", "angle": float(b - a)}
+        table["members"][f"m{i}"] = {"nodes": [names[i], names[i + 1]], "section": "s", "shape": shape}
+    return table
+
+
+@pytest.mark.parametrize("force", [30.0, 36.0, 42.0, 48.0])
+def test_rolling_at_a_node_is_as_stable_as_between_nodes(force):
+    """The place of contact moves when the ring rolls: with or without a node there it is the same ring."""
+    at_node, between = (solve(made(ring_on_floor(force, n))).last for n in ([np.pi], [1.9, 4.2]))
+    assert at_node.certificate.stable is between.certificate.stable is True
+    # The accuracy asked for, twice, times the size.
+    assert at_node.position("top")[1] == pytest.approx(between.position("top")[1], abs=1e-5)
+    # Eigenvalues by lumped masses on two meshes: four digits.
+    assert at_node.certificate.smallest == pytest.approx(between.certificate.smallest, rel=1e-3)
+    assert not any("jumped" in note or "left" in note for note in at_node.notes)
+
+
+def test_flattened_ring_rolls_away_and_says_so():
+    """Where it has become flat on the floor nothing keeps it from rolling to one side."""
+    step = solve(made(ring_on_floor(52.0, [np.pi]))).last
+    assert step.certificate.stable is True
+    assert any("jumped near factor" in note or "left an unstable" in note for note in step.notes)
