@@ -48,8 +48,11 @@ class TangentTest:
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
-    def _tangent(self, point: Point) -> tuple[Array, Array, float]:
-        """The weighted tangent on the null space of the closings, a basis of that, and what counts as zero."""
+    def _tangent(self, point: Point) -> tuple[Array, float, int]:
+        """The weighted tangent on the null space of the closings, what counts as zero, and the size of that space.
+
+        Across the null space it has its largest entry for an eigenvalue: projecting costs less than a basis does.
+        """
         equations, n = self._equations, self._equations.unknowns
         h, rows = np.zeros((n, n)), np.zeros((equations.rows, n))
         h[equations.row[self._in_h], equations.column[self._in_h]] = point.entries[self._in_h]
@@ -57,11 +60,15 @@ class TangentTest:
         h /= np.outer(self._root, self._root)
         if self._symmetric:
             h = 0.5 * (h + h.T)
-        basis = np.eye(n)
+        largest, free = float(np.abs(h).max(initial=0.0)), n
         if len(rows):
-            _, sizes, right = np.linalg.svd(rows / self._root)
-            basis = right[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
-        return basis.T @ h @ basis, basis, NEUTRAL + ROUNDING * float(np.abs(h).max(initial=0.0))
+            _, sizes, right = np.linalg.svd(rows / self._root, full_matrices=False)
+            across = right[sizes > RANK * sizes.max(initial=0.0)]
+            free -= len(across)
+            before, after = across @ h, h @ across.T
+            inner = before @ across.T + (largest + 1.0) * np.eye(len(across))
+            h += across.T @ (inner @ across - before) - after @ across
+        return h, NEUTRAL + ROUNDING * largest, free
 
     def _eigenvalues(self, tangent: Array) -> Array:
         """Eigenvalues by rising real part."""
@@ -70,7 +77,7 @@ class TangentTest:
 
     def inertia(self, point: Point) -> Inertia:
         """Numbers of eigenvalues with a negative real part, and of vanishing ones."""
-        tangent, _, limit = self._tangent(point)
+        tangent, limit, _ = self._tangent(point)
         values = self._eigenvalues(tangent)
         zero = int((np.abs(values) <= limit).sum())
         return Inertia(int(((values.real < 0.0) & (np.abs(values) > limit)).sum()), zero)
@@ -81,14 +88,13 @@ class TangentTest:
         The shapes are columns in the order of the real parts; they are singular vectors: where eigenvalues vanish
         these span what the tangent leaves open, while eigenvectors may coincide.
         """
-        tangent, basis, _ = self._tangent(point)
+        tangent = self._tangent(point)[0]
         if self._symmetric:
             values, vectors = np.linalg.eigh(tangent)
         else:
             values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
             vectors[:, np.argsort(np.abs(values))] = np.linalg.svd(tangent)[2][::-1].T
-        shapes = basis @ vectors
-        return 0, values, (shapes / self._root[:, None])[: self._equations.turning_unknowns]
+        return 0, values, (vectors / self._root[:, None])[: self._equations.turning_unknowns]
 
     def singular(self, point: Point, count: int) -> bool:
         """Whether so many eigenvalues vanish at a point where their real parts do."""
@@ -102,11 +108,11 @@ class TangentTest:
         turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
         if not self._symmetric:
             return Stability("not defined", 0, np.nan, np.zeros(turning), nothing)
-        tangent, basis, limit = self._tangent(point)
-        if not len(tangent):
+        tangent, limit, free = self._tangent(point)
+        if not free:
             return Stability(True, 0, np.inf, np.zeros(turning), nothing)
         values, vectors = np.linalg.eigh(tangent)
-        shape = basis @ vectors[:, 0] / self._root
+        shape = vectors[:, 0] / self._root
         masses = np.concatenate([equations.mass, np.full(len(nothing), LIGHT)])
         quotient = float(values[0]) / float(shape @ (masses * shape))
         shape = shape / shape[np.argmax(np.abs(shape[:turning]))]
