@@ -54,7 +54,8 @@ def evaluation(nodes: Array, x: ArrayLike) -> Array:
     """Matrix (len(x), len(nodes)) that takes nodal values to values at x."""
     x = np.atleast_1d(np.asarray(x, dtype=float))
     difference = x[:, None] - nodes[None, :]
-    hit = difference == 0.0
+    # Nearer than that the quotient would overflow.
+    hit = np.abs(difference) < 1e-200
     quotient = _barycentric(nodes) / np.where(hit, 1.0, difference)
     quotient = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), quotient)
     return np.asarray(quotient / quotient.sum(axis=1, keepdims=True))

@@ -318,3 +318,9 @@ def test_functions_are_made_once():
     element = element_by_name("SFET4", True)
     assert element.turning is element.turning
     assert isinstance(element.energy, ca.Function)
+
+
+@pytest.mark.filterwarnings("error")
+def test_places_next_to_a_node_are_the_node():
+    nodes = np.array([0.0, 0.5, 1.0])
+    np.testing.assert_array_equal(evaluation(nodes, [1e-310, 1e-210]), evaluation(nodes, [0.0, 0.0]))
