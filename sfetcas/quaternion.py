@@ -69,12 +69,21 @@ def turned(q: Sequence[Any], v: Sequence[Any]) -> list[Any]:
 
 
 def _components(a: ArrayLike) -> list[Array]:
-    return list(np.moveaxis(np.asarray(a, dtype=float), -1, 0))
+    a = np.asarray(a, dtype=float)
+    return [a[..., i] for i in range(a.shape[-1])]
+
+
+def _stacked(parts: list[Array]) -> Array:
+    """The inverse; sums of products have the shape that all are broadcast to."""
+    found = np.empty((*np.shape(parts[0]), len(parts)))
+    for i, part in enumerate(parts):
+        found[..., i] = part
+    return found
 
 
 def multiply(a: ArrayLike, b: ArrayLike) -> Array:
     """Product of quaternion arrays of shape (..., 4), broadcast against each other."""
-    return np.stack(np.broadcast_arrays(*product(_components(a), _components(b))), axis=-1)
+    return _stacked(product(_components(a), _components(b)))
 
 
 def conjugate(q: ArrayLike) -> Array:
@@ -84,7 +93,7 @@ def conjugate(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """``R(q) v`` for arrays of shape (..., 4) and (..., 3)."""
-    return np.stack(np.broadcast_arrays(*turned(_components(q), _components(v))), axis=-1)
+    return _stacked(turned(_components(q), _components(v)))
 
 
 def matrix(q: ArrayLike) -> Array:

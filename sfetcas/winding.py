@@ -8,6 +8,7 @@ plane rotations are angles, which count turns by themselves.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,21 +77,42 @@ class Winding:
 
     def _parts(self, q: Array) -> tuple[Array, Array, Array]:
         """Sine and cosine of the angles over the share, and the share; see :class:`~sfetcas.joints.Turning`."""
-        q = np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
-        relative = quaternion.multiply(quaternion.conjugate(q[self.sides[:, 0]]), q[self.sides[:, 1]])
-        seen = quaternion.rotate(relative, self.across)
-        crossed = self.across.any(axis=1)
-        sine = np.where(crossed, _dot(np.cross(self.axis, self.across), seen), _dot(self.axis, relative[:, 1:]))
-        cosine = np.where(crossed, _dot(self.across, seen), relative[:, 0])
-        return sine, cosine, np.where(crossed, 1.0, 2.0)
+        relative = q[self.sides[:, 1]]
+        if not self._on_ground:
+            q = np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
+            relative = quaternion.multiply(quaternion.conjugate(q[self.sides[:, 0]]), q[self.sides[:, 1]])
+        sine, cosine = _dot(self.axis, relative[:, 1:]), relative[:, 0]
+        if self._crossed.any():
+            seen = quaternion.rotate(relative, self.across)
+            sine = np.where(self._crossed, _dot(np.cross(self.axis, self.across), seen), sine)
+            cosine = np.where(self._crossed, _dot(self.across, seen), cosine)
+        return sine, cosine, self._share
+
+    # Of a few angles in most scenes, and asked for at every step: what never changes is found once.
+
+    @functools.cached_property
+    def _on_ground(self) -> bool:
+        """Whether the first sides are all the ground."""
+        return bool((self.sides[:, 0] == GROUND).all() and (self.sides[:, 1] != GROUND).all())
+
+    @functools.cached_property
+    def _crossed(self) -> Array:
+        return np.asarray(self.across.any(axis=1))
+
+    @functools.cached_property
+    def _share(self) -> Array:
+        return np.where(self._crossed, 1.0, 2.0)
 
     def moved(self, q: Array, near: Array, turn: Array, there: Array) -> Array:
         """The angles after rotations ``q`` have turned by vectors (rotations, 3) about the fixed axes to ``there``."""
         if not self.count:
             return near
-        turn, still = np.vstack([turn, np.zeros(3)]), np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
-        axis = quaternion.rotate(still[self.sides[:, 0]], self.axis)
-        gained = _dot(axis, turn[self.sides[:, 1]] - turn[self.sides[:, 0]])
+        if self._on_ground:
+            gained = _dot(self.axis, turn[self.sides[:, 1]])
+        else:
+            turn, still = np.vstack([turn, np.zeros(3)]), np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
+            axis = quaternion.rotate(still[self.sides[:, 0]], self.axis)
+            gained = _dot(axis, turn[self.sides[:, 1]] - turn[self.sides[:, 0]])
         return self.angles(there, self.angles(q, near) + gained)
 
     def prescribed(self, kind: Index, loading: Loading) -> Array:
