@@ -40,6 +40,9 @@ STRAIGHT = 1e-4
 STAYS = "unstable, and no stable equilibrium was found along its escape shape"
 """A note."""
 
+CAREFUL = 0.05
+"""Part of the way of a step where longer ones led astray."""
+
 LEVELS, MOST_ELEMENTS = 40, 20_000
 """Most refinements of a mesh, and most elements."""
 
@@ -85,7 +88,13 @@ class ContactRun:
         self.jumps = []
         if self.last is None or self.last[0] * (factor - self.last[0]) < 0.0 or not self.last[1].mesh.touches:
             return None
-        return self._through(base, self.last[0], factor, self.last[1])
+        begin, start = self.last
+        held = self._through(base, begin, factor, start)
+        stood = self.scene.analysis.unstable == "leave" and self._judged(start, self.at(begin)).negative <= 0
+        if held is None or not stood or self._judged(held, self.at(factor)).negative <= 0:
+            return held
+        # A long step from a stable state may have met an unstable branch beside its own.
+        return self._through(base, begin, factor, start, longest=CAREFUL) or held
 
     def grown(self, base: Mesh, factor: float) -> Held | None:
         """From the undeformed scene, loads and motions growing together."""
@@ -103,12 +112,14 @@ class ContactRun:
         knots = {t for history in self.scene.histories.values() for t in history.t if low < t < high}
         return [begin, *sorted(knots, reverse=end < begin), end]
 
-    def _through(self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...]) -> Held | None:
+    def _through(
+        self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...], longest: float = 1.0
+    ) -> Held | None:
         stops = self._factors(begin, end)
         held: Held | None = None
         for a, b in zip(stops, stops[1:], strict=False):
             way = _between(a, b)
-            held = self.toucher.follow(base, way, start)
+            held = self.toucher.follow(base, way, start, longest)
             if held is None:
                 return None
             self.jumps += [a + part * (b - a) for part in self.toucher.snapped]

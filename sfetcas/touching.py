@@ -104,15 +104,19 @@ class Toucher:
             source = found.prepared.model, found.corrected.state
         return None
 
-    def follow(self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...]) -> Held | None:
+    def follow(
+        self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...], longest: float = 1.0
+    ) -> Held | None:
         """Follow from the begin of a way to its end; from a state there, or from the undeformed scene.
+
+        No step is longer than ``longest``, a part of the way.
 
         ``snapped``, an attribute, is then the parts of the way at which a state was left that ceased to be.
         """
         self.snapped = []
         now = start if isinstance(start, Held) else None
         touches = start.mesh.touches if isinstance(start, Held) else start
-        done, step = 0.0, 0.5
+        done, step = 0.0, min(0.5, longest)
         most = self.settler.solves + MOST_SOLVES
         for _ in range(TRIES):
             if done >= 1.0:
@@ -132,7 +136,7 @@ class Toucher:
                 self.snapped.append(trial)
                 step = 0.05
             now, touches, done = there, there.mesh.touches, trial
-            step *= 2.0
+            step = min(2.0 * step, longest)
         return None
 
     def _snapped(self, base: Mesh, now: Held | None, way: Way) -> Held | None:

@@ -139,3 +139,11 @@ def test_flattened_ring_rolls_away_and_says_so():
     step = solve(made(ring_on_floor(52.0, [np.pi]))).last
     assert step.certificate.stable is True
     assert any("jumped near factor" in note or "left an unstable" in note for note in step.notes)
+
+
+def test_a_ring_that_rolls_to_one_side_stays_there():
+    """From one step to the next the state goes on on its own branch, not over the unstable one to the other side."""
+    table = ring_on_floor(50.0, [np.pi])
+    table["analysis"]["steps"] = [1.0, 1.1]
+    sides = [step.contacts["floor"]["member"] for step in solve(made(table)).steps]
+    assert sides[0] == sides[1]
