@@ -10,23 +10,25 @@ import numpy as np
 from .arrays import Array, Index
 from .beams import Scales
 from .bodies import BodyData, body_of
-from .elements import Element
-from .joints import (
+from .contact_joints import (
     Along,
     AlongRound,
     Bent,
-    Body,
-    Connection,
     CushionedPlane,
     CushionedRound,
+    OnEdge,
+    OnPlane,
+    OnRound,
+)
+from .elements import Element
+from .joints import (
+    Body,
+    Connection,
     DrivenSlide,
     DrivenTurn,
     Hinge,
     LineSpring,
     LineStop,
-    OnEdge,
-    OnPlane,
-    OnRound,
     Slide,
     Spring,
     TurnSpring,

@@ -16,8 +16,8 @@ from . import interpolation, quaternion
 from .arrays import Array
 from .balance import Balance, SpringState
 from .balance import three as _three
+from .contact_joints import OnPlane, OnRound
 from .equations import Equations, State
-from .joints import OnPlane, OnRound
 from .loading import Loading
 from .mesh import Touch
 from .obstacles import obstacle

@@ -38,6 +38,7 @@ ORDER = [
     "scenefile",
     "elements",
     "joints",
+    "contact_joints",
     "carried",
     "mesh",
     "rotations",

@@ -7,9 +7,10 @@ from scenes import SOFT, made
 from test_contacts import balance, smallest_gap
 
 from sfetcas import solve
+from sfetcas.contact_joints import CushionedPlane, CushionedRound
 from sfetcas.contact_statics import ContactRun
 from sfetcas.cushions import Cushions
-from sfetcas.joints import CushionedPlane, CushionedRound, by_turning
+from sfetcas.joints import by_turning
 from sfetcas.statics import Settings, _Run
 
 FLAT, ROUND = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
