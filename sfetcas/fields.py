@@ -372,6 +372,26 @@ class Fields:
         scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
         return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
 
+    def bent(self, member: str) -> float:
+        """Largest displacement, over the size, and rotation of the nodes of a small member, seen from its frame."""
+        model = self.model
+        names, turns = model.scene.members[member].nodes, list(model.rotations.ends[member])
+        rest = np.array([model.scene.nodes[name].position for name in names])
+        places = [model.segments.place(model.segments.ends[member, i]) for i in range(len(names))]
+        now = rest + _three(self._nodal[places]) * model.scales.length
+        turned = self.state.q[turns]
+        if not model.space:
+            # From the mean angle: quaternions of angles that differ by turns would not tell their mean.
+            mean = quaternion.from_rotation_vector(np.array([0.0, 0.0, turned.mean()]))
+            turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
+        else:
+            turned = turned * np.where(turned @ turned[0] < 0.0, -1.0, 1.0)[:, None]
+            mean = turned.sum(axis=0) / np.linalg.norm(turned.sum(axis=0))
+        moved = now - now[0] - quaternion.rotate(mean, rest - rest[0])
+        spins = 2.0 * quaternion.multiply(turned, quaternion.conjugate(mean))[:, 1:]
+        size = np.linalg.norm(rest - rest[0], axis=1).max()
+        return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
+
     def _start_forces(self, part: slice) -> Array:
         """Internal force at the start of each of consecutive elements, (elements, axes)."""
         element = self.model.element

@@ -289,15 +289,32 @@ def equilibrium(
         error_estimate=error_estimate,
         escape=escape,
     )
+    fields = Fields(equations, state, loading)
     return Equilibrium(
         factor=factor,
         model=model,
         state=state,
         loading=loading,
         certificate=certificate,
-        notes=notes,
+        notes=(*notes, *_not_small(fields)),
         iterations=iterations,
         strain=point.strain,
         potential=point.potential,
-        fields=Fields(equations, state, loading),
+        fields=fields,
     )
+
+
+def _not_small(fields: Fields) -> tuple[str, ...]:
+    """A note where small members bend so far that linear elasticity is wrong, which no error estimate sees."""
+    members = fields.model.scene.members
+    bent = {name: fields.bent(name) for name, member in members.items() if member.type == "small"}
+    far = sorted((name for name in bent if bent[name] > SMALL), key=lambda name: -bent[name])
+    if not far:
+        return ()
+    others = f", as {counted(len(far) - 1, 'other', 'others')} do" if far[1:] else ""
+    found = f"the small member {far[0]!r} bends by {bent[far[0]]:.2g} of its length or rad{others}"
+    return (f"{found}: its linear elasticity is for a few percent, and the error estimate does not tell",)
+
+
+SMALL = 0.1
+"""Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""

@@ -334,6 +334,26 @@ def test_small_is_flexible_for_small_loads(kind, load):
     assert gaps[0] < 0.05 * moved[0]
 
 
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+@pytest.mark.parametrize(("force", "told"), [(0.15, False), (3.0, True)])
+def test_a_small_member_that_bends_far_is_told(dimension, force, told):
+    """A cantilever by one small member: the tip goes F L3 / 3 EI across, whatever carries its foot and turns it."""
+    table = {
+        "dimension": dimension,
+        "sections": {"one": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"arm": {"nodes": ["A", "B"], "section": "one", "type": "small"}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, force]}},
+    }
+    notes = sfetcas.solve(made(table)).last.notes
+    assert [note for note in notes if "small member 'arm' bends by" in note] == list(notes)
+    assert bool(notes) is told
+    # Turned as a whole it does not bend.
+    table["motions"] = {"m": {"node": "A", "rotation": 2.0 if dimension == "plane" else [0, 0, 2.0]}}
+    table["loads"]["f"]["value"] = [0.0, 0.01]
+    assert sfetcas.solve(made(table)).last.notes == ()
+
+
 @pytest.mark.parametrize("load", ["force", "spread", "inside", "gravity"])
 @pytest.mark.parametrize("kind", ["arc", "varying", "arc, space", "varying, space"])
 def test_small_turned_far_is_flexible_turned_far(kind, load):
