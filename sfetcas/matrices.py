@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,8 +40,11 @@ def _matrix(value: Any, name: str) -> tuple[tuple[float, ...], ...]:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         array = np.zeros(0)
-    if array.ndim != 2 or array.shape[0] != array.shape[1] or not np.isfinite(array).all():
-        raise ValueError(f"found {say(value)}, accepted: a square matrix of finite numbers, or a file with one")
+    square = array.ndim == 2 and array.shape[0] == array.shape[1]
+    if not square or not np.isfinite(array).all():
+        wrong = "entries that are not finite" if square else " x ".join(map(str, array.shape)) + " numbers"
+        found = wrong if isinstance(value, np.ndarray) else say(value)
+        raise ValueError(f"found {found}, accepted: a square matrix of finite numbers, or a file with one")
     return tuple(tuple(row) for row in array.tolist())
 
 
@@ -82,10 +86,17 @@ def _from_npz(path: Path, name: str) -> Floats:
         if name not in names and len(names) != 1:
             message = f"the file {path} holds {', '.join(names) or 'nothing'}, accepted: {name}, or one array alone"
             raise ValueError(message)
-        return _numbers_of(loaded[name if name in names else names[0]], path)
+        try:
+            array = loaded[name if name in names else names[0]]
+        except (ValueError, EOFError, zlib.error):
+            array = None
+        return _numbers_of(array, path)
 
 
 def _numbers_of(array: Any, path: Path) -> Floats:
+    # What is no array of numpy is given as bytes, or not at all.
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"the file {path} holds no arrays of numbers of numpy")
     if array.dtype.kind not in "fiu":
         raise ValueError(f"the file {path} holds {array.dtype.name}, accepted: real numbers")
     return np.asarray(array, dtype=float)
@@ -112,7 +123,7 @@ def _from_market(path: Path) -> Floats:
 
 
 def _market_entries(numbers: Floats, layout: str, symmetry: str) -> Floats:
-    n, m = int(numbers[0]), int(numbers[1])
+    n, m = _whole(numbers[:2])
     if not (0 < n <= LARGEST and 0 < m <= LARGEST):
         raise ValueError
     matrix = np.zeros((n, m))
@@ -123,14 +134,24 @@ def _market_entries(numbers: Floats, layout: str, symmetry: str) -> Floats:
             row, column = row[keep], column[keep]
         matrix[row, column] = numbers[2:].reshape(len(row))
     else:
-        entries = numbers[3:].reshape(int(numbers[2]), 3)
-        row, column = entries[:, 0].astype(int) - 1, entries[:, 1].astype(int) - 1
+        (count,) = _whole(numbers[2:3])
+        if 3 * count != len(numbers) - 3:
+            raise ValueError
+        entries = numbers[3:].reshape(count, 3)
+        row, column = (_whole(entries[:, i]) - 1 for i in (0, 1))
         if min(row.min(initial=0), column.min(initial=0)) < 0:
             raise ValueError
         np.add.at(matrix, (row, column), entries[:, 2])
     if symmetry == "symmetric":
         matrix[column, row] = matrix[row, column]
     return matrix
+
+
+def _whole(numbers: Floats) -> NDArray[np.intp]:
+    """Counts and places; anything else, also what no integer holds, is a ValueError."""
+    if not (np.abs(numbers) < 2.0**31).all() or (numbers % 1.0).any():
+        raise ValueError
+    return numbers.astype(np.intp)
 
 
 def check_stiffness(matrix: ArrayLike, nodes: int) -> None:
