@@ -100,14 +100,15 @@ class Equations:
         self._linked = [_Linked(self, group) for group in model.connections]
         self._pattern()
         # A hundredth of the stiffness against turning a node: 1e-14 of it is what rounding of rotations leaves.
-        self._noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
+        self.noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
         for link in self._linked:
-            link.add_noise(self._noise)
+            link.add_noise(self.noise)
         # About an axis that nothing resists, rounding is that of what is stiff across it.
         free = self.number[(self.number >= 0).all(axis=1)]
-        across = self._noise[free].max(axis=1, keepdims=True)
-        self._noise[free] = np.where(self._noise[free] > NOTHING * across, self._noise[free], across)
-        self._noise[self.unknowns :] = 1.0
+        across = self.noise[free].max(axis=1, keepdims=True)
+        self.noise[free] = np.where(self.noise[free] > NOTHING * across, self.noise[free], across)
+        self.noise[self._kept] = self.noise[self._kept].max(axis=1, keepdims=True)
+        self.noise[self.unknowns :] = 1.0
 
     # -- numbering ------------------------------------------------------------------------------
 
@@ -275,7 +276,7 @@ class Equations:
         sums = np.abs(moments) + np.repeat(carried, len(model.element.nodes) * model.element.turns).reshape(
             moments.shape
         )
-        scale = self._gathered(sums) + self._noise
+        scale = self._gathered(sums) + self.noise
         if loading.moment.any():
             potential -= self._work_of_moments(state, loading)
             couple = self._on_unknowns(loading.moment)

@@ -117,10 +117,11 @@ def correct(
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
     first = second = last = np.inf
+    begun = state, point, residual
     count = 0
     for count in range(iterations):
         # One step is always taken: under a tiny load even the whole answer is below rounding of the stiffness.
-        if residual == 0.0 or (count and residual <= ROUNDING):
+        if residual == 0.0 or (count and residual <= ROUNDING and _balanced(equations, point)):
             break
         try:
             here = replace(point, entries=tangent) if tangent is not None and count == 0 else point
@@ -137,20 +138,35 @@ def correct(
         elif count == 1:
             second = length
         if count and residual > tolerance and (length > most or length > max(contraction * last, SHORT)):
+            if begun[2] <= tolerance:
+                break
             return Corrected(state, point, False, count, first, second, residual)
         last = length
         trial = equations.moved(state, step)
         there = equations.at(trial, loading)
         gained = relative_residual(equations, there)
-        if residual <= tolerance and gained > 0.25 * residual:
+        if residual <= tolerance and gained > 0.25 * residual and (count or _balanced(equations, point)):
             if gained < residual:
                 state, point, residual = trial, there, gained
             break
         state, point, residual = trial, there, gained
         if not np.isfinite(residual):
             break
+    if not residual <= tolerance and begun[2] <= tolerance:
+        state, point, residual = begun
     second = 0.0 if second == np.inf else second
     return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+
+
+def _balanced(equations: Equations, point: Point) -> bool:
+    """Whether what is out of balance is little beside all that acts, too, and not only beside what is stiff."""
+    n = equations.unknowns
+    acting = (point.scale - equations.noise)[:n].max(initial=0.0)
+    return float(np.abs(point.residual[:n]).max(initial=0.0)) <= BALANCED * acting
+
+
+BALANCED = 1e-9
+"""Share of the largest moment or force that acts: where more is out of balance, stiffness beside it hides it."""
 
 
 def _unresisted(equations: Equations, step: Array, point: Point, weight: Array) -> bool:

@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+import zipfile
 from itertools import pairwise
 
 import numpy as np
@@ -571,6 +572,9 @@ BAD_FILES = {
         b"%%MatrixMarket matrix coordinate real general\n900000000 900000000 0\n",
         "does not hold the entries",
     ),
+    "infinite.mtx": (b"%%MatrixMarket matrix array real general\ninf 1\n1\n", "does not hold the entries"),
+    "between.mtx": (b"%%MatrixMarket matrix coordinate real general\n2 2 1\n1.5 1 5\n", "does not hold the entries"),
+    "less.mtx": (b"%%MatrixMarket matrix coordinate real general\n2 2 -1\n1 1 5\n", "does not hold the entries"),
     "words.mtx": (b"%%MatrixMarket matrix array real general\n1 1\none\n", "does not hold the entries"),
     "flat.mtx": (b"%%MatrixMarket matrix array real general\n1 2\n1\n2\n", "a square matrix of finite numbers"),
     "nan.mtx": (b"%%MatrixMarket matrix array real general\n1 1\nnan\n", "a square matrix of finite numbers"),
@@ -595,6 +599,20 @@ def test_wrong_matrix_files_are_refused_in_one_sentence(name, tmp_path):
     assert sentence in message
     assert "members.m.stiffness" in message
     assert "\n" not in message
+
+
+def test_npz_without_an_array_is_refused_by_its_name(tmp_path):
+    with zipfile.ZipFile(tmp_path / "text.npz", "w") as archive:
+        archive.writestr("stiffness.npy", "no array")
+    np.savez(tmp_path / "objects.npz", stiffness=np.array([None, "a"], dtype=object))
+    np.savez(tmp_path / "flat.npz", stiffness=np.ones((12, 11)))
+    for name, sentence in (
+        ("text.npz", "text.npz holds no arrays of numbers"),
+        ("objects.npz", "objects.npz holds no arrays of numbers"),
+        ("flat.npz", "found 12 x 11 numbers, accepted: a square matrix"),
+    ):
+        with pytest.raises(sfetcas.SceneError, match=sentence):
+            made(condensed(str(tmp_path / name)))
 
 
 def test_npz_with_several_arrays_needs_the_name(tmp_path):
@@ -638,6 +656,47 @@ def test_reactions_balance_whatever_the_stiffness_ratio(ratio, space):
         force, moment = force + f, moment + m + np.cross(step.position(node), f)
     np.testing.assert_allclose(force, 0.0, atol=1e-8)
     np.testing.assert_allclose(moment, 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("stiffness", [1e10, 1e12, 1e16])
+def test_a_load_far_below_the_stiffness_of_a_spring_is_carried(stiffness):
+    """A rigid rod on a pin and a spring at its end: the spring takes the whole force across the rod."""
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"rod": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"k": {"type": "translational", "node": "B", "stiffness": stiffness, "direction": [0, 1]}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, 0.01]}},
+    }
+    assert sfetcas.solve(made(table)).last.spring("k").effort == pytest.approx(-0.01, rel=1e-9)
+
+
+@pytest.mark.parametrize("axial", [1e6, 1e9, 1e12])
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_a_load_far_below_the_stiffness_of_a_small_member_is_carried(axial, dimension):
+    """A cantilever far stiffer along than across: the moment at its foot is the force times its arm."""
+    table = textbook_cantilever(axial) | {"dimension": dimension}
+    step = sfetcas.solve(made(table)).last
+    assert step.position("B")[1] == pytest.approx(0.01 / 3.0, rel=1e-4)
+    # Rounding of the length leaves 1e-16 of the axial stiffness, a hundredth of that as a moment.
+    moment = step.reaction("A")[1][2]
+    assert moment == pytest.approx(-0.01 * step.position("B")[0], rel=1e-8 + 1e-20 * axial / 0.01)
+
+
+def textbook_cantilever(axial):
+    """A small member from its 12 x 12 matrix with EI = GJ = L = 1, clamped, under a force across its end."""
+    stiffness = np.zeros((12, 12))
+    stretch = np.outer([1.0, -1.0], [1.0, -1.0])
+    for freedoms, size in (([0, 6], axial), ([3, 9], 1.0)):
+        stiffness[np.ix_(freedoms, freedoms)] = size * stretch
+    bent = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
+    signs = np.array([1.0, -1.0, 1.0, -1.0])
+    stiffness[np.ix_([1, 5, 7, 11], [1, 5, 7, 11])] = bent
+    stiffness[np.ix_([2, 4, 8, 10], [2, 4, 8, 10])] = bent * np.outer(signs, signs)
+    return {
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "type": "small", "stiffness": stiffness}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, 0.01]}},
+    }
 
 
 def test_small_scene_bends():
