@@ -223,7 +223,8 @@ def loose_rows(equations: Equations, point: Point) -> Array:
     if not equations.rows:
         return np.zeros((0, 0))
     # A row that no rotation changes is loose too, also where it is the only one.
-    usual = float((equations.model.beams.weight**2).sum())
+    # Without beams rows are of the size of the units of the model.
+    usual = float((equations.model.beams.weight**2).sum()) or 1.0
     find = _smallest if equations.rows > MANY else _all_singular
     squares, left, largest = find(equations, point)
     return np.asarray(left[:, squares < SLACK**2 * max(largest, usual)])

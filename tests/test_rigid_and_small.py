@@ -753,6 +753,22 @@ def test_redundant_reactions_are_the_smallest_that_balance(nodes, order):
     assert any("not unique" in note for note in step.notes)
 
 
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_a_small_member_alone_between_held_points_tells_that_its_pull_is_not_known(dimension):
+    """It does not stretch: what the load along it does to either end is open, and the halves are the smallest."""
+    table = {
+        "dimension": dimension,
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0], "support": "ball"}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s", "type": "small"}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [3.0, 1.0]}},
+    }
+    step = sfetcas.solve(made(table)).last
+    assert any("reactions are not unique" in note and "member m" in note for note in step.notes)
+    np.testing.assert_allclose(step.reaction("A")[0], [-1.5, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(step.reaction("B")[0], [-1.5, -1.0, 0.0], atol=1e-12)
+
+
 def test_loops_within_one_rigid_body_need_no_closings():
     """A ladder of rigid members is one body: no redundant rows, and the answer of a single member in its place."""
     table = {
