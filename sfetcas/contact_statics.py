@@ -308,7 +308,7 @@ class ContactRun:
         freed = self._freed(held, way) if judged.stable in (True, False) else 0
         if freed:
             ways_out = max(judged.negative + freed, 0)
-            stability = replace(judged, stable=ways_out == 0, negative=ways_out)
+            stability = replace(judged, stable=ways_out == 0, negative=ways_out, smallest=np.nan)
         return stability, tuple(notes)
 
     def _judged(self, held: Held, way: Way) -> Stability:
@@ -319,7 +319,8 @@ class ContactRun:
         held = self._pressing(held, way)
         stability = held.prepared.stability(rolling(held))
         if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
-            stability = replace(stability, stable=True, negative=0)
+            # The smallest eigenvalue was that of places that do not slide.
+            stability = replace(stability, stable=True, negative=0, smallest=np.nan)
         return stability
 
     def _pressing(self, held: Held, way: Way) -> Held:

@@ -30,9 +30,6 @@ from .work import Work
 
 __all__ = ["Equations", "Point", "State"]
 
-NOTHING = 1e-12
-"""Share of the stiffness across an axis below which there is none about it."""
-
 
 @dataclass(frozen=True)
 class State:
@@ -103,10 +100,9 @@ class Equations:
         self.noise = np.abs(self.elastic_entries()[self.diagonal]) * 0.01
         for link in self._linked:
             link.add_noise(self.noise)
-        # About an axis that nothing resists, rounding is that of what is stiff across it.
+        # Sections turn: about any fixed axis rounding is that of the stiffest one, also where nothing resists a turn.
         free = self.number[(self.number >= 0).all(axis=1)]
-        across = self.noise[free].max(axis=1, keepdims=True)
-        self.noise[free] = np.where(self.noise[free] > NOTHING * across, self.noise[free], across)
+        self.noise[free] = self.noise[free].max(axis=1, keepdims=True)
         self.noise[self._kept] = self.noise[self._kept].max(axis=1, keepdims=True)
         self.noise[self.unknowns :] = 1.0
 
