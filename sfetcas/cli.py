@@ -214,7 +214,9 @@ def _report_path(path: Course) -> None:
         low, high = branch.factors.min(), branch.factors.max()
         print(f"{name}: {counted(len(branch.points), 'point')}, factors {low:.6g} to {high:.6g}; {branch.end}")
         for stable, first, last in branch.stretches():
-            ends = list(dict.fromkeys(f"{branch.points[i].factor:.9g}" for i in (first, last)))
+            # In contact the point where stability changes is not located: the last of its kind is that of a sample.
+            digits = 3 if path.scene.contacts else 9
+            ends = list(dict.fromkeys(f"{branch.points[i].factor:.{digits}g}" for i in (first, last)))
             kind = {"True": "stable", "False": "unstable", "not defined": "stability not defined"}.get(
                 str(stable), "neutral"
             )

@@ -9,8 +9,10 @@ import numpy as np
 
 from .accuracy import largest_difference, roughness
 from .arrays import Array
+from .balance import three
 from .continuation import JUMPED, near_factor
 from .cushions import Cushions
+from .doctor import along
 from .errors import SolveError, Status
 from .fields import Fields
 from .mesh import Mesh, Touch
@@ -36,6 +38,9 @@ IDLE = 1e-7
 
 STRAIGHT = 1e-4
 """Curvatures, times the length of the scene, below this are those of a straight member on a coarse mesh."""
+
+PARALLEL = 1e-6
+"""Square of the sine of an angle up to which a direction lies in a plane."""
 
 STAYS = "unstable, and no stable equilibrium was found along its escape shape"
 """A note."""
@@ -213,6 +218,40 @@ class ContactRun:
         for way in ways:
             self.jumps = []
             yield way()
+
+    def refuse_what_cannot_be(self, pilot: Prepared, factor: float) -> None:
+        """Say why there can be no state: a node is held inside an obstacle, or nothing holds a direction.
+
+        Raises
+        ------
+        SolveError
+            Naming the node and the obstacle, or the direction.
+        """
+        model = pilot.model
+        stops, axes = obstacles_of(model), model.element.axes
+        shifts = model.loading(factor).shift.reshape(-1, axes) * model.scales.length
+        for contact, stop in stops.items():
+            members = [
+                self.scene.members[name] for name in members_of(self.scene.contacts[contact], self.scene.members)
+            ]
+            for node in dict.fromkeys(n for member in members for n in member.nodes):
+                record = self.scene.nodes[node]
+                if stop.kind == "sharp" or record.support == "free" or record.slides:
+                    continue
+                place = three(np.asarray(record.position)[:axes] + shifts[model.segments.place(node)])
+                gap = float(stop.gaps(place[None, :], np.zeros((1, 3)))[0])
+                if gap < -COARSE * self.scene.size:
+                    detail = f"node {node} is held {-gap:.3g} m inside contacts.{contact}"
+                    raise SolveError(Status.INFEASIBLE, detail)
+        free = np.array(pilot.diagnosis.drifts).reshape(-1, axes)
+        if not len(free) or any(stop.kind != "flat" for stop in stops.values()):
+            return
+        normals = np.array([stop.normals(np.zeros((1, 3)), np.zeros((1, 3)))[0][:axes] for stop in stops.values()])
+        _, sizes, ways = np.linalg.svd(free @ normals.T @ normals @ free.T)
+        for way in ways[sizes < PARALLEL]:
+            direction = way @ free / np.linalg.norm(way @ free)
+            detail = f"nothing holds it along {along(direction)}, not the frictionless {', '.join(self.named(None))}"
+            raise SolveError(Status.FAILED, detail)
 
     def named(self, failure: SolveError | None) -> list[str]:
         """What may be in the way, for a sentence."""

@@ -11,6 +11,7 @@ Source: Maxwell 1864 and Calladine 1978 (counting), here by rank; theory of mech
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from .equations import Equations, State
 from .loading import Loading
 from .newton import loose_rows, rows_in
 
-__all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
+__all__ = ["Diagnosis", "along", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
 SOFT = 1e-7
 """Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing."""
@@ -49,12 +50,15 @@ class Diagnosis:
         Names of the closings and joints that take part in redundant combinations.
     excess : int
         Number of redundant combinations.
+    drifts : tuple of tuple of float
+        Directions in which all nodes may move alike.
     """
 
     mobility: int
     motions: tuple[str, ...]
     redundant: tuple[str, ...]
     excess: int
+    drifts: tuple[tuple[float, ...], ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -73,7 +77,9 @@ def diagnose(equations: Equations, weight: Array) -> Diagnosis:
     loose = loose_rows(equations, equations.at(state, equations.model.loading(0.0, 0.0)))
     names = tuple(equations.row_names[row] for row in rows_in(loose))
     words = tuple(in_words(equations, motion) for motion in motions.T)
-    return Diagnosis(motions.shape[1], words, names, loose.shape[1] if loose.size else 0)
+    found = [_alike(_node_travels(equations, motion)) for motion in motions.T]
+    drifts = tuple(tuple(direction.tolist()) for direction in found if direction is not None)
+    return Diagnosis(motions.shape[1], words, names, loose.shape[1] if loose.size else 0, drifts)
 
 
 def _undeformed(equations: Equations) -> State:
@@ -157,14 +163,24 @@ def _listed(kind: str, names: list[str]) -> str:
     return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(names[:4])}{more}"
 
 
+def _alike(travels: Array) -> Array | None:
+    """The direction of nodes that travel alike, its largest component above zero; None of others."""
+    size = float(np.linalg.norm(travels[0]))
+    if np.abs(travels - travels[0]).max() > ALIKE * size or size < ALIKE:
+        return None
+    direction = np.where(np.abs(travels[0]) > ALIKE * size, travels[0] / size, 0.0)
+    return np.asarray(direction * np.sign(direction[np.argmax(np.abs(direction))]))
+
+
 def _together(travels: Array) -> str:
     """The direction in words, where all travel alike."""
-    first = travels[0] / np.linalg.norm(travels[0])
-    if np.abs(travels - travels[0]).max() > ALIKE * np.linalg.norm(travels[0]):
-        return ""
-    first = np.where(np.abs(first) > ALIKE, first, 0.0)
-    largest = first[np.argmax(np.abs(first))]
-    return f" along [{', '.join(f'{part:.3g}' for part in first * np.sign(largest))}]"
+    direction = _alike(travels)
+    return "" if direction is None else f" along {along(direction)}"
+
+
+def along(direction: Sequence[float] | Array) -> str:
+    """A direction in words."""
+    return f"[{', '.join(f'{part + 0.0:.3g}' for part in direction)}]"
 
 
 ALIKE = 1e-6

@@ -263,8 +263,11 @@ def _anchor(sketch: Sketch, spring: Spring, end: Array) -> Array:
 def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
     factor, node = _factor(sketch.step, motion.history), sketch.scene.nodes[motion.node]
     old, new = np.array(node.position) / sketch.course.unit, sketch.at(motion.node)
-    if motion.displacement is not None and norm(new - old) > 0.02 * sketch.size:
-        ink = Ink(f"motion-{name}", MOTION, 1.4, dotted=True)
+    ink = Ink(f"motion-{name}", MOTION, 1.4, dotted=True)
+    if motion.displacement is not None and motion.between is not None:
+        # How far one side slides along the other, not where both go.
+        sketch.label(amount(norm(factor * np.array(motion.displacement)), "m"), new, np.array([0.0, 1.0]), ink)
+    elif motion.displacement is not None and norm(new - old) > 0.02 * sketch.size:
         sketch.arrow(np.array([old, new]), ink)
         away = flat_unit(left_of(sketch.view.flat(new - old) / norm(new - old)), (0.0, 1.0))
         text = amount(norm(new - old) * sketch.course.unit, "m")
@@ -315,9 +318,10 @@ def _sketch_reaction(sketch: Sketch, name: str, largest: float) -> None:
     point, arm = sketch.at(name), sketch.step.model.scales.length
     moments = [largest * arm, norm(moment), *(float(np.abs(values).max()) for values in sketch.course.values)]
     ink = Ink(f"reaction-{name}", REACTION, 1.1)
-    if norm(force) > 1e-6 * max(largest, max(moments) / arm):
+    rounding = 1e-11 * sketch.step.model.scales.force
+    if norm(force) > max(1e-6 * max(largest, max(moments) / arm), rounding):
         _sketch_force(sketch, point, force, largest, ink, pushing=True)
-    if norm(moment) > 1e-6 * max(moments):
+    if norm(moment) > max(1e-6 * max(moments), rounding * arm):
         _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
 
 

@@ -204,7 +204,7 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     loose = loose_rows(equations, corrected.point)
     if not loose.size:
         return found
-    names = ", ".join(equations.row_names[row] for row in rows_in(loose))
+    names = ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
     lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
     state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
     point = equations.at(state, loading)

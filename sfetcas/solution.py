@@ -275,7 +275,7 @@ def equilibrium(
     SolveError
         The angle of a spring cannot be told.
     """
-    model = equations.model
+    model, notes = equations.model, tuple(dict.fromkeys(notes))
     doubt = model.winding.doubt(state.q, state.wound, loading)
     if doubt is not None:
         raise SolveError(Status.FAILED, doubt, state)

@@ -237,6 +237,7 @@ class _Run(Refining):
             return unstable
         if refused is not None:
             raise refused
+        contact.refuse_what_cannot_be(self._prepared(self.pilot_mesh), factor)
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
         raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
 

@@ -6,7 +6,7 @@ import pytest
 from scenes import SOFT, made
 from test_contacts import balance, smallest_gap
 
-from sfetcas import solve
+from sfetcas import SolveError, solve
 from sfetcas.contact_joints import CushionedPlane, CushionedRound
 from sfetcas.contact_statics import ContactRun
 from sfetcas.cushions import Cushions
@@ -148,3 +148,29 @@ def test_a_ring_that_rolls_to_one_side_stays_there():
     table["analysis"]["steps"] = [1.0, 1.1]
     sides = [step.contacts["floor"]["member"] for step in solve(made(table)).steps]
     assert sides[0] == sides[1]
+
+
+def fallen(**more):
+    return {
+        "gravity": [0, -9.81],
+        "sections": {"s": {"EI3": 2.0, "rhoA": 0.5}},
+        "nodes": {"a": {"position": [0, 0.3]}, "b": {"position": [1, 0.3]}},
+        "members": {"beam": {"nodes": ["a", "b"], "section": "s"}},
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}},
+        **more,
+    }
+
+
+def test_what_only_friction_would_hold_is_refused_with_the_direction():
+    with pytest.raises(SolveError, match=r"nothing holds it along \[1, 0\], not the frictionless contacts\.floor"):
+        solve(made(fallen()))
+    # A weak spring is enough.
+    step = solve(made(fallen(springs={"s": {"type": "translational", "node": "a", "stiffness": 0.01}}))).last
+    assert step.position("a")[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_node_that_is_held_inside_an_obstacle_is_named():
+    table = fallen(motions={"down": {"node": "a", "displacement": [0, -0.305]}})
+    table["nodes"]["a"]["support"] = "clamped"
+    with pytest.raises(SolveError, match=r"node a is held 0\.005 m inside contacts\.floor"):
+        solve(made(table))

@@ -284,3 +284,9 @@ def test_driven_slides_go_by_the_component_along_the_direction(sign):
     assert step.along("b", [0.0])["position"][0, 0] == pytest.approx(1.2, abs=1e-12)
     # On the second member, along the direction: it holds what pulls away.
     assert step.motion("d")["force"] == pytest.approx(-0.3 * sign, abs=1e-9)
+
+
+def test_every_module_stands_in_the_table():
+    modules = {file.stem for file in (README.parent / "sfetcas").glob("*.py")} - {"__init__", "__main__"}
+    rows = [line for line in README.read_text().splitlines() if line.startswith("| `")]
+    assert modules - {name for line in rows for name in re.findall(r"`(\w+)`", line.split("|")[1])} == set()
