@@ -154,7 +154,11 @@ class ContactRun:
         if found is None:
             return None
         self.jumps = list(self.cushions.left)
-        return self.toucher.resolved(base, found.held, found.touches, self.at(factor))
+        for touches in _readings(found.touches):
+            held = self.toucher.resolved(base, found.held, touches, self.at(factor))
+            if held is not None:
+                return held
+        return None
 
     def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
         """What touches in the undeformed scene."""
@@ -438,6 +442,15 @@ class ContactRun:
     def _straight_over_edge(held: Held, touch: Touch) -> bool:
         bent = abs(held.touched.gap_curvature(touch)) * held.prepared.model.scales.length
         return held.touched.obstacles[touch.contact].kind == "sharp" and bent < STRAIGHT
+
+
+def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
+    """What touches as it was read from cushions; then without single places on members that lie on the obstacle too."""
+    yield touches
+    lying = {(t.contact, t.member) for t in touches if t.to is not None}
+    fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
+    if len(fewer) < len(touches):
+        yield fewer
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:

@@ -174,3 +174,22 @@ def test_node_that_is_held_inside_an_obstacle_is_named():
     table["nodes"]["a"]["support"] = "clamped"
     with pytest.raises(SolveError, match=r"node a is held 0\.005 m inside contacts\.floor"):
         solve(made(table))
+
+
+def test_stretch_that_cushions_show_in_two_pieces_is_one():
+    """A chain that falls onto a slope lies on it to its hinge; between two pushes its cushions seem to be free."""
+    nodes = {"n0": [0, 0], "n1": [0.88, 0.177], "n2": [1.685, 0.087], "n3": [2.224, -0.175]}
+    table = {
+        "gravity": [0, -9.81],
+        "sections": {"a": {"EI3": 1, "rhoA": 0.3}},
+        "nodes": {name: {"position": position} for name, position in nodes.items()},
+        "members": {f"m{i}": {"nodes": [f"n{i}", f"n{i + 1}"], "section": "a"} for i in range(3)},
+        "loads": {"f": {"type": "force", "node": "n1", "value": [-0.972, -14.16]}},
+        "contacts": {"p": {"type": "plane", "point": [0, -0.793], "normal": [-0.1625, 1], "members": "all"}},
+        "analysis": {"accuracy": 1e-5},
+    }
+    table["nodes"]["n0"]["support"], table["nodes"]["n2"]["joint"] = "ball", "hinge"
+    table["members"]["m2"]["type"] = "rigid"
+    step = solve(made(table)).last
+    assert step.certificate.stable is True
+    assert smallest_gap(step) > -1e-5  # the accuracy
