@@ -17,22 +17,22 @@ large motion, Part 1.
 
 from .analyses import solve
 from .checks import check
-from .contacts import Contact
+from .description.contacts import Contact
+from .description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
+from .description.scenefile import dump, load
+from .description.sections import CrossSection, Polynomial, Table
+from .description.shapes import Arc, Curvature, Helix, Spline, Straight
+from .description.springs import Spring
+from .equilibria.solution import Certificate, Equilibrium, Solution
+from .equilibria.statics import Settings, solve_model
 from .errors import SceneError, SolveError, Status
-from .mesh import Mesh, first_mesh, uniform_mesh
-from .model import Model, assemble
-from .nlp import NLP, Ipopt, NLPResult, Solver
-from .open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
-from .path import Branch, Path, PathPoint
-from .paths import switch
-from .prepared import Prepared
-from .scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
-from .scenefile import dump, load
-from .sections import CrossSection, Polynomial, Table
-from .shapes import Arc, Curvature, Helix, Spline, Straight
-from .solution import Certificate, Equilibrium, Solution
-from .springs import Spring
-from .statics import Settings, solve_model
+from .mathematics.nlp import NLP, Ipopt, NLPResult, Solver
+from .mechanics.mesh import Mesh, first_mesh, uniform_mesh
+from .mechanics.model import Model, assemble
+from .paths.path import Branch, Path, PathPoint
+from .paths.paths import switch
+from .solvers.open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
+from .solvers.prepared import Prepared
 
 __version__ = "0.1.0"
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from . import paths, statics, stops
-from .path import Path
-from .scene import Scene, check_loaded
-from .solution import Solution
-from .statics import Settings
+from .description.scene import Scene, check_loaded
+from .equilibria import statics, stops
+from .equilibria.solution import Solution
+from .equilibria.statics import Settings
+from .paths import paths
+from .paths.path import Path
 
 __all__ = ["solve"]
 

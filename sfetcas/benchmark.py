@@ -21,16 +21,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .equations import Equations
+from .description.scene import Analysis, Load, Member, Node, Scene
+from .description.sections import CrossSection
+from .description.shapes import Arc
+from .equilibria.statics import Settings, solve, solve_model
 from .errors import SolveError
-from .mesh import uniform_mesh
-from .model import assemble
-from .paths import follow_path
-from .prepared import Prepared
-from .scene import Analysis, Load, Member, Node, Scene
-from .sections import CrossSection
-from .shapes import Arc
-from .statics import Settings, solve, solve_model
+from .mechanics.equations import Equations
+from .mechanics.mesh import uniform_mesh
+from .mechanics.model import assemble
+from .paths.paths import follow_path
+from .solvers.prepared import Prepared
 
 __all__ = ["main"]
 

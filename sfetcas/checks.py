@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from .description.records import nearest, say
+from .description.scene import Expect, Scene
+from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
-from .path import Path
-from .records import nearest, say
-from .scene import Expect, Scene
-from .solution import Equilibrium, Solution
+from .paths.path import Path
 
 __all__ = ["Check", "check", "look_up"]
 

@@ -17,17 +17,17 @@ import numpy as np
 
 from .analyses import solve
 from .checks import Check, check
-from .elements import ELEMENTS
+from .description.records import counted
+from .description.scene import Scene
+from .description.scenefile import load
+from .equilibria.solution import Equilibrium, Solution
+from .equilibria.statics import Settings, pilot_of
 from .errors import SceneError, SolveError, Status
-from .model import assemble
-from .path import Branch
-from .path import Path as Course
-from .prepared import Prepared
-from .records import counted
-from .scene import Scene
-from .scenefile import load
-from .solution import Equilibrium, Solution
-from .statics import Settings, pilot_of
+from .mechanics.elements import ELEMENTS
+from .mechanics.model import assemble
+from .paths.path import Branch
+from .paths.path import Path as Course
+from .solvers.prepared import Prepared
 
 __all__ = ["main"]
 
@@ -154,8 +154,8 @@ def _drawing(path: Path | None, chart: bool) -> Callable[[Any, Path], None] | No
     if path is None:
         return None
     # Matplotlib costs more than most solves: only a picture pays for it.
-    from .charts import save_chart
-    from .plotting import ENDINGS, save_picture
+    from .pictures.charts import save_chart
+    from .pictures.plotting import ENDINGS, save_picture
 
     if path.suffix.lower() not in ENDINGS:
         raise SceneError(f"{path}: found the ending {path.suffix!r} of a picture, accepted: {', '.join(ENDINGS)}")

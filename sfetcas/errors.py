@@ -49,7 +49,7 @@ class SolveError(RuntimeError):
     last : object or None
         Last iterate as the solver left it; never an answer.
     reached : object or None
-        The :class:`~sfetcas.solution.Solution` with the steps before the one that failed, where there are any.
+        The :class:`~sfetcas.equilibria.solution.Solution` with the steps before the one that failed, if any.
     """
 
     reached: object = None

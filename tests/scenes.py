@@ -5,7 +5,7 @@ import copy
 import numpy as np
 
 from sfetcas import Scene, assemble, uniform_mesh
-from sfetcas import quaternion as quat
+from sfetcas.mathematics import quaternion as quat
 
 SOFT = {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8, "rhoA": 0.5}
 UNLIKE = {"EI2": 3.0, "EI3": 1.0, "GJ": 0.7, "rhoA": 0.4}

@@ -13,97 +13,105 @@ FOLDER = Path(sfetcas.__file__).parent
 
 ORDER = [
     "errors",
-    "arrays",
-    "threads",
-    "records",
-    "quaternion",
-    "interpolation",
-    "curves",
-    "nlp",
-    "kernels",
-    "linear",
-    "later",
-    "matrices",
-    "sections",
-    "shapes",
-    "structure",
-    "springs",
-    "loads",
-    "contacts",
-    "obstacles",
-    "supports",
-    "dimension",
-    "task",
-    "scene",
-    "scenefile",
-    "elements",
-    "joints",
-    "contact_joints",
-    "carried",
-    "mesh",
-    "rotations",
-    "segments",
-    "positions",
-    "beams",
-    "bodies",
-    "connections",
-    "pressure",
-    "loading",
-    "winding",
-    "model",
-    "work",
-    "equations",
-    "newton",
-    "doctor",
-    "guess",
-    "stability",
-    "divergence",
-    "downhill",
-    "problem",
-    "prepared",
-    "arclength",
-    "critical",
-    "tracing",
-    "continuation",
-    "beginning",
-    "deflation",
-    "open_problem",
-    "balance",
-    "fields",
-    "mirrors",
-    "touches",
-    "settling",
-    "cushions",
-    "revising",
-    "touching",
-    "solution",
-    "accuracy",
-    "several",
-    "contact_balance",
-    "rolling",
-    "contact_statics",
-    "settings",
-    "single",
-    "meshing",
-    "piloting",
-    "refining",
-    "statics",
-    "stops",
-    "path",
-    "contact_curve",
-    "contact_trace",
-    "contact_path",
+    "mathematics",
+    "mathematics.arrays",
+    "mathematics.threads",
+    "mathematics.quaternion",
+    "mathematics.interpolation",
+    "mathematics.curves",
+    "mathematics.nlp",
+    "mathematics.kernels",
+    "mathematics.linear",
+    "description",
+    "description.records",
+    "description.later",
+    "description.matrices",
+    "description.sections",
+    "description.shapes",
+    "description.structure",
+    "description.springs",
+    "description.loads",
+    "description.contacts",
+    "description.obstacles",
+    "description.supports",
+    "description.dimension",
+    "description.task",
+    "description.scene",
+    "description.scenefile",
+    "mechanics",
+    "mechanics.elements",
+    "mechanics.joints",
+    "mechanics.contact_joints",
+    "mechanics.carried",
+    "mechanics.mesh",
+    "mechanics.rotations",
+    "mechanics.segments",
+    "mechanics.positions",
+    "mechanics.beams",
+    "mechanics.bodies",
+    "mechanics.connections",
+    "mechanics.pressure",
+    "mechanics.loading",
+    "mechanics.winding",
+    "mechanics.model",
+    "mechanics.work",
+    "mechanics.equations",
+    "mechanics.balance",
+    "mechanics.fields",
+    "mechanics.accuracy",
+    "solvers",
+    "solvers.newton",
+    "solvers.doctor",
+    "solvers.guess",
+    "solvers.stability",
+    "solvers.divergence",
+    "solvers.downhill",
+    "solvers.problem",
+    "solvers.prepared",
+    "solvers.arclength",
+    "solvers.critical",
+    "solvers.tracing",
+    "solvers.continuation",
+    "solvers.beginning",
+    "solvers.deflation",
+    "solvers.open_problem",
+    "contact",
+    "contact.touches",
+    "contact.settling",
+    "contact.cushions",
+    "contact.revising",
+    "contact.touching",
+    "contact.contact_balance",
+    "contact.rolling",
+    "contact.contact_statics",
+    "equilibria",
+    "equilibria.mirrors",
+    "equilibria.solution",
+    "equilibria.several",
+    "equilibria.settings",
+    "equilibria.single",
+    "equilibria.meshing",
+    "equilibria.piloting",
+    "equilibria.refining",
+    "equilibria.statics",
+    "equilibria.stops",
     "paths",
+    "paths.path",
+    "paths.contact_curve",
+    "paths.contact_trace",
+    "paths.contact_path",
+    "paths.paths",
+    "pictures",
+    "pictures.sketch",
+    "pictures.limits",
+    "pictures.glyphs",
+    "pictures.looks",
+    "pictures.sheet",
+    "pictures.plotting",
+    "pictures.charts",
     "analyses",
     "checks",
     "benchmark",
-    "sketch",
-    "limits",
-    "glyphs",
-    "looks",
-    "sheet",
-    "plotting",
-    "charts",
     "cli",
     "__init__",
     "__main__",
@@ -113,57 +121,70 @@ ORDER = [
 PROGRAMS = ("cli", "benchmark")
 """What is run and not imported: only these print."""
 
-PICTURES = ("sheet", "plotting", "charts")
+PICTURES = ("pictures.sheet", "pictures.plotting", "pictures.charts")
 """What needs matplotlib, which a run pays for only when a picture is asked for."""
 
-MODULES = sorted(path.stem for path in FOLDER.glob("*.py"))
-TREES = {name: ast.parse((FOLDER / f"{name}.py").read_text()) for name in MODULES}
+
+def named(path):
+    """A module by its place below the package: ``mechanics.mesh``, ``mechanics`` for that package itself."""
+    parts = path.relative_to(FOLDER).with_suffix("").parts
+    return ".".join(parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts)
+
+
+TREES = {named(path): ast.parse(path.read_text()) for path in sorted(FOLDER.rglob("*.py"))}
+PACKAGES = {path.parent.name for path in FOLDER.glob("*/__init__.py")}
+MODULES = sorted(TREES)
 each = pytest.mark.parametrize("name", MODULES)
 
 
-def imported(tree):
+def sources(name, node):
+    """Modules that one ``from ... import ...`` of a module reads."""
+    if node.level:
+        here = [] if name in ("__init__", "__main__") else name.split(".")
+        above = here[: max(len(here) - node.level, 0)]
+        parts = [*above, *(node.module.split(".") if node.module else [])]
+    else:
+        parts = node.module.split(".")[1:]
+    place = ".".join(parts)
+    if not place or place in PACKAGES:
+        return {f"{place}.{alias.name}".lstrip(".") for alias in node.names}
+    return {place}
+
+
+def imported(name):
     """(own modules, other top-level packages) that a module imports, also inside functions."""
     own, other = set(), set()
-    for node in ast.walk(tree):
+    for node in ast.walk(TREES[name]):
         if isinstance(node, ast.ImportFrom):
-            if node.level:
-                own |= {node.module} if node.module else {alias.name for alias in node.names}
-            elif node.module.split(".")[0] == "sfetcas":
-                own |= {node.module.split(".")[1]} if "." in node.module else {"__init__"}
+            if node.level or node.module.split(".")[0] == "sfetcas":
+                own |= sources(name, node)
             else:
                 other.add(node.module.split(".")[0])
         elif isinstance(node, ast.Import):
             other |= {alias.name.split(".")[0] for alias in node.names}
-    return own, other
+    # The command line reads the version from the package.
+    return {source if source in TREES else "__init__" for source in own}, other
 
 
 def test_every_module_has_its_place():
     assert set(MODULES) <= set(ORDER), f"add to ORDER: {set(MODULES) - set(ORDER)}"
 
 
+def test_packages_stand_together_in_the_order():
+    heads = [name.split(".")[0] for name in ORDER if name.split(".")[0] in PACKAGES]
+    assert [head for head, before in zip(heads, [None, *heads]) if head != before] == list(dict.fromkeys(heads))
+
+
 @each
 def test_modules_import_only_from_their_left(name):
-    wrong = {other for other in imported(TREES[name])[0] if ORDER.index(other) >= ORDER.index(name)}
+    wrong = {other for other in imported(name)[0] if ORDER.index(other) >= ORDER.index(name)}
     assert not wrong
 
 
 @each
 def test_mechanics_and_solvers_know_no_more_than_they_need(name):
-    own, other = imported(TREES[name])
-    if name in ("nlp", "interpolation", "quaternion", "kernels", "linear"):
-        assert own <= {"errors", "arrays", "kernels"}, "mathematics knows no mechanics"
-    if name in (
-        "sections",
-        "shapes",
-        "structure",
-        "loads",
-        "supports",
-        "dimension",
-        "task",
-        "scene",
-        "records",
-        "scenefile",
-    ):
+    own, other = imported(name)
+    if name.startswith("description"):
         assert "casadi" not in other, "descriptions need no solver"
     assert ("matplotlib" in other) == (name in PICTURES)
     assert not {*PICTURES, *PROGRAMS} & own or name in ("cli", "__main__", *PICTURES)
@@ -201,7 +222,7 @@ def test_imports_stand_at_the_top(name):
 
 @each
 def test_all_is_complete_and_documented(name):
-    if name in ("__main__", *PICTURES):
+    if name in ("__main__", *PACKAGES, *PICTURES):
         assert ast.get_docstring(TREES[name])
         return
     module = importlib.import_module("sfetcas" if name == "__init__" else f"sfetcas.{name}")
@@ -217,8 +238,9 @@ def test_all_is_complete_and_documented(name):
     # What other modules import is public in the module it comes from.
     for other in MODULES:
         for node in ast.walk(TREES[other]):
-            if isinstance(node, ast.ImportFrom) and node.level and node.module == name:
-                assert {alias.name for alias in node.names} <= set(module.__all__), f"imported by {other}"
+            if isinstance(node, ast.ImportFrom) and node.level and sources(other, node) == {name}:
+                names = {alias.name for alias in node.names} - {name.split(".")[-1]}
+                assert names <= set(module.__all__), f"imported by {other}"
 
 
 @each

@@ -7,8 +7,8 @@ import pytest
 
 from sfetcas import benchmark
 from sfetcas.checks import check
-from sfetcas.scene import Analysis, Expect
-from sfetcas.statics import solve
+from sfetcas.description.scene import Analysis, Expect
+from sfetcas.equilibria.statics import solve
 
 
 @pytest.fixture

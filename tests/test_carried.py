@@ -5,7 +5,7 @@ import pytest
 from scenes import SOFT, made
 
 from sfetcas import benchmark, first_mesh
-from sfetcas.carried import _parts, carried
+from sfetcas.mechanics.carried import _parts, carried
 
 
 def tree(parents, forces, **more):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sfetcas.cli import main
-from sfetcas.records import counted
+from sfetcas.description.records import counted
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 
@@ -263,7 +263,7 @@ def test_a_mistake_while_a_scene_is_made_is_no_syntax_error(scene, capsys, monke
     def broken(*_):
         raise ValueError("shapes do not fit")
 
-    monkeypatch.setattr("sfetcas.scenefile.Scene.from_dict", broken)
+    monkeypatch.setattr("sfetcas.description.scenefile.Scene.from_dict", broken)
     assert main(["run", str(scene())]) == 70
     assert "not read as" not in capsys.readouterr().err
 

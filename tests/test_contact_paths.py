@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sfetcas import Scene, SceneError, SolveError, Status, load, solve, switch
-from sfetcas.charts import chart
 from sfetcas.cli import main
+from sfetcas.pictures.charts import chart
 
 PROBLEMS = File(__file__).parent.parent / "problems"
 LIMIT, DEFLECTION, ARC = 1.66795210859543, 0.476377597825455, 1.13015070107339
@@ -140,7 +140,7 @@ def test_points_of_the_path_are_equilibria(heavy):
 
 
 def look_up_force(path, point):
-    from sfetcas.touches import answers
+    from sfetcas.contact.touches import answers
 
     return np.reshape(answers(path.fields(point))["floor"]["force"], (-1, 3)).sum(axis=0)[1]
 

@@ -8,9 +8,9 @@ from scenes import SOFT, made
 
 from sfetcas import SceneError, SolveError, Status, load, solve
 from sfetcas.checks import look_up
-from sfetcas.obstacles import obstacle
-from sfetcas.scene import Contact
-from sfetcas.touches import Touched, edge_sides
+from sfetcas.contact.touches import Touched, edge_sides
+from sfetcas.description.obstacles import obstacle
+from sfetcas.description.scene import Contact
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
 

@@ -6,11 +6,11 @@ from scenes import made
 from test_paths import PROBLEMS, curve_of
 
 from sfetcas import Prepared, Scene, SceneError, load, solve
-from sfetcas.beginning import begin_path
-from sfetcas.mesh import uniform_mesh
-from sfetcas.model import assemble
-from sfetcas.pressure import is_pressure
-from sfetcas.tracing import trace
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import assemble
+from sfetcas.mechanics.pressure import is_pressure
+from sfetcas.solvers.beginning import begin_path
+from sfetcas.solvers.tracing import trace
 
 
 def column(follower, space=False, **analysis):

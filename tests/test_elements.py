@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from scenes import cantilever, elastica, made, turned_about
 
-from sfetcas import quaternion as quat
-from sfetcas.elements import ELEMENTS, Element, element_by_name
-from sfetcas.equations import Equations
-from sfetcas.fields import Fields
-from sfetcas.interpolation import differentiation, evaluation
-from sfetcas.mesh import uniform_mesh
-from sfetcas.model import assemble
-from sfetcas.newton import correct
-from sfetcas.stability import StabilityTest
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mathematics.interpolation import differentiation, evaluation
+from sfetcas.mechanics.elements import ELEMENTS, Element, element_by_name
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import assemble
+from sfetcas.solvers.newton import correct
+from sfetcas.solvers.stability import StabilityTest
 
 ALL = [Element(p, space, gauss) for p in range(1, 9) for space in (False, True) for gauss in (False, True)]
 IDS = [f"{e.name}-{'space' if e.space else 'plane'}-{'gauss' if e.gauss else 'nodes'}" for e in ALL]

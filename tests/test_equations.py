@@ -7,14 +7,14 @@ import pytest
 from scenes import PLANE, ZOO, density, gauss_points, made, model_of
 from systems import EVERY, EVERYTHING
 
-from sfetcas import quaternion as quat
-from sfetcas.equations import Equations
-from sfetcas.fields import Fields
-from sfetcas.interpolation import differentiation, evaluation
-from sfetcas.newton import relative_residual
-from sfetcas.prepared import Prepared
-from sfetcas.rotations import Turn
-from sfetcas.statics import solve_model
+from sfetcas.equilibria.statics import solve_model
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mathematics.interpolation import differentiation, evaluation
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
+from sfetcas.mechanics.rotations import Turn
+from sfetcas.solvers.newton import relative_residual
+from sfetcas.solvers.prepared import Prepared
 
 CASES = [(name, assembly, False) for name in EVERY for assembly in ("closing", "nodal")]
 CASES += [(name, "closing", True) for name in ("arch", "hinged_space", "linked_space")]

@@ -27,9 +27,9 @@ from scenes import (
 from systems import EVERY, PLANE_SYSTEMS, SYSTEMS
 
 import sfetcas
-from sfetcas import quaternion as quat
-from sfetcas.prepared import Prepared
-from sfetcas.statics import solve_model
+from sfetcas.equilibria.statics import solve_model
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.solvers.prepared import Prepared
 
 FLAT = [*PLANE, *PLANE_SYSTEMS]
 PLACES = np.array([0.0, 0.1, 0.37, 0.5, 0.93, 1.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import polynomial
 
-from sfetcas import interpolation as ip
+from sfetcas.mathematics import interpolation as ip
 
 SIZES = range(2, 10)
 

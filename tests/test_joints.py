@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scenes import made, model_of
 
-from sfetcas import joints
-from sfetcas import quaternion as quat
-from sfetcas.equations import Equations
-from sfetcas.fields import Fields
-from sfetcas.matrices import rigid_motions
-from sfetcas.newton import correct
-from sfetcas.positions import normals
-from sfetcas.prepared import Prepared
+from sfetcas.description.matrices import rigid_motions
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mechanics import joints
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
+from sfetcas.mechanics.positions import normals
+from sfetcas.solvers.newton import correct
+from sfetcas.solvers.prepared import Prepared
 
 AXIS = np.array([0.2, -1.0, 0.5]) / np.linalg.norm([0.2, -1.0, 0.5])
 OTHER = np.cross(AXIS, [0.3, 0.2, 0.9]) / np.linalg.norm(np.cross(AXIS, [0.3, 0.2, 0.9]))

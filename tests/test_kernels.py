@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from sfetcas import kernels
-from sfetcas.elements import Element
+from sfetcas.mathematics import kernels
+from sfetcas.mechanics.elements import Element
 
 ELEMENT = Element(2, True)
 
@@ -117,7 +117,7 @@ def test_folder_that_cannot_be_written(tmp_path, monkeypatch):
 def test_concurrent_processes(cache, compiler):
     code = (
         "import casadi as ca, numpy as np\n"
-        "from sfetcas import kernels\n"
+        "from sfetcas.mathematics import kernels\n"
         "x = ca.SX.sym('x', 3)\n"
         "f = ca.Function('small', [x], [2.0 * ca.sin(x) * ca.sumsqr(x)], ['x'], ['y'])\n"
         "g = kernels.compiled(f)\n"

@@ -9,10 +9,10 @@ from matplotlib.patches import Polygon
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sfetcas import load, solve
-from sfetcas.charts import chart
-from sfetcas.contacts import Contact
-from sfetcas.obstacles import obstacle
-from sfetcas.plotting import picture
+from sfetcas.description.contacts import Contact
+from sfetcas.description.obstacles import obstacle
+from sfetcas.pictures.charts import chart
+from sfetcas.pictures.plotting import picture
 
 ALL = "problems/cantilever_inclined_force_all_equilibria.toml"
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sfetcas import linear
-from sfetcas.linear import SparseSolver
+from sfetcas.mathematics import linear
+from sfetcas.mathematics.linear import SparseSolver
 
 
 def frame(seed, n=240, rows=80):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sfetcas.errors import Status
-from sfetcas.nlp import NLP, Ipopt, Solver
+from sfetcas.mathematics.nlp import NLP, Ipopt, Solver
 
 QUIET_SQP = Solver(
     "sqpmethod",

@@ -6,10 +6,10 @@ import pytest
 from scenes import bend_45, cantilever, four_bar, hinged_space, model_of
 
 from sfetcas import SceneError, SolveError, equilibrium_nlp
+from sfetcas.equilibria.statics import solve_model
 from sfetcas.errors import Status
-from sfetcas.nlp import Ipopt, Solver
-from sfetcas.prepared import Prepared
-from sfetcas.statics import solve_model
+from sfetcas.mathematics.nlp import Ipopt, Solver
+from sfetcas.solvers.prepared import Prepared
 
 TIGHT = Ipopt(tolerance=1e-11)
 

@@ -11,14 +11,14 @@ import pytest
 from scenes import ZOO
 
 from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, solve, solve_model, switch
-from sfetcas.arclength import Curve, Tangent
-from sfetcas.charts import chart
 from sfetcas.cli import main
-from sfetcas.critical import events_between, root
-from sfetcas.mesh import uniform_mesh
-from sfetcas.model import assemble
-from sfetcas.prepared import Prepared
-from sfetcas.tracing import trace
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import assemble
+from sfetcas.pictures.charts import chart
+from sfetcas.solvers.arclength import Curve, Tangent
+from sfetcas.solvers.critical import events_between, root
+from sfetcas.solvers.prepared import Prepared
+from sfetcas.solvers.tracing import trace
 
 PROBLEMS = File(__file__).parent.parent / "problems"
 P_LEE = (1.85587465394782, -0.942128745387476)

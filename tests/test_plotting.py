@@ -15,7 +15,7 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.text import Text
 
 from sfetcas import SceneError, Settings, load, solve
-from sfetcas.plotting import ENDINGS, picture, save_picture
+from sfetcas.pictures.plotting import ENDINGS, picture, save_picture
 
 TIGHT = Settings(accuracy=1e-6)
 

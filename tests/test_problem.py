@@ -8,15 +8,15 @@ import pytest
 from scenes import arch, bend_45, cantilever, model_of
 from systems import EVERY
 
-from sfetcas import quaternion as quat
-from sfetcas.equations import Equations
-from sfetcas.fields import Fields
-from sfetcas.newton import correct
-from sfetcas.nlp import Ipopt
-from sfetcas.prepared import Prepared
-from sfetcas.problem import EquilibriumProblem
-from sfetcas.stability import StabilityTest
-from sfetcas.statics import solve_model
+from sfetcas.equilibria.statics import solve_model
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mathematics.nlp import Ipopt
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
+from sfetcas.solvers.newton import correct
+from sfetcas.solvers.prepared import Prepared
+from sfetcas.solvers.problem import EquilibriumProblem
+from sfetcas.solvers.stability import StabilityTest
 
 CASES = [(name, assembly, False) for name in EVERY for assembly in ("closing", "nodal")]
 CASES += [("guided", "nodal", True), ("hinged_space", "closing", True)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sfetcas import quaternion as quat
+from sfetcas.mathematics import quaternion as quat
 
 RNG = np.random.default_rng(1)
 PHI = RNG.normal(size=(20, 3))

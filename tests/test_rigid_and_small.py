@@ -12,10 +12,10 @@ from scenes import SOFT, UNLIKE, arc_across, made, model_of
 from systems import linked, linked_space, small_space
 
 import sfetcas
-from sfetcas import quaternion as quat
 from sfetcas.cli import main
-from sfetcas.fields import Fields
-from sfetcas.statics import solve_model
+from sfetcas.equilibria.statics import solve_model
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mechanics.fields import Fields
 
 
 def answer(table, elements=4, order=6, **options):

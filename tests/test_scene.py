@@ -9,10 +9,10 @@ import pytest
 from pydantic import ValidationError
 
 from sfetcas import solve
+from sfetcas.description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
+from sfetcas.description.sections import CrossSection
+from sfetcas.description.supports import drives
 from sfetcas.errors import SceneError
-from sfetcas.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
-from sfetcas.sections import CrossSection
-from sfetcas.supports import drives
 
 MISSING = ...
 

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from sfetcas import scenefile
+from sfetcas.description import scenefile
+from sfetcas.description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
+from sfetcas.description.scenefile import dump, load, parse
+from sfetcas.description.sections import CrossSection
 from sfetcas.errors import SceneError
-from sfetcas.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
-from sfetcas.scenefile import dump, load, parse
-from sfetcas.sections import CrossSection
 
 EXAMPLE = """
 title = "strip with a force at its tip"

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from sfetcas.description.records import Record
+from sfetcas.description.sections import CrossSection, Polynomial, Table, Varying, breaks, evaluate
 from sfetcas.errors import SceneError
-from sfetcas.records import Record
-from sfetcas.sections import CrossSection, Polynomial, Table, Varying, breaks, evaluate
 
 X = np.array([0.0, 0.3, 0.5, 0.9, 1.0])
 

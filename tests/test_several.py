@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from scenes import cantilever
 
-from sfetcas import Scene, SceneError, assemble, quaternion, solve, uniform_mesh
+from sfetcas import Scene, SceneError, assemble, solve, uniform_mesh
 from sfetcas.checks import check
 from sfetcas.cli import main
-from sfetcas.deflation import deflated, turned_between, unheld
-from sfetcas.mirrors import mirrored, mirrors
-from sfetcas.prepared import Prepared
-from sfetcas.several import Search, search
-from sfetcas.statics import Settings
+from sfetcas.equilibria.mirrors import mirrored, mirrors
+from sfetcas.equilibria.several import Search, search
+from sfetcas.equilibria.statics import Settings
+from sfetcas.mathematics import quaternion
+from sfetcas.solvers.deflation import deflated, turned_between, unheld
+from sfetcas.solvers.prepared import Prepared
 
 FIRST_LOAD = 0.25 * math.pi**2
 """Critical load of a clamped-free column of unit length and stiffness."""

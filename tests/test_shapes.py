@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from sfetcas.description.shapes import Arc, Curvature, Helix, Shape, Spline, Straight, place
 from sfetcas.errors import SceneError
-from sfetcas.quaternion import conjugate, matrix, multiply
-from sfetcas.shapes import Arc, Curvature, Helix, Shape, Spline, Straight, place
+from sfetcas.mathematics.quaternion import conjugate, matrix, multiply
 
 # A few hundred operations with numbers of size one.
 ROUNDING = 1e-14

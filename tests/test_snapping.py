@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scenes import cantilever
 
-from sfetcas import Scene, SceneError, assemble, quaternion, solve, solve_model, switch, uniform_mesh
+from sfetcas import Scene, SceneError, assemble, solve, solve_model, switch, uniform_mesh
 from sfetcas.cli import main
-from sfetcas.mirrors import mirrored, mirrors
-from sfetcas.prepared import Prepared
-from sfetcas.rotations import Turn
+from sfetcas.equilibria.mirrors import mirrored, mirrors
+from sfetcas.mathematics import quaternion
+from sfetcas.mechanics.rotations import Turn
+from sfetcas.solvers.prepared import Prepared
 
 SPAN, STIFFNESS = 0.4, 0.35
 

@@ -8,13 +8,14 @@ from scenes import SOFT, ZOO, cantilever, made, model_of
 from systems import EVERY, SYSTEMS
 
 import sfetcas
-from sfetcas import benchmark, newton
-from sfetcas import stability as stability_module
-from sfetcas.equations import Equations
-from sfetcas.model import assemble
-from sfetcas.prepared import Prepared
-from sfetcas.stability import StabilityTest
-from sfetcas.statics import pilot_of, solve_model
+from sfetcas import benchmark
+from sfetcas.equilibria.statics import pilot_of, solve_model
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.model import assemble
+from sfetcas.solvers import newton
+from sfetcas.solvers import stability as stability_module
+from sfetcas.solvers.prepared import Prepared
+from sfetcas.solvers.stability import StabilityTest
 
 EI = SOFT["EI3"]
 

@@ -7,11 +7,12 @@ import pytest
 from scenes import SOFT, UNLIKE, ZOO, arch, bend_45, cantilever, elastica, guided, helix, made, model_of
 
 import sfetcas
-from sfetcas import SolveError, Status, benchmark, meshing
+from sfetcas import SolveError, Status, benchmark
 from sfetcas.cli import main
-from sfetcas.fields import Fields, transferred
-from sfetcas.prepared import Prepared
-from sfetcas.statics import Settings, pilot_of, solve, solve_model
+from sfetcas.equilibria import meshing
+from sfetcas.equilibria.statics import Settings, pilot_of, solve, solve_model
+from sfetcas.mechanics.fields import Fields, transferred
+from sfetcas.solvers.prepared import Prepared
 
 
 def together(travel, *, space=False, **analysis):

@@ -8,9 +8,9 @@ from scenes import SOFT, UNLIKE, arc_across, cantilever, gauss_points, made, mod
 from systems import EVERY, EVERYTHING, PLANE_SYSTEMS, SYSTEMS, linked, linked_space, sliding_plane, sliding_space
 
 import sfetcas
-from sfetcas import joints
-from sfetcas import quaternion as quat
-from sfetcas.statics import solve_model
+from sfetcas.equilibria.statics import solve_model
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mechanics import joints
 
 systems = pytest.mark.parametrize("name", SYSTEMS)
 SLIDES = ("slider", "cylindrical")

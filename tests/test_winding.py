@@ -5,9 +5,9 @@ import pytest
 from scenes import made
 
 from sfetcas import SolveError, solve, solve_model
-from sfetcas import quaternion as quat
-from sfetcas.mesh import uniform_mesh
-from sfetcas.model import assemble
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import assemble
 
 TILT = quat.from_rotation_vector([0.4, -0.7, 0.2])
 

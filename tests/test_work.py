@@ -10,9 +10,9 @@ from test_equations import full, trial, unit
 
 import sfetcas
 from sfetcas import SceneError, equilibrium_nlp
-from sfetcas import quaternion as quat
-from sfetcas.fields import Fields
-from sfetcas.statics import solve_model
+from sfetcas.equilibria.statics import solve_model
+from sfetcas.mathematics import quaternion as quat
+from sfetcas.mechanics.fields import Fields
 
 
 def answer(table, elements=4, order=6, **options):

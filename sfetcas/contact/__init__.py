@@ -1,0 +1,1 @@
+"""Contact as inequality: what touches where, stretches, rolling, and the way to the touching state."""

@@ -1,0 +1,465 @@
+"""Static equilibria of a scene with obstacles: the way to a state in contact, its mesh and its stability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..description.obstacles import members_of, nearest, obstacle, takes_part
+from ..description.scene import Scene
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.accuracy import largest_difference, roughness
+from ..mechanics.balance import three
+from ..mechanics.fields import Fields
+from ..mechanics.mesh import Mesh, Touch
+from ..solvers.continuation import JUMPED, near_factor
+from ..solvers.doctor import along
+from ..solvers.prepared import Prepared
+from ..solvers.stability import Stability
+from .cushions import Cushions
+from .rolling import rolling
+from .settling import Held, Way, placed
+from .touches import COARSE, NOISE, Touched, edge_sides, obstacles_of
+from .touching import Toucher, can_leave
+
+__all__ = ["ContactRun", "Pressed"]
+
+INSIDE = 1e-9
+"""How deep a place may be inside an obstacle over the size of the scene: rounding, and what curves between nodes."""
+
+WEAK = 1e-9
+"""Forces of obstacles below this share of the largest force hardly touch."""
+
+IDLE = 1e-7
+"""Share of the force on a stretch below which it is without pressure between its ends."""
+
+STRAIGHT = 1e-4
+"""Curvatures, times the length of the scene, below this are those of a straight member on a coarse mesh."""
+
+PARALLEL = 1e-6
+"""Square of the sine of an angle up to which a direction lies in a plane."""
+
+STAYS = "unstable, and no stable equilibrium was found along its escape shape"
+"""A note."""
+
+CAREFUL = 0.05
+"""Part of the way of a step where longer ones led astray."""
+
+LEVELS, MOST_ELEMENTS = 40, 20_000
+"""Most refinements of a mesh, and most elements."""
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """An answer: the state, its stability with sliding places, the estimate of its error and what to say of it."""
+
+    held: Held
+    stability: Stability
+    error: float
+    notes: tuple[str, ...]
+
+
+class ContactRun:
+    """Contact over the load factors of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    accuracy : float
+        Wanted error of the positions over the size of the scene.
+    fixed : set of str
+        Members whose mesh is prescribed.
+    """
+
+    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: set[str]) -> None:
+        self.scene, self.accuracy, self.fixed = scene, accuracy, fixed
+        self.toucher = Toucher(scene, prepare, COARSE, edge_sides(scene))
+        self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
+        self.cushions = Cushions(scene, prepare, self.reviser.sides)
+        self.fine = max(INSIDE, 0.1 * accuracy)
+        self.prepare = prepare
+        self.last: tuple[float, Held] | None = None
+        self.jumps: list[float] = []
+
+    # -- ways -----------------------------------------------------------------------------------
+
+    def continued(self, base: Mesh, factor: float) -> Held | None:
+        """From the contact of the last factor, where that lies on the way from zero."""
+        self.jumps = []
+        if self.last is None or self.last[0] * (factor - self.last[0]) < 0.0 or not self.last[1].mesh.touches:
+            return None
+        begin, start = self.last
+        held = self._through(base, begin, factor, start)
+        stood = self.scene.analysis.unstable == "leave" and self._judged(start, self.at(begin)).negative <= 0
+        if held is None or not stood or self._judged(held, self.at(factor)).negative <= 0:
+            return held
+        # A long step from a stable state may have met an unstable branch beside its own.
+        return self._through(base, begin, factor, start, longest=CAREFUL) or held
+
+    def grown(self, base: Mesh, factor: float) -> Held | None:
+        """From the undeformed scene, loads and motions growing together."""
+        start: Held | tuple[Touch, ...] = self.first_touches(base)
+        if self.scene.histories and factor != 0.0:
+            held = self.toucher.follow(base, lambda t: Way(lambda model: model.loading(0.0, t), {}), start)
+            if held is None:
+                return None
+            start = held
+        return self._through(base, 0.0, factor, start)
+
+    def _factors(self, begin: float, end: float) -> list[float]:
+        """Factors from one to another, where histories have knots."""
+        low, high = min(begin, end), max(begin, end)
+        knots = {t for history in self.scene.histories.values() for t in history.t if low < t < high}
+        return [begin, *sorted(knots, reverse=end < begin), end]
+
+    def _through(
+        self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...], longest: float = 1.0
+    ) -> Held | None:
+        stops = self._factors(begin, end)
+        held: Held | None = None
+        for a, b in zip(stops, stops[1:], strict=False):
+            way = _between(a, b)
+            held = self.toucher.follow(base, way, start, longest)
+            if held is None:
+                return None
+            self.jumps += [a + part * (b - a) for part in self.toucher.snapped]
+            start = held
+        return held
+
+    @property
+    def jumped(self) -> tuple[str, ...]:
+        """What is to be said of states that the last way left."""
+        return tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
+
+    def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
+        """From the state without obstacles, these coming back from where they do not reach it."""
+        gaps = free.touched.inside({}, self.reviser.sides, 0.0)
+        depths: dict[str, float] = {}
+        for gap in gaps:
+            depths[gap.contact] = max(depths.get(gap.contact, 0.0), -gap.depth)
+
+        def way(t: float) -> Way:
+            return Way(lambda model: model.loading(factor), {n: (1.0 - t) * depth for n, depth in depths.items()})
+
+        return self.toucher.follow(base, way, free)
+
+    def cushioned(self, base: Mesh, factor: float) -> Held | None:
+        """From the state that the loads lead to where obstacles are cushions."""
+        found = self.cushions.found(base, self._factors(0.0, factor))
+        if found is None:
+            return None
+        self.jumps = list(self.cushions.left)
+        for touches in _readings(found.touches):
+            held = self.toucher.resolved(base, found.held, touches, self.at(factor))
+            if held is not None:
+                return held
+        return None
+
+    def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
+        """What touches in the undeformed scene."""
+        model = self.prepare(base).model
+        found: list[Touch] = []
+        for contact, stop in obstacles_of(model).items():
+            for member in members_of(self.scene.contacts[contact], self.scene.members):
+                line = self.scene.center_lines[member]
+                x = np.linspace(0.0, 1.0, 257)
+                if stop.kind == "sharp":
+                    way = self.reviser.sides[contact, member]
+                    places = np.array(nearest(stop, line.positions, line.tangents, x))
+                    gaps = stop.gaps(line.positions(places), line.tangents(places), 0.0, way) if len(places) else places
+                    found += [
+                        Touch(contact, member, float(p), way=way)
+                        for p, gap in zip(places, gaps, strict=True)
+                        if abs(gap) < INSIDE * self.scene.size
+                    ]
+                    continue
+                gaps = stop.gaps(line.positions(x), line.tangents(x))
+                found += self._lying(contact, member, x, gaps)
+        return tuple(found)
+
+    def _takes_part(self, contact: str, node: str) -> bool:
+        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
+
+    def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
+        """Places and stretches of the undeformed member at no distance."""
+        near = np.abs(gaps) < INSIDE * self.scene.size
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
+        nodes = self.scene.members[member].nodes
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            low, high = float(x[a]), float(x[b - 1])
+            if b - a == 1:
+                if 0.0 < low < 1.0 or self._takes_part(contact, nodes[int(low)]):
+                    yield Touch(contact, member, low)
+                continue
+            yield Touch(contact, member, low, high)
+
+    def at(self, factor: float) -> Way:
+        """The point of the way that a factor is."""
+        return Way(lambda model: model.loading(factor), {})
+
+    def clear(self, fields: Fields) -> bool:
+        """Whether no obstacle is in the way of a state."""
+        return not Touched.of(fields).inside({}, self.reviser.sides, self.fine * self.scene.size)
+
+    def reached(
+        self, base: Mesh, factor: float, free: Held | None, *, nearer: bool, falls: bool
+    ) -> Iterator[Held | None]:
+        """States in contact, one way after the other: the loads growing from zero, or near the state without obstacles.
+
+        What ``falls`` onto obstacles, as nothing else holds it, has no state under small loads to grow from.
+        """
+        ways: list[Callable[[], Held | None]] = [lambda: self.cushioned(base, factor)]
+        if not falls:
+            ways.insert(0, lambda: self.grown(base, factor))
+            if free is not None:
+                ways.insert(0 if nearer else 2, lambda: self.retracted(base, factor, free))
+        for way in ways:
+            self.jumps = []
+            yield way()
+
+    def refuse_what_cannot_be(self, pilot: Prepared, factor: float) -> None:
+        """Say why there can be no state: a node is held inside an obstacle, or nothing holds a direction.
+
+        Raises
+        ------
+        SolveError
+            Naming the node and the obstacle, or the direction.
+        """
+        model = pilot.model
+        stops, axes = obstacles_of(model), model.element.axes
+        shifts = model.loading(factor).shift.reshape(-1, axes) * model.scales.length
+        for contact, stop in stops.items():
+            members = [
+                self.scene.members[name] for name in members_of(self.scene.contacts[contact], self.scene.members)
+            ]
+            for node in dict.fromkeys(n for member in members for n in member.nodes):
+                record = self.scene.nodes[node]
+                if stop.kind == "sharp" or record.support == "free" or record.slides:
+                    continue
+                place = three(np.asarray(record.position)[:axes] + shifts[model.segments.place(node)])
+                gap = float(stop.gaps(place[None, :], np.zeros((1, 3)))[0])
+                if gap < -COARSE * self.scene.size:
+                    detail = f"node {node} is held {-gap:.3g} m inside contacts.{contact}"
+                    raise SolveError(Status.INFEASIBLE, detail)
+        free = np.array(pilot.diagnosis.drifts).reshape(-1, axes)
+        if not len(free) or any(stop.kind != "flat" for stop in stops.values()):
+            return
+        normals = np.array([stop.normals(np.zeros((1, 3)), np.zeros((1, 3)))[0][:axes] for stop in stops.values()])
+        _, sizes, ways = np.linalg.svd(free @ normals.T @ normals @ free.T)
+        for way in ways[sizes < PARALLEL]:
+            direction = way @ free / np.linalg.norm(way @ free)
+            detail = f"nothing holds it along {along(direction)}, not the frictionless {', '.join(self.named(None))}"
+            raise SolveError(Status.FAILED, detail)
+
+    def named(self, failure: SolveError | None) -> list[str]:
+        """What may be in the way, for a sentence."""
+        return [*(f"contacts.{name}" for name in self.scene.contacts), *([str(failure)] if failure else [])]
+
+    # -- accuracy -------------------------------------------------------------------------------
+
+    def answered(self, held: Held, factor: float, target: Mesh, notes: tuple[str, ...]) -> Pressed:
+        """The state on a mesh that is fine enough, with its stability.
+
+        Raises
+        ------
+        SolveError
+            What touches on a coarse mesh is not found again on a fine one.
+        """
+        way = self.at(factor)
+        held, left = self._left(held, way)
+        self.last = (factor, held)
+        now = held
+        if held.mesh.order != target.order or self.fixed:
+            now = self._onto(placed(self.scene, target, held.mesh.touches), held, way)
+        smooth, error = np.sqrt(self.accuracy), np.inf
+        for _ in range(LEVELS):
+            marks = self._marked(now, smooth)
+            if not any(marked.any() for marked in marks.values()):
+                finer = self._onto(now.mesh.refined(), now, way)
+                error = largest_difference(now.touched.fields, finer.touched.fields)
+                now = finer
+                if error <= self.accuracy or self._all_fixed:
+                    break
+                smooth *= 0.1
+            elif now.mesh.elements > MOST_ELEMENTS:
+                break
+            else:
+                now = self._onto(now.mesh.refined(marks), now, way)
+        now = self._checked(now, way, error)
+        stability, more = self._stability(now, way)
+        if stability.negative <= 0 and left == (STAYS,):
+            left = ()
+        return Pressed(now, stability, error, (*notes, *left, *more))
+
+    def _checked(self, held: Held, way: Way, error: float) -> Held:
+        """The state on its fine mesh with what touches looked at as finely as the error of positions allows."""
+        self.reviser.limit = max(self.fine, error)
+        self.reviser.noise = min(NOISE, self.accuracy) if self.fine >= COARSE else 0.0
+        try:
+            if self.reviser.wrong(held, way) is None:
+                return held
+            return self._onto(held.mesh, held, way, anew=True)
+        finally:
+            self.reviser.limit, self.reviser.noise = COARSE, NOISE
+
+    @property
+    def _all_fixed(self) -> bool:
+        return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
+
+    def _marked(self, held: Held, smooth: float) -> dict[str, Array]:
+        rough, model = roughness(held.touched.fields) > smooth, held.prepared.model
+        return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+    def _onto(self, mesh: Mesh, held: Held, way: Way, *, anew: bool = False) -> Held:
+        """The same contact on another mesh; ``anew`` with what touches looked at again."""
+        if not anew:
+            found = self.settler.settle(mesh, (held.prepared.model, held.corrected.state), way)
+            if isinstance(found, Held):
+                return found
+        there = self.toucher.resolved(replace(mesh, touches=()), held, held.mesh.touches, way)
+        if there is None:
+            raise SolveError(Status.FAILED, f"contact found on a coarse mesh was lost on a finer one: {_told(held)}")
+        return there
+
+    # -- stability ------------------------------------------------------------------------------
+
+    def _stability(self, held: Held, way: Way) -> tuple[Stability, list[str]]:
+        """Stability with what touches held on its obstacles, free to slide along them."""
+        notes: list[str] = []
+        touched, touches = held.touched, held.mesh.touches
+        stability = self._judged(held, way)
+        if touches:
+            notes.append(f"in contact: {_told(held)}; stability is that with these places held on their obstacles")
+        pushes = {touch.name: float(np.linalg.norm(touched.force(touch))) for touch in touches}
+        largest = max([held.prepared.model.scales.force, *pushes.values()])
+        weak = [name for name, push in pushes.items() if push < WEAK * largest]
+        if weak:
+            notes.append(f"touches without force: {', '.join(weak)}")
+        return stability, notes
+
+    def certified(self, held: Held, factor: float) -> tuple[Stability, tuple[str, ...]]:
+        """Stability of a state on its mesh with sliding places, also where these take stability away, and notes."""
+        way = self.at(factor)
+        stability, notes = self._stability(held, way)
+        judged = held.prepared.stability(rolling(held))
+        freed = self._freed(held, way) if judged.stable in (True, False) else 0
+        if freed:
+            ways_out = max(judged.negative + freed, 0)
+            stability = replace(judged, stable=ways_out == 0, negative=ways_out, smallest=np.nan)
+        return stability, tuple(notes)
+
+    def _judged(self, held: Held, way: Way) -> Stability:
+        """Stability on what touches with a force, at places that slide.
+
+        A stretch without pressure may leave its obstacle between its ends: only these hold it.
+        """
+        held = self._pressing(held, way)
+        stability = held.prepared.stability(rolling(held))
+        if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
+            # The smallest eigenvalue was that of places that do not slide.
+            stability = replace(stability, stable=True, negative=0, smallest=np.nan)
+        return stability
+
+    def _pressing(self, held: Held, way: Way) -> Held:
+        """The state with the ends of stretches without pressure in their place; itself where there is none."""
+        touches: list[Touch] = []
+        for touch in held.mesh.touches:
+            if touch.to is None:
+                touches.append(touch)
+                continue
+            pressed = held.touched.pressures(touch, np.linspace(touch.at, touch.to, 9))
+            idle = np.abs(pressed).max() < IDLE * float(np.linalg.norm(held.touched.force(touch)))
+            if idle and all(0.0 < x < 1.0 or held.touched.goes_on(touch, x) for x in touch.places):
+                inner = [x for x in touch.places if 0.0 < x < 1.0]
+                ends = (replace(touch, at=x, to=None, flat=True) for x in inner)
+                touches += [replace(end, number=touch.number + 50 * i) for i, end in enumerate(ends)]
+            else:
+                touches.append(touch)
+        if [t.to for t in touches] == [t.to for t in held.mesh.touches]:
+            return held
+        source = held.prepared.model, held.corrected.state
+        return self.settler.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
+
+    def _left(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
+        """An equilibrium in contact left for a stable one along its escape shape, as far as that is found."""
+        if self.scene.analysis.unstable != "leave" or not can_leave(held) or self._judged(held, way).negative <= 0:
+            return held, ()
+        pressing = self._pressing(held, way)
+        loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
+        source = pressing.prepared.model, pressing.corrected.state
+        for start in (pressing, self.settler.solved(replace(pressing.mesh, touches=loose), source, way)):
+            found = None if start is None else self._downhill(start, loose, way)
+            if found is not None and self._judged(found, way).negative <= 0:
+                return found, ("left an unstable equilibrium in contact along its escape shape",)
+        return held, (STAYS,)
+
+    def _downhill(self, start: Held, touches: tuple[Touch, ...], way: Way) -> Held | None:
+        """From an unstable state along its escape shape, then what touches is looked at again."""
+        prepared = start.prepared
+        try:
+            corrected, _ = prepared.leave(start.corrected.state, prepared.stability(start.corrected), start.loading)
+            touched = Touched(prepared.equations, corrected.state, start.loading)
+            there = Held(prepared, corrected, start.loading, touched)
+            return self.toucher.resolved(replace(start.mesh, touches=()), there, touches, way)
+        except SolveError:
+            return None
+
+    def _freed(self, held: Held, way: Way) -> int:
+        """How many more ways out there are when places of contact may slide along their members.
+
+        With f the force and g the gap, the Lagrangian ``Pi - f g(x, s)`` has the places s among its unknowns;
+        its inertia counted with s eliminated last and first gives the two numbers of ways out.
+        """
+        touched, touches = held.touched, held.mesh.touches
+        free = [(i, k) for i, t in enumerate(touches) for k, x in enumerate(t.places) if 0.0 < x < 1.0]
+        # Rolling on planes is among the entries already.
+        kinds = [touched.obstacles[touches[i].contact].kind for i, _ in free]
+        single = [
+            j for j, (i, _) in enumerate(free) if touches[i].to is None and not touches[i].flat and kinds[j] != "flat"
+        ]
+        # Where the member is straight at an edge, as before an end that hangs over, sliding changes nothing.
+        single = [j for j in single if not self._straight_over_edge(held, touches[free[j][0]])]
+        if not single:
+            return 0
+        slopes = self.settler.slopes(held, way)
+        if slopes is None:
+            return 0
+        own = np.array([touched.gap_curvature(touches[free[j][0]]) for j in single])
+        push = np.array([touched.push(touches[free[j][0]]) for j in single])
+        sharp = np.array([touched.obstacles[touches[free[j][0]].contact].kind == "sharp" for j in single])
+        weight = np.where(sharp, push * own, -push)
+        last = weight[:, None] * slopes[np.ix_(single, single)]
+        first = np.where(sharp, push * own, -push * own)
+        return int((np.linalg.eigvalsh(0.5 * (last + last.T)) < 0.0).sum()) - int((first < 0.0).sum())
+
+    @staticmethod
+    def _straight_over_edge(held: Held, touch: Touch) -> bool:
+        bent = abs(held.touched.gap_curvature(touch)) * held.prepared.model.scales.length
+        return held.touched.obstacles[touch.contact].kind == "sharp" and bent < STRAIGHT
+
+
+def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
+    """What touches as it was read from cushions; then without single places on members that lie on the obstacle too."""
+    yield touches
+    lying = {(t.contact, t.member) for t in touches if t.to is not None}
+    fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
+    if len(fewer) < len(touches):
+        yield fewer
+
+
+def _between(a: float, b: float) -> Callable[[float], Way]:
+    return lambda t: Way(lambda model: model.loading(a + t * (b - a)), {})
+
+
+def _told(held: Held) -> str:
+    parts = []
+    for touch in held.mesh.touches:
+        where = f"at {touch.at:.6g}" if touch.to is None else f"from {touch.at:.6g} to {touch.to:.6g}"
+        parts.append(f"{touch.member} on {touch.contact} {where}")
+    return ", ".join(parts)

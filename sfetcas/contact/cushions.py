@@ -1,0 +1,402 @@
+"""Obstacles as cushions: a first state in contact, wherever members touch, from which the touches are read.
+
+Cushions stand at many places of the members and push softly, so that the loads can be followed from zero as without
+obstacles: nothing begins or ends to touch, forces come and go smoothly.  They are then made thin and stiff, and where
+they push says which places touch and which stretches lie on what.  That state is no answer, it is the start for the
+equilibrium in which obstacles are what they are (see :mod:`~sfetcas.contact.touching`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..description.obstacles import members_of, obstacle, swept, takes_part
+from ..description.scene import Scene
+from ..errors import SolveError
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import Cushion, Mesh, Touch
+from ..mechanics.model import Model
+from ..solvers.continuation import follow
+from ..solvers.newton import Corrected, descend
+from ..solvers.prepared import Prepared
+from .settling import Held
+from .touches import Touched
+
+__all__ = ["Cushioned", "Cushions"]
+
+PLACES, LEAST, MOST = 48, 12, 64
+"""Elements along the longest member, and fewest and most along a member: a cushion stands at each of their ends."""
+
+FINENESS = 0.25
+"""Cushions stand nearer to each other than this share of an obstacle's radius."""
+
+ORDER = 3
+"""Order of the elements."""
+
+THICKEST, THINNEST = 3e-3, 3e-7
+"""Thickness of the cushions over the size of the scene, at first and in the end."""
+
+SHRINK, LEAST_SHRINK = 0.1, 0.8
+"""How cushions are made thinner from stage to stage, and the shrinkage at which that is given up."""
+
+PUSHED = 1e-3
+"""Share of the largest force of a cushion from which a place counts as touching."""
+
+NEARLY = 0.9
+"""Share of a push that counts as all of it."""
+
+TINY = 1e-6
+"""Share of the largest push that stands for none where a member lies without pressure."""
+
+NEARBY = 0.5
+"""Largest turn, rad, to what counts as the same state on thinner cushions."""
+
+REACH = 30.0
+"""Gaps over the thickness from which a cushion hardly reaches a place."""
+
+FALLS, FALL = 60, (4, 0.1)
+"""What falls turns no node by more than 0.1 rad a step; every four steps it is asked whether it passed something."""
+
+FAR = 1e3
+"""Sizes of the scene: what has fallen further falls past everything."""
+
+BEGIN = 0.01
+"""Share of the loads under which a mechanism, which has no place of its own without loads, is looked for at first."""
+
+
+@dataclass(frozen=True)
+class Cushioned:
+    """A state on cushions: held as one without touches, and what touches in it."""
+
+    held: Held
+    touches: tuple[Touch, ...]
+
+
+class Cushions:
+    """Cushions for the obstacles of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+    sides : mapping
+        Of each edge and member where it is allowed, see :func:`~sfetcas.contact.touches.edge_sides`.
+    """
+
+    def __init__(
+        self, scene: Scene, prepare: Callable[[Mesh], Prepared], sides: Mapping[tuple[str, str], float]
+    ) -> None:
+        self.scene, self.prepare, self.sides = scene, prepare, sides
+        space = scene.resolved_dimension == "space"
+        self.obstacles = {name: obstacle(contact, space) for name, contact in scene.contacts.items()}
+        self.left: list[float] = []
+        self._parts: tuple[float, ...] = ()
+
+    # -- the state ------------------------------------------------------------------------------
+
+    def found(self, base: Mesh, factors: Sequence[float]) -> Cushioned | None:
+        """The state that the loads lead to through these factors, and what touches in it.
+
+        ``left``, an attribute, is then the factors at which an unstable state was left on the way.
+        """
+        self.left = []
+        mesh = self._divided(base)
+        # What is free to move without obstacles; cushions themselves count as springs.
+        bare = self.prepare(base)
+        falls = bool(bare.diagnosis.mobility) or bare.lacks_slack
+        prepared = self.prepare(self._cushioned(mesh, THICKEST, factors[-1]))
+        found = self._grown(prepared, factors, falls) or self._direct(prepared, factors[-1])
+        if found is None:
+            return None
+        thickness = THICKEST
+        shrink = SHRINK
+        while thickness > 1.01 * THINNEST and shrink < LEAST_SHRINK:
+            trial = max(shrink * thickness, THINNEST)
+            stiffer = self.prepare(self._cushioned(mesh, trial, factors[-1]))
+            there = self._settled(stiffer, found.state, stiffer.model.loading(factors[-1]))
+            if there is None:
+                shrink = np.sqrt(shrink)
+                continue
+            # What soft cushions hold thin ones may not: it rolls away over them, which what touches at places cannot.
+            prepared, found, thickness = stiffer, self._rolled(stiffer, there, factors[-1]), trial
+        loading = prepared.model.loading(factors[-1])
+        held = Held(prepared, found, loading, Touched(prepared.equations, found.state, loading))
+        return Cushioned(held, self._touches(held))
+
+    def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Corrected | None:
+        """Loads growing through the factors from the undeformed scene."""
+        model = prepared.model
+        state, first = prepared.equations.start(model.loading(0.0, 0.0)), factors[0]
+        if falls:
+            first = factors[0] + BEGIN * (factors[1] - factors[0])
+            begun = self._fallen(prepared, first)
+            if begun is None:
+                return None
+            state = begun.state
+        elif self.scene.histories:
+            began = self._followed(prepared, lambda t: model.loading(factors[0], t), state)
+            if began is None:
+                return None
+            state = began
+        for a, b in zip((first, *factors[1:]), factors[1:], strict=False):
+            reached = self._followed(prepared, _between(model, a, b), state)
+            if reached is None:
+                return None
+            self.left += [a + part * (b - a) for part in self._parts]
+            state = reached
+        return self._settled(prepared, state, model.loading(factors[-1]))
+
+    def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
+        leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
+
+        def allowed(before: State, after: State) -> bool:
+            return self._passes(prepared, before, after, way(1.0))
+
+        result = follow(prepared, way, state, leave=leave, allowed=allowed)
+        self._parts = result.left
+        return result.state if result.reached else None
+
+    def _passes(self, prepared: Prepared, before: State, after: State, loading: Loading) -> bool:
+        """Whether no member runs over an obstacle from one state to the next."""
+        courses = [self._courses(prepared, state, loading) for state in (before, after)]
+        return not any(
+            swept(stop, courses[0][member], courses[1][member])
+            for name, stop in self.obstacles.items()
+            for member in members_of(self.scene.contacts[name], self.scene.members)
+        )
+
+    def _courses(self, prepared: Prepared, state: State, loading: Loading) -> dict[str, Array]:
+        touched = Touched(prepared.equations, state, loading)
+        return {name: touched.course(name) for name in prepared.model.members}
+
+    def _fallen(self, prepared: Prepared, factor: float) -> Corrected | None:
+        """Downhill from the undeformed scene in short steps, to where obstacles and supports hold what falls."""
+        if not prepared.model.minimisable:
+            return None
+        loading = prepared.model.loading(factor)
+        state = prepared.equations.start(loading)
+        for _ in range(FALLS):
+            # What falls past everything overflows within a few steps.
+            with np.errstate(over="ignore", invalid="ignore"):
+                lower = descend(prepared.equations, state, loading, prepared.weight, iterations=FALL[0], most=FALL[1])
+            if not np.abs(lower.y).max(initial=0.0) <= FAR or not self._passes(prepared, state, lower, loading):
+                return None
+            near = prepared.distance(state, lower) < FALL[1]
+            state = lower
+            if near:
+                break
+        return self._settled(prepared, state, loading)
+
+    def _direct(self, prepared: Prepared, factor: float) -> Corrected | None:
+        """Downhill from the start guess."""
+        model, loading = prepared.model, prepared.model.loading(factor)
+        if not prepared.model.minimisable:
+            return None
+        try:
+            state, gap = prepared.guess(loading)
+            found = prepared.minimise(loading, state)[0] if gap < 0.2 else None
+        except SolveError:
+            return None
+        start = prepared.equations.start(model.loading(0.0, 0.0))
+        return found if found is not None and self._passes(prepared, start, found.state, loading) else None
+
+    def _rolled(self, prepared: Prepared, found: Corrected, factor: float) -> Corrected:
+        """Where an unstable state goes to, if that is not over an obstacle; else the state."""
+        leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
+        if not leave or not prepared.negative(found):
+            return found
+        loading = prepared.model.loading(factor)
+        try:
+            there = prepared.leave(found.state, prepared.stability(found), loading)[0]
+        except SolveError:
+            return found
+        if not self._passes(prepared, found.state, there.state, loading):
+            return found
+        self.left.append(factor)
+        return there
+
+    def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
+        """The equilibrium near a state; downhill from there where Newton's method does not find it, if not far."""
+        found = prepared.correct(state, loading, iterations=25, most=0.8)
+        if found.converged:
+            return found
+        try:
+            found = prepared.minimise(loading, state)[0]
+        except SolveError:
+            return None
+        near = prepared.distance(state, found.state) < NEARBY and self._passes(prepared, state, found.state, loading)
+        return found if near else None
+
+    # -- where cushions stand -------------------------------------------------------------------
+
+    def _divided(self, base: Mesh) -> Mesh:
+        """A mesh as fine as cushions have to be, with the borders of the one given."""
+        lines = {name: self.scene.center_lines[name] for name in base.cuts}
+        longest = max(line.length for line in lines.values())
+        radii = [stop.radius for stop in self.obstacles.values() if stop.kind == "round"]
+        cuts = {}
+        for name, old in base.cuts.items():
+            count = max(LEAST, PLACES * lines[name].length / longest)
+            count = max(count, *(lines[name].length / (FINENESS * radius) for radius in radii), 0.0)
+            each = np.ceil(np.diff(old) * min(count, MOST)).astype(int)
+            parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(old, old[1:], each, strict=False)]
+            cuts[name] = np.append(np.concatenate(parts), 1.0)
+        return replace(base, order=ORDER, cuts=cuts, touches=())
+
+    def _cushioned(self, mesh: Mesh, thickness: float, factor: float) -> Mesh:
+        """The mesh with its cushions."""
+        bare = self.prepare(mesh).model
+        thick = thickness * self.scene.size
+        stiffness = self._largest_force(bare, factor) * bare.scales.force / thick
+        found: list[Cushion] = []
+        for contact in self.obstacles:
+            seen: set[str] = set()
+            for member in members_of(self.scene.contacts[contact], self.scene.members):
+                cuts, nodes = mesh.cuts[member], self.scene.members[member].nodes
+                edge = float(np.diff(cuts).max()) * self.scene.center_lines[member].length
+                for at in cuts.tolist():
+                    node = nodes[int(at)] if at in (0.0, 1.0) else ""
+                    if node and (node in seen or not self._takes_part(node, contact)):
+                        continue
+                    seen |= {node} if node else set()
+                    found.append(Cushion(contact, member, at, stiffness, thick, edge))
+        return replace(mesh, cushions=tuple(found))
+
+    def _takes_part(self, node: str, contact: str) -> bool:
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), self.obstacles[contact])
+
+    @staticmethod
+    def _largest_force(model: Model, factor: float) -> float:
+        """Size of the forces that obstacles may have to take, dimensionless."""
+        loading = model.loading(factor)
+        loads = float(np.linalg.norm(loading.force.sum(axis=0))), float(np.abs(loading.force).max(initial=0.0))
+        return max(1.0, *loads, float(np.abs(loading.moment).max(initial=0.0)))
+
+    # -- what touches ---------------------------------------------------------------------------
+
+    def _touches(self, held: Held) -> tuple[Touch, ...]:
+        """Runs of places that are pushed."""
+        touched = held.touched
+        pushes = {c: self._push(touched, c) for c in held.mesh.cushions}
+        largest = max(pushes.values(), default=0.0)
+        found: list[Touch] = []
+        for contact, stop in self.obstacles.items():
+            pushed = {c: push for c, push in pushes.items() if c.contact == contact and push > PUSHED * largest}
+            if stop.kind == "sharp":
+                found += self._on_edge(held, contact, {c.member for c in pushed})
+                continue
+            runs = [
+                run
+                for member in members_of(self.scene.contacts[contact], self.scene.members)
+                for run in self._runs(held, contact, member, pushed)
+            ]
+            lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
+            # A place beside a node counts the push on the node too: the farthest from it stands for all of them.
+            beside = [(run, *self._beside(held, run)) for run in runs]
+            for run, near, _ in sorted(beside, key=lambda entry: -entry[2]):
+                if run.to is None and near is not None and near in lying:
+                    continue
+                lying |= {near} if run.to is None and near else set()
+                found.append(replace(run, way=self._way(touched, run)))
+        return tuple(found)
+
+    def _node(self, touch: Touch, x: float) -> str | None:
+        """The node at a place of a touch."""
+        return self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
+
+    def _beside(self, held: Held, touch: Touch) -> tuple[str | None, float]:
+        """The node within one element of a place, and how far it is, m."""
+        member, cuts = self.scene.members[touch.member], held.mesh.cuts[touch.member]
+        length = self.scene.center_lines[touch.member].length
+        if member.type != "rigid" and touch.at <= cuts[1]:
+            return member.nodes[0], touch.at * length
+        if member.type != "rigid" and touch.at >= cuts[-2]:
+            return member.nodes[-1], (1.0 - touch.at) * length
+        return self._node(touch, touch.at), 0.0
+
+    def _runs(self, held: Held, contact: str, member: str, pushed: Mapping[Cushion, float]) -> Iterator[Touch]:
+        """Places of a member next to each other that are pushed; a node counts for each member that ends there.
+
+        An end that a support holds on the obstacle has no cushion, and goes with what is beside it.
+        """
+        at_nodes = {self._node(Touch(c.contact, c.member, c.at), c.at): push for c, push in pushed.items()}
+        inner = {c.at: push for c, push in pushed.items() if c.member == member}
+        cuts = held.mesh.cuts[member]
+        nodes = self.scene.members[member].nodes
+        push = np.array([inner.get(x, 0.0) for x in cuts.tolist()])
+        push[0], push[-1] = at_nodes.get(nodes[0], 0.0), at_nodes.get(nodes[-1], 0.0)
+        reach = REACH * max((c.thickness for c in pushed), default=0.0)
+        for i, beside in ((0, 1), (-1, -2)):
+            gap = held.touched.gaps(contact, member, cuts[[i]], 0.0)[0]
+            if not self._takes_part(nodes[i], contact) and push[beside] > 0.0 and gap < reach:
+                push[i] = push[beside]
+        if self.obstacles[contact].kind == "round":
+            # Along something round a member may lie without pressure between the ends of the stretch.
+            near = held.touched.gaps(contact, member, cuts, 0.0) < reach
+            first, last = np.flatnonzero(push > 0.0)[[0, -1]] if push.any() else (0, 0)
+            if near[first : last + 1].all():
+                push[first : last + 1] = np.maximum(push[first : last + 1], push.max() * TINY)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], push > 0.0, [False]]).astype(int)))
+        for number, (a, b) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+            if self.scene.members[member].type == "rigid":
+                yield from self._of_rigid(contact, member, cuts[a:b], push[a:b])
+            elif b - a <= 2:
+                most = float(cuts[a:b][np.argmax(push[a:b])])
+                at = float(np.average(cuts[a:b], weights=push[a:b]))
+                # Nearly all on a node is on the node.
+                on_node = most in (0.0, 1.0) and push[a:b].max() > NEARLY * push[a:b].sum()
+                yield Touch(contact, member, most if on_node else at, number=number)
+            else:
+                yield Touch(contact, member, float(cuts[a]), float(cuts[b - 1]), number=number)
+
+    def _of_rigid(self, contact: str, member: str, x: Array, push: Array) -> Iterator[Touch]:
+        """A rigid member touches where it is pushed most, or at both ends of the run where it is straight."""
+        line = self.scene.center_lines[member]
+        straight = line.turning == 0.0 and self.obstacles[contact].kind == "flat"
+        if not straight:
+            yield Touch(contact, member, float(x[np.argmax(push)]))
+            return
+        spacing = float(np.diff(x).max(initial=0.0))
+        ends = [e for e in (0.0, 1.0) if np.abs(x - e).min() <= spacing]
+        yield from (Touch(contact, member, e, number=int(e)) for e in ends)
+
+    def _on_edge(self, held: Held, contact: str, members: set[str]) -> list[Touch]:
+        """The place that is nearest to an edge, of the members that it pushes."""
+        touched, found = held.touched, []
+        for member in members:
+            way = self.sides[contact, member]
+            for x in touched.passing(contact, member):
+                gap = float(touched.gaps(contact, member, np.array([x]), 0.0, way)[0])
+                found.append((abs(gap), Touch(contact, member, x, way=way)))
+        return [min(found, key=lambda pair: pair[0])[1]] if found else []
+
+    def _push(self, touched: Touched, cushion: Cushion) -> float:
+        """Force of a cushion, N; zero where it only reaches a place from afar."""
+        gap = float(touched.gaps(cushion.contact, cushion.member, np.array([cushion.at]), 0.0)[0])
+        if self.obstacles[cushion.contact].kind == "sharp":
+            x = np.array([cushion.at])
+            out = touched.fields.positions(cushion.member, x)[0] - self.obstacles[cushion.contact].place
+            gap = float(np.linalg.norm(self.obstacles[cushion.contact].across @ out)) - cushion.edge
+        if gap > REACH * cushion.thickness:
+            return 0.0
+        root = float(np.hypot(gap, cushion.thickness))
+        depth = 0.5 * (root - gap)
+        return cushion.stiffness * depth**2 / root
+
+    @staticmethod
+    def _way(touched: Touched, touch: Touch) -> float:
+        """To which side something round bends what lies on it."""
+        x = np.array([touch.at])
+        stop = touched.obstacles[touch.contact]
+        point, tangent = touched.fields.positions(touch.member, x)[0], touched.fields.tangents(touch.member, x)[0]
+        return float(np.sign(stop.curvature(point, tangent))) or 1.0
+
+
+def _between(model: Model, a: float, b: float) -> Callable[[float], Loading]:
+    return lambda t: model.loading(a + t * (b - a))

@@ -1,0 +1,365 @@
+"""Which touches to try next: what is wrong about a state in contact, and what becomes of its touches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..description.obstacles import Obstacle, members_of, obstacle, swept, takes_part
+from ..description.scene import Scene
+from ..errors import SolveError, Status
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import SAME, Touch
+from ..mechanics.model import Model
+from .settling import APART, Held, Ran, Way, moved
+from .touches import NOISE, Gap, Loose, obstacles_of
+
+__all__ = ["Reviser"]
+
+Touches = tuple[Touch, ...]
+
+FLAT = 1e-7
+"""Curvature of a gap (times the length of the scene) below minus this gets inside: rounding of moments is less."""
+
+
+ROUNDED = 1e-14
+"""Gaps above this share of the size of the scene are more than rounding."""
+
+LOADS = 1e-6
+"""Share of the largest force or moment from which a load may open a stretch."""
+
+BEHIND = 1e-3
+"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
+
+CORNER = 1e-4
+"""Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
+
+
+class Reviser:
+    """Changes of the touches of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    limit : float
+        How deep a place may be inside an obstacle, over the size of the scene.  ``noise``, an attribute, is the same
+        beside places where a member leaves it.
+    sides : mapping
+        Of each edge and member where it is allowed, see :func:`~sfetcas.contact.touches.edge_sides`.
+    """
+
+    def __init__(self, scene: Scene, limit: float, sides: Mapping[tuple[str, str], float]) -> None:
+        self.scene, self.limit, self.noise, self.sides = scene, limit, NOISE, sides
+
+    def ended(self, ran: Ran, crossed: set[str]) -> Touches:
+        """What becomes of a touch one of whose places ran to the end of its member or met the other one.
+
+        It goes on along the next member; at a node that was ``crossed`` before, to which it is added, it stays.
+        """
+        touches, i, k = ran.touches, ran.touch, ran.place
+        touch, rest = touches[i], touches[:i] + touches[i + 1 :]
+        if ran.collapsed:
+            middle = 0.5 * sum(touch.places)
+            at = middle if min(touch.places) > 0.0 and max(touch.places) < 1.0 else float(round(middle))
+            return _numbered((*rest, replace(touch, at=at, to=None)))
+        end = float(round(touch.places[k]))
+        member = self.scene.members[touch.member]
+        node = member.nodes[int(end)]
+        if touch.to is not None:
+            return _numbered((*rest, moved(touch, k, end)))
+        others = [n for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
+        sharp = self.scene.contacts[touch.contact].type in ("point", "line")
+        if not self._takes_part(touch.contact, node) or (sharp and not others):
+            return _numbered(rest)
+        back = node in crossed
+        crossed.add(node)
+        for other in () if back else others:
+            if self.scene.nodes[node].joint == "rigid" and self.scene.members[other].type == "flexible":
+                at = 1e-3 if self.scene.members[other].nodes[0] == node else 1.0 - 1e-3
+                return _numbered((*rest, replace(touch, member=other, at=at)))
+        return _numbered((*rest, replace(touch, at=end)))
+
+    def check(self, touches: Touches) -> None:
+        """Refuse what cannot be modelled.
+
+        Raises
+        ------
+        SolveError
+            A stretch on a round obstacle in space.
+        """
+        space = self.scene.resolved_dimension == "space"
+        for touch in touches:
+            if touch.to is not None and space and self.scene.contacts[touch.contact].radius is not None:
+                detail = f"member {touch.member!r} comes to lie along contacts.{touch.contact}: found a stretch on a "
+                detail += f"{self.scene.contacts[touch.contact].type} in space, accepted: stretches on planes"
+                raise SolveError(Status.FAILED, detail)
+
+    def _takes_part(self, contact: str, node: str) -> bool:
+        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
+        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
+
+    def released(self, model: Model, loading: Loading, touches: Touches, way: Way) -> Touches:
+        """Stretches that reach a held end which is lifted off the obstacle end before it."""
+        if not any(touch.to is not None and {0.0, 1.0} & {*touch.places} for touch in touches):
+            return touches
+        shift = loading.shift.reshape(-1, model.element.axes) * model.scales.length
+        found, stops = [], obstacles_of(model)
+        for touch in touches:
+            for k, x in enumerate(touch.places if touch.to is not None else ()):
+                node = self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else ""
+                if not node or self._takes_part(touch.contact, node):
+                    continue
+                place = np.asarray(self.scene.nodes[node].position, dtype=float)
+                place = place + np.pad(shift[model.nodes.index(node)], (0, 3 - model.element.axes))
+                tangent = np.array([[1.0, 0.0, 0.0]])
+                gap = stops[touch.contact].gaps(place[None, :], tangent, way.offsets.get(touch.contact, 0.0))[0]
+                if gap > SAME * self.scene.size:
+                    touch = moved(touch, k, x + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at))
+            found.append(touch)
+        return tuple(found)
+
+    def ran_over(self, now: Held | None, there: Held) -> bool:
+        """Whether a step takes a member over an obstacle, or to the other side of one that it touches."""
+        touched = [touch.contact for touch in there.mesh.touches]
+        for contact, stop in there.touched.obstacles.items():
+            # On an edge itself no side can be told.
+            if stop.kind == "sharp" and contact in touched:
+                continue
+            for member in members_of(self.scene.contacts[contact], self.scene.members):
+                line = self.scene.center_lines[member]
+                begin = line.positions(np.linspace(0.0, 1.0, 65)) if now is None else now.touched.course(member)
+                if swept(self._behind(now, contact, member, stop), begin, there.touched.course(member)):
+                    return True
+        return False
+
+    def _behind(self, now: Held | None, contact: str, member: str, stop: Obstacle) -> Obstacle:
+        """An edge that a member begins to leave a little behind where it is: on the edge itself no side can be told."""
+        if now is None or stop.kind != "sharp":
+            return stop
+        for touch in now.mesh.touches:
+            if (touch.contact, touch.member) == (contact, member):
+                shift = BEHIND * self.scene.size * now.touched.normal(touch, touch.at)
+                return replace(stop, place=stop.place - shift)
+        return stop
+
+    def wrong(self, held: Held, way: Way) -> Touches | None:
+        """What has to touch otherwise at this state; None where all is right."""
+        touched, touches = held.touched, held.mesh.touches
+        smallest = 1e-9 * held.prepared.model.scales.force
+        pulls = [(touched.push(touch), i) for i, touch in enumerate(touches) if touch.to is None]
+        if pulls and min(pulls)[0] < -smallest:
+            i = min(pulls)[1]
+            return _numbered(touches[:i] + touches[i + 1 :])
+        for i, touch in enumerate(touches):
+            loose = touched.loose_end(touch)
+            if loose is not None:
+                return _numbered((*touches[:i], *self._loosened(held, touch, loose), *touches[i + 1 :]))
+        flatter = self._opened(held) or self._flattened(held) or self._joined(held, way)
+        if flatter is not None:
+            return flatter
+        gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size, self.noise * self.scene.size)
+        if not gaps:
+            return self._lifted(held)
+        return _numbered(self._with(held, min(gaps, key=lambda gap: gap.depth)))
+
+    def _loosened(self, held: Held, touch: Touch, loose: Loose) -> list[Touch]:
+        """A stretch with an end that cannot lie there: shorter, or longer where the next member is pressed as well."""
+        end, k = replace(touch, at=loose.at, to=None), int(loose.at)
+        if loose.stays:
+            beside = [
+                part for part in (self._laid(held, other) for other in self._across_node(end)) if part is not None
+            ]
+            if beside:
+                return [touch, *beside]
+        shorter = moved(touch, k, touch.places[k] + (1.0 - 2.0 * k) * loose.risen)
+        return [shorter, end] if loose.stays else [shorter]
+
+    def _opened(self, held: Held) -> Touches | None:
+        """A stretch that a load takes off its obstacle becomes two, at a node those of both members shorter."""
+        touches = held.mesh.touches
+        for i, touch in enumerate(touches):
+            opened = None if touch.to is None else held.touched.opened(touch, LOADS)
+            if opened is None:
+                continue
+            wide, rest = held.touched.hump(opened), touches[:i] + touches[i + 1 :]
+            if opened.node is None:
+                low = opened.at - min(wide, 0.9 * (opened.at - touch.at))
+                high = opened.at + min(wide, 0.9 * (float(touch.to or 0.0) - opened.at))
+                return _numbered((*rest, replace(touch, to=low), replace(touch, at=high)))
+            found = []
+            for other in touches:
+                nodes = self.scene.members[other.member].nodes
+                ends = [x for x in other.places if x in (0.0, 1.0) and nodes[int(x)] == opened.node]
+                if other.contact == touch.contact and other.to is not None and ends:
+                    scale = self.scene.center_lines[touch.member].length / self.scene.center_lines[other.member].length
+                    inwards = (1.0 - 2.0 * ends[0]) * min(scale * wide, 0.9 * (other.to - other.at))
+                    other = moved(other, int(ends[0]), ends[0] + inwards)
+                found.append(other)
+            return _numbered(tuple(found))
+        return None
+
+    def _flattened(self, held: Held) -> Touches | None:
+        """A place beside which the member curves into a plane or a round obstacle becomes a stretch."""
+        touches = held.mesh.touches
+        for i, touch in enumerate(touches):
+            if touch.to is not None or held.touched.obstacles[touch.contact].kind == "sharp":
+                continue
+            beside = [touch, *self._across_node(touch)]
+            if touch.at in (0.0, 1.0) and len(beside) == 1:
+                continue
+            lying = [self._laid(held, part) for part in beside]
+            found = [part for part in lying if part is not None]
+            if found:
+                return _numbered((*touches[:i], *found, *touches[i + 1 :]))
+        return None
+
+    def _across_node(self, touch: Touch) -> list[Touch]:
+        """The same place on the other members where a member ends."""
+        if touch.at not in (0.0, 1.0):
+            return []
+        node = self.scene.members[touch.member].nodes[int(touch.at)]
+        others = [(n, m) for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
+        allowed = members_of(self.scene.contacts[touch.contact], self.scene.members)
+        flexible = [(n, m) for n, m in others if m.type == "flexible" and n in allowed]
+        return [replace(touch, member=n, at=float(m.nodes.index(node))) for n, m in flexible]
+
+    def _laid(self, held: Held, touch: Touch) -> Touch | None:
+        """The stretch that a place becomes; None where the member curves away from the obstacle."""
+        if self._stiff(touch.member):
+            return None
+        scales = held.prepared.model.scales
+        bent = held.touched.gap_curvature(touch) * scales.length
+        if bent > -FLAT or self._leaves(held, touch):
+            return None
+        # The moment falls by half of the force to either side, down to what the obstacle's shape takes.
+        push = max((held.touched.push(t) for t in held.mesh.touches if t.to is None), default=0.0) / scales.force
+        stiff = held.touched.fields.stiffness(touch.member, touch.at)
+        length = self.scene.center_lines[touch.member].length / scales.length
+        reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
+        low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
+        return replace(touch, at=low, to=high, way=self._bend(held, touch))
+
+    def _stiff(self, member: str) -> bool:
+        """Whether a member cannot come to lie along an obstacle, but touches it at places only."""
+        return self.scene.members[member].type == "rigid"
+
+    @staticmethod
+    def _leaves(held: Held, touch: Touch) -> bool:
+        """Whether a member leaves the obstacle from its end at an angle, as beside a corner that touches."""
+        if touch.at not in (0.0, 1.0):
+            return False
+        inwards = 1.0 - 2.0 * touch.at
+        tangent = held.touched.fields.tangents(touch.member, np.array([touch.at]))[0]
+        return bool(inwards * float(tangent @ held.touched.normal(touch, touch.at)) > CORNER)
+
+    def _joined(self, held: Held, way: Way) -> Touches | None:
+        """Between two places of one obstacle without any gap between them the member lies on it."""
+        touches, limit = held.mesh.touches, self.limit * self.scene.size
+        for touch in touches:
+            if held.touched.obstacles[touch.contact].kind == "sharp" or self._stiff(touch.member):
+                continue
+            others = [
+                (t, x)
+                for t in touches
+                if t.contact == touch.contact and t.member == touch.member and t is not touch
+                for x in t.places
+            ]
+            for k, sign in ((-1, 1.0), (0, -1.0)):
+                here = touch.places[k]
+                beside = sorted((x for _, x in others if (x - here) * sign > 0.0), key=lambda x: abs(x - here))
+                there = beside[0] if beside else 0.5 + 0.5 * sign
+                if abs(there - here) < 1e-5:
+                    continue
+                x = np.linspace(here, there, 12)[1:]
+                gaps = held.touched.gaps(touch.contact, touch.member, x, way.offsets.get(touch.contact, 0.0))
+                # A member that rises over so short a way is nowhere inside.
+                rounded = ROUNDED * self.scene.size
+                if np.abs(gaps).max() > limit or (gaps.max() > rounded and gaps.min() > -rounded):
+                    continue
+                gone = next((t for t, x in others if x == there), None)
+                low, high = min(*touch.places, there), max(*touch.places, there)
+                low, high = (low, high) if gone is None else (min(low, *gone.places), max(high, *gone.places))
+                lying = replace(touch, at=low, to=high, way=self._bend(held, touch))
+                rest = tuple(t for t in touches if t is not touch and t is not gone)
+                return _numbered((*rest, lying))
+        return None
+
+    def _lifted(self, held: Held) -> Touches | None:
+        """A stretch between whose ends the obstacle would have to pull becomes two."""
+        for i, touch in enumerate(held.mesh.touches):
+            if touch.to is None:
+                continue
+            x = np.linspace(touch.at, touch.to, 9)
+            pressed = held.touched.pressures(touch, x)
+            if pressed.min() < -1e-6 * max(np.abs(pressed).max(), held.prepared.model.scales.force):
+                j = int(np.argmin(pressed))
+                rest = held.mesh.touches[:i] + held.mesh.touches[i + 1 :]
+                halves = [(touch.at, float(x[j])), (float(x[j + 1]), float(touch.to))]
+                parts = []
+                for low, high in halves:
+                    short = high - low < 0.05 * (touch.to - touch.at)
+                    outer = low if low == touch.at else high
+                    parts.append(replace(touch, at=outer if short else low, to=None if short else high))
+                return _numbered((*rest, *parts))
+        return None
+
+    def _with(self, held: Held, gap: Gap) -> Touches:
+        """The touches with one that keeps a run of places out of an obstacle."""
+        touches = held.mesh.touches
+        width = max(gap.end - gap.begin, 1e-4)
+        for i, touch in enumerate(() if self._stiff(gap.member) else touches):
+            if (touch.contact, touch.member) != (gap.contact, gap.member):
+                continue
+            beside = [x for x in touch.places if gap.begin - width <= x <= gap.end + width]
+            if not beside and touch.at in (0.0, 1.0) and touch.to is None and self._sinks(held, touch, gap.at):
+                beside = [touch.at]
+            if not beside:
+                continue
+            rest = touches[:i] + touches[i + 1 :]
+            if touch.at in (0.0, 1.0):
+                # It rolls off its end; where the end does not stay off, it comes back as a stretch.
+                return (*rest, replace(touch, at=float(np.clip(gap.at, 1e-4, 1.0 - 1e-4))))
+            if touch.to is None:
+                low, high = max(0.0, touch.at - 0.5 * width), min(1.0, touch.at + 0.5 * width)
+                low, high = (
+                    min(low, gap.begin) if gap.begin == 0.0 else low,
+                    max(high, gap.end) if gap.end == 1.0 else high,
+                )
+                return (*rest, replace(touch, at=low, to=high, way=self._bend(held, touch)))
+            low, high = min(touch.at, gap.begin), max(touch.to, gap.end)
+            return (*rest, replace(touch, at=low, to=high))
+        at = gap.at
+        if 0.0 < at < 1.0:
+            at = float(np.clip(at, 2.0 * APART, 1.0 - 2.0 * APART))
+        return (*touches, Touch(gap.contact, gap.member, at, way=gap.way))
+
+    @staticmethod
+    def _sinks(held: Held, touch: Touch, at: float) -> bool:
+        """Whether a member is inside an obstacle all the way from where it touches to another place."""
+        x = np.linspace(touch.at, at, 12)[1:]
+        return bool(held.touched.gaps(touch.contact, touch.member, x, touch.offset, touch.way).max() < 0.0)
+
+    @staticmethod
+    def _bend(held: Held, touch: Touch) -> float:
+        """To which side a round obstacle bends a member that lies on it."""
+        x = np.array([touch.at])
+        fields, stop = held.touched.fields, held.touched.obstacles[touch.contact]
+        point, tangent = fields.positions(touch.member, x)[0], fields.tangents(touch.member, x)[0]
+        return float(np.sign(stop.curvature(point, tangent))) or 1.0
+
+
+def _numbered(touches: Touches) -> Touches:
+    """Touches of the same two told apart by numbers, in the order of their places; each place once."""
+    count: dict[tuple[str, str], int] = {}
+    found: list[Touch] = []
+    lying = [(t.contact, t.member, x) for t in touches if t.to is not None for x in t.places]
+    for touch in sorted(touches, key=lambda t: (t.contact, t.member, t.at)):
+        key = (touch.contact, touch.member)
+        if touch.to is None and (*key, touch.at) in lying:
+            continue
+        lying += [(*key, touch.at)] if touch.to is None else []
+        found.append(replace(touch, number=count.get(key, 0)))
+        count[key] = count.get(key, 0) + 1
+    return tuple(found)

@@ -1,0 +1,344 @@
+"""Equilibria with given touches, and the places of contact that follow from their conditions.
+
+Each place is held while the equilibrium is solved; the places then follow by Newton's method on their conditions,
+with differences once and Broyden's updates.  The mesh moves with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations, State
+from ..mechanics.fields import Fields, transferred
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import Mesh, Touch, breaks_of
+from ..mechanics.model import Model
+from ..solvers.newton import Corrected
+from ..solvers.prepared import Prepared
+from .touches import Touched
+
+__all__ = ["APART", "SETTLED", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed", "stretched"]
+
+NEAR = 0.35
+"""Cuts nearer to a place of contact than this share of their element make way for it."""
+
+APART = 1e-7
+"""Places nearer to each other, or to the end of a member, are the same: fractions of the length."""
+
+CLOSE = 1e-4
+"""Fractions of the length beside an end of a member in which a double root is lost in rounding."""
+
+SETTLED = 1e-11
+"""Steps of places shorter than this have arrived: fractions of the length."""
+
+MISSED = 1e-6
+"""Conditions of places, dimensionless, that are larger than this do not hold."""
+
+MOST_STEPS = 40
+"""Steps of places before giving up."""
+
+PATIENCE = 8
+"""Steps in a row in which a place may want beyond its room, before it counts as having got there."""
+
+ARRIVING = 0.01
+"""A step that is so much shorter than the one before leads to a root within its member, however near to an end."""
+
+MOST_TURN = 0.8
+"""A step along the way is too long when its corrections turn a node by more, rad."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """An equilibrium in contact; ``slopes`` is the derivative of the conditions by the places."""
+
+    prepared: Prepared
+    corrected: Corrected
+    loading: Loading
+    touched: Touched
+    slopes: Array | None = None
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh with its touches."""
+        return self.prepared.model.mesh
+
+
+@dataclass(frozen=True)
+class Way:
+    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m."""
+
+    loading: Callable[[Model], Loading]
+    offsets: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A place (0 or 1) of a touch that ran to the end of its member, or into the other place of its stretch."""
+
+    touches: tuple[Touch, ...]
+    touch: int
+    place: int
+    collapsed: bool
+
+
+def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
+    """A mesh with an element border at each place of contact; cuts that are too near make way."""
+    cuts = dict(base.cuts)
+    for name in {touch.member for touch in touches}:
+        places = sorted({x for touch in touches if touch.member == name for x in touch.places if 0.0 < x < 1.0})
+        old, breaks = cuts[name], breaks_of(scene, name)
+        keep = np.ones(len(old), bool)
+        for x in places:
+            e = int(np.clip(np.searchsorted(old, x) - 1, 0, len(old) - 2))
+            keep &= np.abs(old - x) > NEAR * (old[e + 1] - old[e])
+        keep |= np.isin(old, breaks)
+        far = [x for x in places if np.abs(breaks - x).min() > APART]
+        cuts[name] = np.unique(np.concatenate([old[keep], far]))
+    return replace(base, cuts=cuts, touches=touches)
+
+
+def free_places(touches: tuple[Touch, ...]) -> list[tuple[int, int]]:
+    """(touch, 0 or 1 for the begin or end) of each place within a member."""
+    return [(i, k) for i, touch in enumerate(touches) for k, x in enumerate(touch.places) if 0.0 < x < 1.0]
+
+
+def moved(touch: Touch, k: int, x: float) -> Touch:
+    """The touch with its begin (0) or end (1) at another place."""
+    return replace(touch, at=x) if k == 0 else replace(touch, to=x)
+
+
+def stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
+    """The mesh with its places of contact moved and the cuts between them in proportion; None where they cross."""
+    cuts = dict(mesh.cuts)
+    for name in {touch.member for touch in touches}:
+        pairs = {x: x for x in breaks_of(scene, name)}
+        for old, new in zip(mesh.touches, touches, strict=True):
+            if old.member == name:
+                pairs |= dict(zip(old.places, new.places, strict=True))
+        before = np.array(sorted(pairs))
+        after = np.array([pairs[x] for x in before])
+        if (np.diff(after) < 0.2 * APART).any():
+            return None
+        cuts[name] = np.interp(cuts[name], before, after)
+    return replace(mesh, cuts=cuts, touches=touches)
+
+
+def balanced(equations: Equations, state: State, loading: Loading) -> State:
+    """The state with the multipliers that leave the least out of balance."""
+    n = equations.unknowns
+    if not equations.rows or equations.rows * n > 4_000_000:
+        return state
+    nothing = replace(state, lam=np.zeros(equations.rows))
+    point = equations.at(nothing, loading)
+    chosen = (equations.row >= n) & (equations.column < n)
+    rows = np.zeros((equations.rows, n))
+    rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
+    return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
+
+
+def _carried(source: tuple[Model, State], loading: Loading, model: Model, state: State) -> State:
+    """The state with nodes where they were: of a body without support another node may lead its places now."""
+    kept, known = model.positions.kept[: len(model.nodes)], set(source[0].positions.unknowns)
+    new = [i for i in np.flatnonzero((kept >= 0).all(axis=1)) if model.positions.unknowns[kept[i, 0]] not in known]
+    if not new:
+        return state
+    fields, y = Fields(Equations(source[0]), source[1], loading), state.y.copy()
+    for i in new:
+        start = np.asarray(model.scene.nodes[model.nodes[i]].position, dtype=float)
+        moved_by = (fields.position(model.nodes[i]) - start) / model.scales.length
+        y[kept[i]] = moved_by[: kept.shape[1]]
+    return replace(state, y=y)
+
+
+def closed(equations: Equations, state: State, loading: Loading, known: Collection[str]) -> State:
+    """The state with the displacements of places that are not known by name where the members lead."""
+    n, positions = equations.unknowns, equations.model.positions
+    rows, new = len(positions.rows), [i for i, name in enumerate(positions.unknowns) if name not in known]
+    if not rows or not new or rows * len(new) > 4_000_000:
+        return state
+    gaps = equations.at(state, loading).residual[n : n + rows]
+    y = state.y.copy()
+    y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=1e-12)[0]
+    return replace(state, y=y)
+
+
+class Settler:
+    """Equilibria of one scene with given touches.
+
+    Parameters
+    ----------
+    scene : Scene
+    prepare : callable
+        Mesh -> Prepared.
+
+    Attributes
+    ----------
+    solves : int
+        Equilibria with places held that were solved so far.
+    limit : float
+        Number of them after which settling gives up.
+    """
+
+    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared]) -> None:
+        self.scene, self.prepare = scene, prepare
+        self.solves, self.limit = 0, np.inf
+
+    def solved(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way, *, same: bool = False) -> Held | None:
+        """The equilibrium with places held; None where Newton's method does not get there."""
+        if _meet(mesh):
+            return None
+        touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in mesh.touches)
+        self.solves += 1
+        prepared = self.prepare(replace(mesh, touches=touches))
+        loading = way.loading(prepared.model)
+        if source is None:
+            state = prepared.equations.start(loading)
+        elif same:
+            state = source[1]
+        else:
+            state = transferred(source[0], source[1], prepared.model)
+            state = _carried(source, way.loading(source[0]), prepared.model, state)
+            known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in self.scene.nodes for axis in "xyz")}
+            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
+            state = balanced(prepared.equations, state, loading)
+        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
+        if not corrected.converged and not corrected.residual <= 1e-9:
+            return None
+        return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+
+    def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | Ran | None:
+        """The equilibrium with the places of contact where their conditions hold."""
+        held = self.solved(mesh, source, way)
+        if held is None:
+            return None
+        slopes: Array | None = None
+        end: Ran | None = None
+        last, size, crowded = np.inf, np.inf, 0
+        for _ in range(MOST_STEPS):
+            free = free_places(held.mesh.touches)
+            if not free:
+                return held
+            if self.solves > self.limit:
+                return None
+            here = held.touched.conditions
+            slopes = self.slopes(held, way) if slopes is None else slopes
+            if slopes is None:
+                return None
+            step = -np.linalg.lstsq(slopes, here, rcond=1e-14)[0]
+            if not np.isfinite(step).all():
+                return None
+            step, ran, room = _shortened(held.mesh.touches, free, step)
+            near = ran is not None or _nearest_end(held.mesh.touches, free) is not None
+            crowded = crowded + 1 if near else 0
+            end = ran or end
+            if ran is not None and room < 10.0 * APART:
+                return ran
+            size, before = float(np.abs(step).max()), size
+            if end is not None and crowded > PATIENCE and size > ARRIVING * before:
+                return _nearest_end(held.mesh.touches, free) or replace(end, touches=held.mesh.touches)
+            if size < SETTLED:
+                # Where places have no say, as along a straight rigid member, no step is no answer.
+                return replace(held, slopes=slopes) if np.abs(here).max() < MISSED else None
+            there = self._stepped(held, free, step, way)
+            if there is None:
+                return ran
+            change = there.touched.conditions - here
+            taken = _places(there.mesh.touches, free) - _places(held.mesh.touches, free)
+            slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), 1e-300)
+            now = float(np.abs(there.touched.conditions).max())
+            if now > 0.5 * last:
+                slopes = None
+            held, last = there, now
+        return None
+
+    def _stepped(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
+        for share in (1.0, 0.3, 0.1, 0.03):
+            there = self._at_places(held, free, share * step, way)
+            if there is not None:
+                return there
+        return None
+
+    def _at_places(self, held: Held, free: list[tuple[int, int]], step: Array, way: Way) -> Held | None:
+        touches = list(held.mesh.touches)
+        for (i, k), change in zip(free, step, strict=True):
+            touches[i] = moved(touches[i], k, self._beside(touches[i], k, touches[i].places[k] + float(change)))
+        mesh = stretched(self.scene, held.mesh, tuple(touches))
+        source = held.prepared.model, held.corrected.state
+        if mesh is None:
+            if any(min(x, 1.0 - x) < APART for i, k in free for x in [touches[i].places[k]]):
+                return None
+            if any(touch.to is not None and touch.to - touch.at < APART for touch in touches):
+                return None
+            mesh = placed(self.scene, replace(held.mesh, touches=()), tuple(touches))
+            return self.solved(mesh, source, way)
+        return self.solved(mesh, source, way, same=True)
+
+    def _beside(self, touch: Touch, k: int, x: float) -> float:
+        """A place, not nearer to a load or a kink of the section than its cut may be: on the side it comes from."""
+        breaks = breaks_of(self.scene, touch.member)[1:-1]
+        near = breaks[np.abs(breaks - x) < 2.0 * APART]
+        return x if not len(near) else float(near[0] + np.copysign(2.0 * APART, touch.places[k] - near[0]))
+
+    def slopes(self, held: Held, way: Way) -> Array | None:
+        """Derivative of the conditions by the places, by differences."""
+        free, here = free_places(held.mesh.touches), held.touched.conditions
+        columns = []
+        for j, (i, k) in enumerate(free):
+            touch = held.mesh.touches[i]
+            x = touch.places[k]
+            size = min(1e-6, 0.1 * min(x, 1.0 - x), 1.0 if touch.to is None else 0.1 * (touch.to - touch.at))
+            for sign in (1.0, -1.0):
+                step = np.zeros(len(free))
+                step[j] = sign * size
+                there = self._at_places(held, free, step, way)
+                if there is not None:
+                    break
+            if there is None:
+                return None
+            columns.append((there.touched.conditions - here) / step[j])
+        return np.column_stack(columns) if columns else np.zeros((0, 0))
+
+
+def _meet(mesh: Mesh) -> bool:
+    """Whether places have crossed, or are so near to each other or to an end that they have no cut of their own."""
+    cuts = [(t.member, mesh.cut_at(t.member, x)) for t in mesh.touches for x in t.places if 0.0 < x < 1.0]
+    turned = any(t.to is not None and t.to <= t.at for t in mesh.touches)
+    at_ends = turned or any(cut in (0, len(mesh.cuts[member]) - 1) for member, cut in cuts)
+    return at_ends or len(set(cuts)) < len(cuts)
+
+
+def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
+    return np.array([touches[i].places[k] for i, k in free])
+
+
+def _nearest_end(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Ran | None:
+    """The place that is nearest to an end of its member, if so near that rounding may lead it to and fro there."""
+    room = {(i, k): min(touches[i].places[k], 1.0 - touches[i].places[k]) for i, k in free}
+    i, k = min(room, key=lambda place: room[place])
+    touch, x = touches[i], touches[i].places[k]
+    collapsed = touch.to is not None and (touch.places[1 - k] > x) == (x > 0.5)
+    return Ran(touches, i, k, collapsed) if room[i, k] <= CLOSE else None
+
+
+def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array) -> tuple[Array, Ran | None, float]:
+    """The step, shortened so that places keep their order; the place that wants beyond what is next to it; its room."""
+    factor, ran, least = 1.0, None, np.inf
+    for (i, k), change in zip(free, step, strict=True):
+        if abs(change) < SETTLED:
+            continue
+        touch, x = touches[i], touches[i].places[k]
+        room, collapsed = 1.0 - x if change > 0.0 else x, False
+        # Towards the other place of its stretch, unless that is an end of the member on the same side.
+        if touch.to is not None and (touch.places[1 - k] > x) == (change > 0.0):
+            room, collapsed = abs(touch.places[1 - k] - x), True
+        # Half of the room again and again: a double root at its end, as of a weight that hangs over.
+        if (abs(change) > 0.4 * room or room < 10.0 * APART) and room < least:
+            ran, least = Ran(touches, i, k, collapsed), room
+        # Two places of a stretch may both move towards each other.
+        factor = min(factor, 0.45 * room / abs(change))
+    return factor * step, ran, least

@@ -1,0 +1,568 @@
+"""What touches what at a state: forces of obstacles, conditions of the places of contact, gaps along members.
+
+A place of contact within a member is an unknown of its own beside the equilibrium with that place held:
+
+* on a plane or a round obstacle the member is tangential to it there;
+* to a point or an edge it is the nearest one;
+* where a stretch begins or ends, the bending moment is the one that the obstacle's shape takes.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..description.obstacles import Obstacle, members_of, nearest, obstacle, takes_part
+from ..description.scene import Scene
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations, State
+from ..mechanics.fields import Fields
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import Touch
+from ..mechanics.model import Model
+from ..mechanics.rotations import STIFF, end_joints
+
+__all__ = ["COARSE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
+
+COARSE = 1e-6
+"""Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
+
+BESIDE = np.geomspace(1e-5, 1e-2, 10)
+"""Fractions of the length from an end that touches at which gaps are looked at too."""
+
+NOISE = 1e-4
+"""On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
+
+THIRDS = 40
+"""Times an interval is cut to two thirds: to a gap within rounding."""
+
+FIRST_RISE, MOST_RISE = 0.05, 0.9
+"""Shares of a stretch: how much of it rises where nothing tells, and at most."""
+
+NEAR = 0.2
+"""Share of the scene's size: a member that is further behind an edge is elsewhere, and not held up by it."""
+
+SAMPLES = 12
+"""Places in each element at which gaps are looked at."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A run of places of a member that are inside an obstacle, and the deepest of them.
+
+    Attributes
+    ----------
+    contact, member : str
+    begin, end, at : float
+        Fractions of the length.
+    depth : float
+        m, negative.
+    way : float
+        As in :class:`~sfetcas.mechanics.mesh.Touch`.
+    """
+
+    contact: str
+    member: str
+    begin: float
+    end: float
+    at: float
+    depth: float
+    way: float = 1.0
+
+
+@dataclass(frozen=True)
+class Loose:
+    """An end of a stretch, 0 or 1, that cannot lie there.
+
+    Attributes
+    ----------
+    at : float
+    risen : float
+        About how far the member rises from there, a fraction of its length.
+    stays : bool
+        Whether the end itself is pressed on the obstacle, and the member rises beside it.
+    """
+
+    at: float
+    risen: float
+    stays: bool
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A place of a stretch at which a load acts that an obstacle cannot hold: a pull (N) or a couple (N m).
+
+    ``node`` is the node there, or None.
+    """
+
+    touch: Touch
+    at: float
+    node: str | None
+    pull: float
+    couple: float
+
+
+def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
+    """The obstacles of a model's scene by name."""
+    return {name: obstacle(contact, model.space) for name, contact in model.scene.contacts.items()}
+
+
+def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
+    """Of each edge and member the sign that turns edge times tangent to the allowed side, in the undeformed scene."""
+    found = {}
+    for name, contact in scene.contacts.items():
+        stop = obstacle(contact, scene.resolved_dimension == "space")
+        if stop.side is None:
+            continue
+        for member in members_of(contact, scene.members):
+            line, x = scene.center_lines[member], np.linspace(0.0, 1.0, 257)
+            near = np.argmin(np.linalg.norm((line.positions(x) - stop.place) @ stop.across, axis=1))
+            normal = np.cross(stop.normal, line.tangents(x[near : near + 1])[0])
+            found[name, member] = 1.0 if normal @ stop.side >= 0.0 else -1.0
+    return found
+
+
+class Touched:
+    """Contact at one state of a model."""
+
+    def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
+        self._take(Fields(equations, state, loading), state)
+
+    @classmethod
+    def of(cls, fields: Fields) -> Touched:
+        """Contact at the state that fields were made of."""
+        self = cls.__new__(cls)
+        self._take(fields, fields.state)
+        return self
+
+    def _take(self, fields: Fields, state: State) -> None:
+        self.fields, self.model, self._state = fields, fields.model, state
+        self.obstacles = obstacles_of(self.model)
+        names = self.model.row_names
+        self._row = {name: i for i, name in reversed(list(enumerate(names)))}
+
+    # -- forces ---------------------------------------------------------------------------------
+
+    def force(self, touch: Touch) -> Array:
+        """Force (3,) of an obstacle on a member at a place or over a stretch, N."""
+        model = self.model
+        if touch.to is not None:
+            return self._resultant(touch)
+        normal = self.normal(touch, touch.at)
+        force = -self._state.lam[self._row[touch.name]] * normal
+        return np.asarray(force * model.scales.force)
+
+    def _resultant(self, touch: Touch) -> Array:
+        """Force over a stretch by the balance of its forces, N."""
+        before, after = self._beside(touch, touch.at, -1.0), self._beside(touch, float(touch.to or 0.0), 1.0)
+        total = before - after - self._load_between(touch.member, touch.at, float(touch.to or 0.0))
+        total = total + sum((self._at_node(touch, at) for at in touch.places if at in (0.0, 1.0)), np.zeros(3))
+        stop = self.obstacles[touch.contact]
+        # What holds an end along a plane is not of the plane.
+        return np.asarray(stop.across @ total if stop.kind == "flat" else total)
+
+    def _beside(self, touch: Touch, at: float, way: float) -> Array:
+        """Internal force just outside a stretch, N; inside it where a support or another stretch continues it."""
+        model, record = self.model, self.model.scene.members[touch.member]
+        if 0.0 < at < 1.0:
+            x = np.nextafter(at, at + way)
+            return np.asarray(self.fields.along(touch.member, np.array([x]))["force"][0])
+        node = record.nodes[int(at)]
+        if not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
+            return np.asarray(self.fields.along(touch.member, np.array([at]))["force"][0])
+        beyond = np.array(self.fields.own_force(node))
+        for name, member in model.scene.members.items():
+            if name != touch.member and node in member.nodes and name in model.members:
+                ends = self.fields.along(name, np.array([0.0, 1.0]))["force"]
+                beyond = beyond + ends[0] if member.nodes[0] == node else beyond - ends[1]
+        return way * beyond
+
+    def goes_on(self, touch: Touch, at: float) -> bool:
+        """Whether another stretch of the same obstacle begins where a stretch reaches the end of its member."""
+        node = self.model.scene.members[touch.member].nodes[int(at)]
+        for other in self.model.mesh.touches:
+            if other is not touch and other.contact == touch.contact and other.to is not None:
+                nodes = self.model.scene.members[other.member].nodes
+                if any(x in (0.0, 1.0) and nodes[int(x)] == node for x in other.places):
+                    return True
+        return False
+
+    def _at_node(self, touch: Touch, at: float) -> Array:
+        """Force on a node between two stretches, N, which counts with the first of them."""
+        node = self.model.scene.members[touch.member].nodes[int(at)]
+        if not self.takes_part(touch.contact, node) or not self.goes_on(touch, at):
+            return np.zeros(3)
+        here = [t for t in self.model.mesh.touches if t.contact == touch.contact and t.to is not None]
+        first = next(t for t in here if any(self._node_at(t, x) == node for x in t.places))
+        return self.left_over(node)[1] if first is touch else np.zeros(3)
+
+    def _node_at(self, touch: Touch, x: float) -> str | None:
+        """The node at a place of a touch; None within its member."""
+        return self.model.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
+
+    def _load_between(self, member: str, begin: float, end: float) -> Array:
+        """Distributed load between two places, N."""
+        before = self.fields.load_before(member, np.array([begin, end]))
+        return np.asarray((before[1] - before[0]) * self.model.scales.force)
+
+    def push(self, touch: Touch) -> float:
+        """Force of a touch along the normal, N: below zero the obstacle would have to pull."""
+        return float(self.force(touch) @ self.normal(touch, touch.at))
+
+    def end_pushes(self, touch: Touch) -> list[float]:
+        """Concentrated forces at the inner ends of a stretch along the normals there, N."""
+        found = []
+        for at, way in ((touch.at, -1.0), (float(touch.to or 0.0), 1.0)):
+            if 0.0 < at < 1.0:
+                inside = self.fields.along(touch.member, np.array([at]))["force"][0]
+                jump = way * (inside - self._beside(touch, at, way))
+                found.append(float(jump @ self.normal(touch, at)))
+        return found
+
+    def pressures(self, touch: Touch, x: Array) -> Array:
+        """Forces (n - 1,) of an obstacle between places of a stretch along the normals in their middles, N."""
+        forces = self.fields.along(touch.member, x)["force"]
+        loads = self.fields.load_before(touch.member, x) * self.model.scales.force
+        pushed = -np.diff(forces, axis=0) - np.diff(loads, axis=0)
+        middles = 0.5 * (x[1:] + x[:-1])
+        return np.array([push @ self.normal(touch, at) for push, at in zip(pushed, middles, strict=True)])
+
+    # -- what obstacles cannot hold -------------------------------------------------------------
+
+    def loose_end(self, touch: Touch) -> Loose | None:
+        """The end of a stretch at a node that the obstacle would have to pull or to clamp; None where there is none."""
+        model = self.model
+        for at in touch.places if touch.to is not None else ():
+            node = model.scene.members[touch.member].nodes[int(at)] if at in (0.0, 1.0) else ""
+            if not node or not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
+                continue
+            axis = self.fields.pressed_moments(touch, np.array([at]))[1][0]
+            moment, force = self.left_over(node)
+            normal = self.normal(touch, at)
+            push = float(force @ normal)
+            # Positive where the moment at the end would bend the member away from the obstacle.
+            away = np.cross(axis, self._tangent(touch, at)) @ normal
+            bends = float((1.0 - 2.0 * at) * (moment @ axis) * away)
+            held = model.scene.nodes[node].support != "free"
+            if push < -1e-9 * model.scales.force or (abs(bends) > 1e-8 and not held):
+                stays = push > 0.0 and bends < 0.0
+                return Loose(at, self._risen(touch, push, bends * model.scales.moment, at), stays)
+        return None
+
+    def left_over(self, node: str) -> tuple[Array, Array]:
+        """Moment (dimensionless) and force (N) on a node that neither its members, loads nor springs balance.
+
+        Members that lie on obstacles count with what their shape takes.
+        """
+        scene, fields = self.model.scene, self.fields
+        moment, force = -fields.own_moment(node) + fields.balance.spring_moment(node), -fields.own_force(node)
+        for name, member in scene.members.items():
+            for i, (at, joint) in enumerate(end_joints(scene, member)):
+                if at != node or name not in self.model.members:
+                    continue
+                found = fields.along(name, np.array([float(i)]))
+                force = force + (2.0 * i - 1.0) * found["force"][0]
+                if joint in STIFF:
+                    moment = moment + (2.0 * i - 1.0) * found["moment"][0] / self.model.scales.moment
+        return moment, force
+
+    def _risen(self, touch: Touch, push: float, bends: float, at: float) -> float:
+        """How far a heavy beam rises from a plane under a force and a couple at its end, as a fraction of the length.
+
+        Where ``bends - push d - pressure d^2 / 2`` vanishes; where the couple presses the end on the plane,
+        ``d = 2 sqrt(couple / pressure)``.
+        """
+        pressure, span, length = self._pressure(touch, at), float(touch.to or 0.0) - touch.at, self._length(touch)
+        if pressure <= 0.0:
+            return FIRST_RISE * span
+        inner = push**2 + 2.0 * bends * pressure
+        rise = 2.0 * np.sqrt(abs(bends) / pressure) if inner < 0.0 or push > 0.0 > bends else 0.0
+        rise = rise or (np.sqrt(inner) - push) / pressure
+        return float(np.clip(rise / length, 1e-3 * span, MOST_RISE * span))
+
+    def _length(self, touch: Touch) -> float:
+        return self.model.scene.center_lines[touch.member].length
+
+    def _pressure(self, touch: Touch, at: float) -> float:
+        """Pressure on a stretch beside a place of it, N/m."""
+        span = float(touch.to or 0.0) - touch.at
+        x = np.linspace(touch.at, float(touch.to or 0.0), 9)
+        i = int(np.clip(np.round((at - touch.at) / span * 8.0 - 0.5), 1, 6))
+        return float(self.pressures(touch, x)[i]) / (span / 8.0 * self._length(touch))
+
+    def opened(self, touch: Touch, share: float) -> Opened | None:
+        """A place within a stretch where a load pulls or turns the member off the obstacle; None where none does.
+
+        Loads that are smaller than a share of the largest force or moment do not count.
+        """
+        model, fields = self.model, self.fields
+        size, to = share * self._size, float(touch.to or 0.0)
+        cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
+        inner = cuts[1:-1][(cuts[1:-1] > touch.at) & (cuts[1:-1] < to)]
+        beside = np.stack([np.nextafter(inner, 0.0), inner], axis=1).ravel()
+        forces = np.diff(fields.load_before(touch.member, beside), axis=0)[::2] if len(inner) else np.zeros((0, 3))
+        turned = model.rotations.turns[part][1:, 0][(cuts[1:-1] > touch.at) & (cuts[1:-1] < to)]
+        for at, force, turn in zip(inner.tolist(), forces, turned.tolist(), strict=True):
+            pull, couple = float(force @ self.normal(touch, at)), fields.moment_on(turn)
+            if pull > size or couple > size:
+                return Opened(touch, at, None, max(pull, 0.0) * model.scales.force, couple * model.scales.moment)
+        for at in (x for x in touch.places if x in (0.0, 1.0)):
+            node = model.scene.members[touch.member].nodes[int(at)]
+            if not self.takes_part(touch.contact, node) or not self.goes_on(touch, at):
+                continue
+            moment, force = self.left_over(node)
+            pull = max(-float(force @ self.normal(touch, at)) / model.scales.force, 0.0)
+            couple = abs(float(moment @ fields.pressed_moments(touch, np.array([at]))[1][0]))
+            if pull > size or couple > size:
+                return Opened(touch, at, node, pull * model.scales.force, couple * model.scales.moment)
+        return None
+
+    @functools.cached_property
+    def _size(self) -> float:
+        """Largest force or moment of the scene, dimensionless."""
+        found = [1e-12]
+        for name in self.model.members:
+            along = self.fields.along(name, np.array([0.0, 0.5, 1.0]), dimensionless=True)
+            found += [float(np.abs(along["force"]).max()), float(np.abs(along["moment"]).max())]
+        return max([*found, self.fields.largest_load])
+
+    def hump(self, opened: Opened) -> float:
+        """Half of how far a heavy beam that lies on a plane rises around a load, as a fraction of the length.
+
+        A force P against the pressure p opens ``1.5 P / p``, a couple C about ``2 sqrt(C / p)`` to either side.
+        """
+        touch = opened.touch
+        pressure, span = self._pressure(touch, opened.at), float(touch.to or 0.0) - touch.at
+        if pressure <= 0.0:
+            return FIRST_RISE * span
+        wide = max(0.75 * opened.pull / pressure, np.sqrt(2.0 * opened.couple / pressure)) / self._length(touch)
+        return float(np.clip(wide, 1e-3 * span, MOST_RISE * span))
+
+    def normal(self, touch: Touch, at: float) -> Array:
+        """Normal (3,) of an obstacle at a place of a member."""
+        x = np.array([at])
+        place, tangent = self.fields.positions(touch.member, x), self.fields.tangents(touch.member, x)
+        return np.asarray(self.obstacles[touch.contact].normals(place, tangent, touch.way)[0])
+
+    def _tangent(self, touch: Touch, at: float) -> Array:
+        return np.asarray(self.fields.tangents(touch.member, np.array([at]))[0])
+
+    # -- conditions -----------------------------------------------------------------------------
+
+    @functools.cached_property
+    def conditions(self) -> Array:
+        """What has to be zero at each place of contact within a member, dimensionless, in their order."""
+        found = []
+        for touch in self.model.mesh.touches:
+            if touch.to is not None:
+                found += [self._moment_jump(touch, at, way) for at, way in zip(touch.places, (-1.0, 1.0), strict=True)]
+            elif 0.0 < touch.at < 1.0:
+                sharp = self.obstacles[touch.contact].kind == "sharp"
+                out = self._from_edge(touch) if sharp else self.normal(touch, touch.at)
+                found.append(float(out @ self._tangent(touch, touch.at)))
+        return np.array([value for value in found if value is not None])
+
+    def _from_edge(self, touch: Touch) -> Array:
+        """Distance (3,) of a place from an edge, across it, dimensionless."""
+        stop = self.obstacles[touch.contact]
+        out = self.fields.positions(touch.member, np.array([touch.at]))[0] - stop.place
+        if stop.side is not None:
+            out = out + touch.offset * stop.side / np.linalg.norm(stop.side)
+        return np.asarray(out @ stop.across / self.model.scales.length)
+
+    def _moment_jump(self, touch: Touch, at: float, way: float) -> float | None:
+        """Moment just outside a stretch less the one that the obstacle's shape takes; None at a member's end."""
+        if not 0.0 < at < 1.0:
+            return None
+        x = np.array([np.nextafter(at, at + way)])
+        outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0]
+        pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
+        return float(outside @ axes[0] - pressed[0])
+
+    def gap_curvature(self, touch: Touch) -> float:
+        """Second derivative of the gap along the member at a place of contact, 1/m."""
+        x = np.array([touch.at])
+        found = self.fields.along(touch.member, x)
+        normal, tangent = self.normal(touch, touch.at), self._tangent(touch, touch.at)
+        bent = self.fields.bend(touch.member, x, found)[0] @ normal
+        stop = self.obstacles[touch.contact]
+        if stop.kind != "round":
+            return float(bent)
+        along = tangent @ stop.across
+        return float(bent + stop.sign * (along @ along) / stop.radius)
+
+    # -- gaps -----------------------------------------------------------------------------------
+
+    def samples(self, member: str) -> Array:
+        """Fractions at which gaps are looked at: finely between the cuts."""
+        cuts = self.model.mesh.cuts[member]
+        # Towards the ends of an element, where contact begins, the samples are dense.
+        inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / SAMPLES)
+        return np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * inner).ravel(), 1.0)
+
+    def gaps(self, contact: str, member: str, x: Array, offset: float, way: float = 1.0) -> Array:
+        """Gaps (n,) of places of a member, m."""
+        place, tangent = self.fields.positions(member, x), self.fields.tangents(member, x)
+        return self.obstacles[contact].gaps(place, tangent, offset, way)
+
+    def inside(
+        self,
+        offsets: Mapping[str, float],
+        ways: Mapping[tuple[str, str], float],
+        limit: float,
+        noise: float = 0.0,
+    ) -> list[Gap]:
+        """All runs of places that are deeper inside an obstacle than the limit (m), where members are free of it.
+
+        Within ``noise`` (m) of it a member may waver beside the places where it leaves.
+        """
+        found: list[Gap] = []
+        for contact, stop in self.obstacles.items():
+            for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
+                offset = offsets.get(contact, 0.0)
+                if stop.kind == "sharp":
+                    found += self._over_edge(contact, member, offset, ways[contact, member], limit)
+                else:
+                    found += self._runs(contact, member, offset, limit, noise)
+        return found
+
+    def takes_part(self, contact: str, node: str) -> bool:
+        """Whether an obstacle can push a node."""
+        scene = self.model.scene
+        return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
+
+    def _runs(self, contact: str, member: str, offset: float, limit: float, noise: float) -> list[Gap]:
+        x = self._with_smallest(contact, member, self._beside_ends(contact, member, self.samples(member)), offset)
+        keep = np.ones(len(x), bool)
+        keep[0], keep[-1] = (self.takes_part(contact, node) for node in self.model.scene.members[member].nodes)
+        for touch in self.model.mesh.touches:
+            if touch.contact == contact and touch.member == member and touch.to is not None:
+                keep &= (x < touch.at) | (x > touch.to)
+        gaps = self.gaps(contact, member, x, offset)
+        deep = (gaps < -limit) & keep
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], deep, [False]]).astype(int)))
+        runs = []
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            i = a + int(np.argmin(gaps[a:b]))
+            if gaps[i] > -noise and self._wavers(contact, member, float(x[a]), float(x[b - 1])):
+                continue
+            runs.append(Gap(contact, member, float(x[a]), float(x[b - 1]), float(x[i]), float(gaps[i])))
+        return runs
+
+    def _beside_ends(self, contact: str, member: str, x: Array) -> Array:
+        """The samples, and some close to ends that touch: what begins to lie there dips in over a short way."""
+        touches = [t for t in self.model.mesh.touches if (t.contact, t.member) == (contact, member) and t.to is None]
+        close = [abs(touch.at - BESIDE) for touch in touches if touch.at in (0.0, 1.0)]
+        return np.unique(np.concatenate([x, *close]))
+
+    def _wavers(self, contact: str, member: str, begin: float, end: float) -> bool:
+        """Whether a run is in the element beside a place where curvatures already say that the member leaves.
+
+        At a free end of a member they do not.
+        """
+        scene, cuts = self.model.scene, self.model.mesh.cuts[member]
+        for touch in self.model.mesh.touches:
+            if touch.contact != contact:
+                continue
+            for x in touch.places:
+                place: float | None = x if touch.member == member else None
+                if x in (0.0, 1.0):
+                    node = scene.members[touch.member].nodes[int(x)]
+                    if sum(node in other.nodes for other in scene.members.values()) == 1 and touch.to is None:
+                        continue
+                    nodes = scene.members[member].nodes
+                    place = float(nodes.index(node)) if node in nodes else place
+                if place is None:
+                    continue
+                cut = self.model.mesh.cut_at(member, place)
+                low, high = cuts[max(cut - 1, 0)], cuts[min(cut + 1, len(cuts) - 1)]
+                if low <= begin and end <= high:
+                    return True
+        return False
+
+    def _with_smallest(self, contact: str, member: str, x: Array, offset: float) -> Array:
+        """The samples, and between them where an obstacle that is smaller than their spacing may be entered."""
+        stop = self.obstacles[contact]
+        length = self.model.scene.center_lines[member].length
+        if stop.kind != "round" or stop.radius > 4.0 * length * np.diff(x).max():
+            return x
+        gaps = self.gaps(contact, member, x, offset)
+        inner = (gaps[1:-1] <= gaps[:-2]) & (gaps[1:-1] <= gaps[2:]) & (gaps[1:-1] < length * np.diff(x).max())
+        found = [self._smallest(contact, member, float(x[i]), float(x[i + 2])) for i in np.flatnonzero(inner)]
+        return np.unique(np.append(x, found))
+
+    def _nearest(self, contact: str, member: str, x: Array) -> Array:
+        """The place of the smallest gap, from the smallest of samples."""
+        i = int(np.argmin(self.gaps(contact, member, x, 0.0)))
+        return np.array([self._smallest(contact, member, float(x[max(i - 1, 0)]), float(x[min(i + 1, len(x) - 1)]))])
+
+    def _smallest(self, contact: str, member: str, low: float, high: float) -> float:
+        """The place of the smallest gap between two places, by thirds."""
+        for _ in range(THIRDS):
+            inner = low + np.array([0.0, 1.0, 2.0, 3.0]) / 3.0 * (high - low)
+            k = int(np.argmin(self.gaps(contact, member, inner, 0.0)))
+            low, high = float(inner[max(k - 1, 0)]), float(inner[min(k + 1, 3)])
+        return 0.5 * (low + high)
+
+    def _over_edge(self, contact: str, member: str, offset: float, way: float, limit: float) -> list[Gap]:
+        if any(t.contact == contact and t.member == member for t in self.model.mesh.touches):
+            return []
+        found = []
+        for x in self.passing(contact, member):
+            gap = float(self.gaps(contact, member, np.array([x]), offset, way)[0])
+            if gap < -limit and abs(gap) < NEAR * self.model.scene.size:
+                found.append(Gap(contact, member, x, x, x, gap, way))
+        return found
+
+    def passing(self, contact: str, member: str) -> list[float]:
+        """Fractions at which a member comes nearest to an edge."""
+        fields = self.fields
+        positions, tangents = (lambda x: fields.positions(member, x)), (lambda x: fields.tangents(member, x))
+        return nearest(self.obstacles[contact], positions, tangents, self.samples(member))
+
+    def course(self, member: str) -> Array:
+        """Places (n, 3) along a member, m, near enough to each other to be joined by lines."""
+        return self.fields.positions(member, self.samples(member))
+
+    def smallest_gap(self, contact: str, way: Mapping[tuple[str, str], float]) -> float:
+        """Smallest gap of all members that an obstacle stops, m; infinite where none passes an edge."""
+        found = [np.inf]
+        for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
+            sharp = self.obstacles[contact].kind == "sharp"
+            x = np.array(self.passing(contact, member)) if sharp else self.samples(member)
+            if not sharp:
+                x = self._nearest(contact, member, x)
+            gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0)) if len(x) else x
+            gaps = gaps[gaps > -NEAR * self.model.scene.size] if sharp else gaps
+            if len(gaps):
+                found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
+        return min(found)
+
+
+def answers(fields: Fields) -> dict[str, dict[str, Any]]:
+    """Of each obstacle the force on what touches it, where, the gap and the member; lists where several touch."""
+    touched, sides = Touched.of(fields), edge_sides(fields.model.scene)
+    found: dict[str, dict[str, Any]] = {}
+    for contact in touched.obstacles:
+        touches = sorted((t for t in fields.model.mesh.touches if t.contact == contact), key=lambda t: t.at)
+        if not touches:
+            gap = touched.smallest_gap(contact, sides)
+            known = gap if np.isfinite(gap) else None
+            found[contact] = {"force": np.zeros(3), "at": None, "gap": known, "member": None}
+            continue
+        entries = [
+            {
+                "force": touched.force(touch),
+                "at": touch.at if touch.to is None else [touch.at, touch.to],
+                "gap": float(touched.gaps(contact, touch.member, np.array([touch.at]), 0.0, touch.way)[0]),
+                "member": touch.member,
+            }
+            for touch in touches
+        ]
+        several = {key: [entry[key] for entry in entries] for key in entries[0]}
+        found[contact] = entries[0] if len(entries) == 1 else several
+    return found

@@ -1,0 +1,79 @@
+"""Frictionless obstacles that members touch from one side: points, lines, planes, circles, cylinders, spheres."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, model_validator
+
+from ..errors import SceneError
+from .later import Staged
+from .records import Direction, Positive, Vector, listed, say
+
+__all__ = ["Contact"]
+
+_KEYS = {
+    "point": ({"position", "side"}, set()),
+    "line": ({"point", "direction", "side"}, set()),
+    "plane": ({"point", "normal"}, {"side"}),
+    "circle": ({"center", "radius"}, {"side"}),
+    "cylinder": ({"center", "radius"}, {"side", "axis"}),
+    "sphere": ({"center", "radius"}, {"side"}),
+}
+"""Of each type the keys that it needs, and those that it may have."""
+
+
+def _members(value: Any) -> Any:
+    return value if value == "all" else listed(value, "a list of members, or 'all'")
+
+
+def _side(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in ("inside", "outside"):
+            raise ValueError(f"found {say(value)}, accepted: inside, outside, or a direction [x, y] or [x, y, z]")
+        return value
+    return value
+
+
+class Contact(Staged):
+    """A frictionless obstacle; its forces push members away and never hold them.
+
+    Parameters
+    ----------
+    type : point (in the plane), line, plane, circle, cylinder or sphere
+    position : (3,), m - of a point that members slide over
+    point : (3,), m - any point of a line or a plane
+    normal : (3,) - across a plane, towards where members are allowed unless ``side`` says otherwise
+    direction : (3,) - of a line
+    center, radius : (3,), m - of a circle or sphere, or any point of the axis of a cylinder
+    axis : (3,) - of a cylinder, default z
+    member, members : name, names or 'all' - which members it stops
+    side : (3,) - where members are allowed, by a direction that points there; 'inside' or 'outside' of what is round
+    """
+
+    type: Literal["point", "line", "plane", "circle", "cylinder", "sphere"]
+    position: Vector | None = None
+    point: Vector | None = None
+    normal: Direction | None = None
+    direction: Direction | None = None
+    center: Vector | None = None
+    radius: Positive | None = None
+    axis: Direction = (0.0, 0.0, 1.0)
+    member: str | None = None
+    members: Annotated[tuple[str, ...] | Literal["all"], BeforeValidator(_members)] | None = None
+    side: Annotated[Direction | Literal["inside", "outside"], BeforeValidator(_side)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Contact:
+        needed, possible = _KEYS[self.type]
+        given = {key for key in self.model_fields_set if getattr(self, key) is not None}
+        for key in sorted(needed - given):
+            raise SceneError(f"the key {key!r} is missing: a {self.type} needs {' and '.join(sorted(needed))}")
+        for key in sorted(given - needed - possible - {"type", "member", "members"}):
+            raise SceneError(f"not accepted: the obstacle is a {self.type}", (key,))
+        if (self.member is None) == (self.members is None):
+            raise SceneError("accepted: either member or members, one of them")
+        if isinstance(self.side, str) != (self.type in ("circle", "cylinder", "sphere")) and self.side is not None:
+            accepted = "a direction [x, y] or [x, y, z]" if isinstance(self.side, str) else "inside or outside"
+            raise SceneError(f"found {say(self.side)}, accepted for a {self.type}: {accepted}", ("side",))
+        return self

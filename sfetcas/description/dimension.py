@@ -1,0 +1,136 @@
+"""Whether a scene lies in x-y, and if not, the first thing that does not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.quaternion import rotate
+from .contacts import Contact
+from .loads import Load, Motion
+from .shapes import CenterLine
+from .springs import Spring
+from .structure import Member, Node
+
+__all__ = ["out_of_plane"]
+
+Triple = tuple[float, float, float]
+Finding = tuple[tuple[str, ...], str]
+
+_ROUNDING = 1e-12
+
+
+def out_of_plane(
+    nodes: Mapping[str, Node],
+    lines: Mapping[str, CenterLine],
+    loads: Mapping[str, Load],
+    motions: Mapping[str, Motion],
+    springs: Mapping[str, Spring],
+    gravity: Triple | None,
+    members: Mapping[str, Member],
+    contacts: Mapping[str, Contact],
+) -> Finding | None:
+    """The place of the first thing out of x-y with what it does there; None where all lies in it."""
+    if gravity is not None and _leaves(gravity):
+        return ("gravity",), "has a z component"
+    findings = (
+        _nodes(nodes),
+        _members(lines),
+        _loads(loads, lines),
+        _motions(motions),
+        _springs(springs),
+        _cylindrical(nodes, members),
+        _contacts(contacts),
+    )
+    return next((finding for group in findings for finding in group), None)
+
+
+def _nodes(nodes: Mapping[str, Node]) -> Iterator[Finding]:
+    size = max((abs(entry) for node in nodes.values() for entry in node.position[:2]), default=0.0)
+    for name, node in nodes.items():
+        for key in ("position", "start"):
+            point = getattr(node, key)
+            if point is not None and abs(point[2]) > _ROUNDING * size:
+                yield ("nodes", name, key), "has a z component"
+        if node.axis2 is not None:
+            yield ("nodes", name, "axis2"), "makes a joint that turns about two axes"
+        if node.direction is not None and _leaves(node.direction):
+            yield ("nodes", name, "direction"), "has a z component"
+        if _turns_out(node.axis):
+            yield ("nodes", name, "axis"), "is not along z"
+
+
+def _members(lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    x = np.linspace(0.0, 1.0, 33)
+    for name, line in lines.items():
+        if line.planar:
+            continue
+        if np.abs(line.tangents(x)[:, 2]).max() > _ROUNDING:
+            yield ("members", name, "shape"), "leaves x-y"
+        elif np.abs(line.curvatures(x)[:, 0]).max() * line.length > _ROUNDING:
+            yield ("members", name, "shape"), "twists"
+        else:
+            yield ("members", name, "b2"), "is neither along z nor in x-y"
+
+
+def _cylindrical(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator[Finding]:
+    for name, node in nodes.items():
+        if node.support == "cylindrical":
+            yield ("nodes", name, "support"), "turns about a line that is not along z"
+    for name, member in members.items():
+        if "cylindrical" in member.release:
+            yield ("members", name, "release"), "turns about a line that is not along z"
+
+
+def _loads(loads: Mapping[str, Load], lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
+    for name, load in loads.items():
+        if load.frame == "section":
+            # Along a plane line the sections turn about z: what leaves x-y at the start does so everywhere.
+            start = lines[str(load.member)].quaternions(np.zeros(1))
+            if _leaves(rotate(start, np.asarray(load.vector))[0]):
+                yield ("loads", name, "value"), "leaves x-y"
+            continue
+        if load.type == "moment" and _turns_out(load.vector):
+            yield ("loads", name, "value"), "is not about z"
+        if load.type != "moment" and _leaves(load.vector):
+            yield ("loads", name, "value"), "has a z component"
+
+
+def _motions(motions: Mapping[str, Motion]) -> Iterator[Finding]:
+    for name, motion in motions.items():
+        if motion.displacement is not None and _leaves(motion.displacement):
+            yield ("motions", name, "displacement"), "has a z component"
+        if isinstance(motion.rotation, tuple) and _turns_out(motion.rotation):
+            yield ("motions", name, "rotation"), "is not about z"
+
+
+def _springs(springs: Mapping[str, Spring]) -> Iterator[Finding]:
+    for name, spring in springs.items():
+        if spring.axis is not None and _turns_out(spring.axis):
+            yield ("springs", name, "axis"), "is not along z"
+        for key in ("anchor", "direction"):
+            vector = getattr(spring, key)
+            if vector is not None and _leaves(vector):
+                yield ("springs", name, key), "has a z component"
+
+
+def _contacts(contacts: Mapping[str, Contact]) -> Iterator[Finding]:
+    for name, contact in contacts.items():
+        if contact.normal is not None and _leaves(contact.normal):
+            yield ("contacts", name, "normal"), "has a z component"
+        if contact.direction is not None and _leaves(contact.direction) and _turns_out(contact.direction):
+            yield ("contacts", name, "direction"), "is neither along z nor in x-y"
+        if _turns_out(contact.axis):
+            yield ("contacts", name, "axis"), "is not along z"
+        if contact.type == "sphere" and contact.center is not None and contact.center[2] != 0.0:
+            yield ("contacts", name, "center"), "has a z component"
+
+
+def _leaves(vector: Triple | Array) -> bool:
+    return abs(vector[2]) > _ROUNDING * max(abs(vector[0]), abs(vector[1]))
+
+
+def _turns_out(vector: Triple) -> bool:
+    return max(abs(vector[0]), abs(vector[1])) > _ROUNDING * abs(vector[2])

@@ -1,0 +1,167 @@
+"""Loads, prescribed motions and the histories that drive them."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import Literal
+
+from pydantic import model_validator
+
+from ..errors import SceneError
+from .later import Staged
+from .records import Fraction, Numbers, Record, Turn, Vector, say
+from .sections import Varying
+
+__all__ = ["History", "Load", "Motion"]
+
+
+class History(Record):
+    """A factor over time, or over the step's factor in statics.
+
+    Parameters
+    ----------
+    t : (n,), s or the step's factor - rising
+    value : (n,) - the factor at t, linear between and constant outside
+    polynomial : (n - 1, any) - instead of value: for each interval c0 + c1 x + ... in
+        x = (t - t_i)/(t_i+1 - t_i), constant outside
+    """
+
+    t: Numbers
+    value: Numbers | None = None
+    polynomial: tuple[Numbers, ...] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> History:
+        if any(right <= left for left, right in zip(self.t, self.t[1:], strict=False)):
+            raise SceneError(f"found {say(self.t)}, accepted: rising numbers", ("t",))
+        if (self.value is None) == (self.polynomial is None):
+            raise SceneError("accepted: either value or polynomial, one of them")
+        if self.value is not None and len(self.value) != len(self.t):
+            raise SceneError(f"found {len(self.value)} numbers, accepted: {len(self.t)}, one for each t", ("value",))
+        if self.polynomial is not None and not len(self.polynomial) == len(self.t) - 1 > 0:
+            accepted = "one list of coefficients for each interval of t, at least one"
+            raise SceneError(
+                f"found {len(self.polynomial)} for {len(self.t)} numbers t, accepted: {accepted}",
+                ("polynomial",),
+            )
+        return self
+
+    def factor(self, t: float) -> float:
+        """The factor at t.
+
+        Parameters
+        ----------
+        t : s, or the step's factor in statics
+
+        Returns
+        -------
+        factor : dimensionless
+        """
+        t = min(max(t, self.t[0]), self.t[-1])
+        i = min(bisect_right(self.t, t), len(self.t) - 1) - 1
+        if i < 0:
+            return self._value(0)
+        x = (t - self.t[i]) / (self.t[i + 1] - self.t[i])
+        if self.polynomial is not None:
+            return sum(c * x**k for k, c in enumerate(self.polynomial[i]))
+        return self._value(i) * (1.0 - x) + self._value(i + 1) * x
+
+    def _value(self, i: int) -> float:
+        assert self.value is not None
+        return self.value[i]
+
+
+class Load(Staged):
+    """A force, a moment or a distributed force.
+
+    Parameters
+    ----------
+    type : force (N), moment (N m) or distributed (N per metre of the undeformed member)
+    node : name of the node it acts on; or
+    member, at : name of the member, and the fraction of its length; a distributed load acts along all of it
+    value : (3,), fixed axes of the undeformed scene; a moment about z may be one number
+    frame : fixed, or follower: the value turns with the node, or with the section under it; section, of a
+        distributed load: the value is along b1, b2, b3 of the sections and turns with them
+    profile : factor along a distributed load
+    history : name of the history that replaces the step's factor
+    """
+
+    type: Literal["force", "moment", "distributed"]
+    node: str | None = None
+    member: str | None = None
+    at: Fraction | None = None
+    value: Turn
+    frame: Literal["fixed", "follower", "section"] = "fixed"
+    profile: Varying | None = None
+    history: str | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Load:
+        self._check_place()
+        if self.type != "moment" and isinstance(self.value, float):
+            accepted = "[x, y] or [x, y, z]; only a moment may be one number"
+            raise SceneError(f"found {self.value:g}, accepted: {accepted}", ("value",))
+        if self.type != "distributed" and self.frame == "section":
+            raise SceneError(f"found 'section', accepted of a {self.type}: fixed or follower", ("frame",))
+        if self.type != "distributed" and self.profile is not None:
+            raise SceneError(f"not accepted with a {self.type}; only a distributed load has a profile", ("profile",))
+        return self
+
+    def _check_place(self) -> None:
+        if self.type == "distributed":
+            return self._check_distributed()
+        if self.node is None and self.member is None:
+            raise SceneError("neither node nor member is given, accepted: one of them, on which the load acts")
+        if self.node is not None and self.member is not None:
+            raise SceneError(f"found node {self.node!r} and member {self.member!r}, accepted: one of them")
+        if self.node is not None and self.at is not None:
+            raise SceneError(f"found {self.at:g}, accepted: only with a member, and here a node is given", ("at",))
+        if self.member is not None and self.at is None:
+            raise SceneError(f"the key 'at' is missing: the fraction of the length where the {self.type} acts")
+
+    def _check_distributed(self) -> None:
+        if self.node is not None:
+            raise SceneError(f"found {self.node!r}, accepted: a member, as the load is distributed", ("node",))
+        if self.member is None:
+            raise SceneError("the key 'member' is missing: a distributed load acts along a member")
+        if self.at is not None:
+            raise SceneError(
+                f"found {self.at:g}, not accepted: a distributed load acts along all of its member", ("at",)
+            )
+
+    @property
+    def follows(self) -> bool:
+        """Whether it is a force that turns with what it acts on."""
+        return self.frame != "fixed" and self.type != "moment"
+
+    @property
+    def vector(self) -> tuple[float, float, float]:
+        """(3,), N, N m or N/m, fixed axes; one number is a moment about z."""
+        return (0.0, 0.0, self.value) if isinstance(self.value, float) else self.value
+
+
+class Motion(Record):
+    """A prescribed displacement or rotation of a held node, or both.
+
+    Parameters
+    ----------
+    node : name of the node
+    displacement : (3,), m, fixed axes
+    rotation : rad, about the axis of a hinge (z where the node is clamped in a plane scene);
+        or (3,), rad, fixed axes - rotation vector of a node that cannot turn by itself
+    between : drives a joint instead of a support: two members that end at the node, hinged there (rotation: angle
+        of the second against the first) or the second released as a slider (displacement along the direction)
+    history : name of the history that replaces the step's factor
+    """
+
+    node: str
+    displacement: Vector | None = None
+    rotation: Turn | None = None
+    between: tuple[str, str] | None = None
+    history: str | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Motion:
+        if self.displacement is None and self.rotation is None:
+            raise SceneError("neither displacement nor rotation is given, accepted: one of them or both")
+        return self

@@ -1,0 +1,226 @@
+"""Condensed matrices of small members: given as numbers or read from files of finite element programs."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator
+
+from ..errors import SceneError
+from .records import say
+
+__all__ = [
+    "Mass",
+    "Stiffness",
+    "check_mass",
+    "check_rigid_motion",
+    "check_stiffness",
+    "read_matrix",
+    "rigid_motions",
+]
+
+Floats = NDArray[np.float64]
+
+SAME = 1e-7
+"""Relative difference below which entries of a matrix are the same: files hold 8 digits and more."""
+
+LARGEST = 6000
+"""Rows of a matrix that are read: a thousand nodes of one small member."""
+
+
+def _matrix(value: Any, name: str) -> tuple[tuple[float, ...], ...]:
+    if isinstance(value, (str, Path)):
+        value = read_matrix(Path(value), name)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    square = array.ndim == 2 and array.shape[0] == array.shape[1]
+    if not square or not np.isfinite(array).all():
+        wrong = "entries that are not finite" if square else " x ".join(map(str, array.shape)) + " numbers"
+        found = wrong if isinstance(value, np.ndarray) else say(value)
+        raise ValueError(f"found {found}, accepted: a square matrix of finite numbers, or a file with one")
+    return tuple(tuple(row) for row in array.tolist())
+
+
+Rows = tuple[tuple[float, ...], ...]
+
+Stiffness = Annotated[Rows, BeforeValidator(lambda value: _matrix(value, "stiffness"))]
+"""A square matrix: rows of numbers, an array, or the name of a file (.npz, or Matrix Market .mtx)."""
+
+Mass = Annotated[Rows, BeforeValidator(lambda value: _matrix(value, "mass"))]
+"""The same for a mass."""
+
+
+def read_matrix(path: Path, name: str = "stiffness") -> Floats:
+    """The matrix in a file: the array of that name or the only one of an .npz, .npy, or Matrix Market.
+
+    Raises
+    ------
+    ValueError
+        The file is absent or holds no such matrix; the sentence says which.
+    """
+    try:
+        return _from_npz(path, name) if path.suffix.lower() in (".npz", ".npy") else _from_market(path)
+    except FileNotFoundError:
+        raise ValueError(f"there is no file {path}") from None
+    except (OSError, zipfile.BadZipFile) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ValueError(f"the file {path} cannot be read: {reason}") from None
+
+
+def _from_npz(path: Path, name: str) -> Floats:
+    try:
+        loaded: Any = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError):
+        raise ValueError(f"the file {path} holds no arrays of numbers of numpy") from None
+    if isinstance(loaded, np.ndarray):
+        return _numbers_of(loaded, path)
+    with loaded:
+        names = list(loaded.files)
+        if name not in names and len(names) != 1:
+            message = f"the file {path} holds {', '.join(names) or 'nothing'}, accepted: {name}, or one array alone"
+            raise ValueError(message)
+        try:
+            array = loaded[name if name in names else names[0]]
+        except (ValueError, EOFError, zlib.error):
+            array = None
+        return _numbers_of(array, path)
+
+
+def _numbers_of(array: Any, path: Path) -> Floats:
+    # What is no array of numpy is given as bytes, or not at all.
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"the file {path} holds no arrays of numbers of numpy")
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"the file {path} holds {array.dtype.name}, accepted: real numbers")
+    return np.asarray(array, dtype=float)
+
+
+def _from_market(path: Path) -> Floats:
+    """Matrix Market exchange format, coordinate or array, general or symmetric (Boisvert et al. 1996)."""
+    try:
+        lines = path.read_text().splitlines()
+    except UnicodeDecodeError:
+        raise ValueError(f"the file {path} is no text, accepted: Matrix Market, or .npz") from None
+    head = lines[0].lower().split() if lines else []
+    if head[:2] != ["%%matrixmarket", "matrix"] or len(head) != 5:
+        raise ValueError(f"the file {path} does not begin as Matrix Market does, '%%MatrixMarket matrix'")
+    kinds = ("array", "coordinate"), ("real", "double", "integer"), ("general", "symmetric")
+    for found, accepted in zip(head[2:], kinds, strict=True):
+        if found not in accepted:
+            raise ValueError(f"the file {path} is {found}, accepted: {', '.join(accepted)}")
+    numbers = " ".join(line for line in lines[1:] if not line.startswith("%")).split()
+    try:
+        return _market_entries(np.array(numbers, dtype=float), head[2], head[4])
+    except (ValueError, IndexError):
+        raise ValueError(f"the file {path} does not hold the entries that its head announces") from None
+
+
+def _market_entries(numbers: Floats, layout: str, symmetry: str) -> Floats:
+    n, m = _whole(numbers[:2])
+    if not (0 < n <= LARGEST and 0 < m <= LARGEST):
+        raise ValueError
+    matrix = np.zeros((n, m))
+    if layout == "array":
+        column, row = np.indices((m, n)).reshape(2, -1)
+        if symmetry == "symmetric":
+            keep = row >= column
+            row, column = row[keep], column[keep]
+        matrix[row, column] = numbers[2:].reshape(len(row))
+    else:
+        (count,) = _whole(numbers[2:3])
+        if 3 * count != len(numbers) - 3:
+            raise ValueError
+        entries = numbers[3:].reshape(count, 3)
+        row, column = (_whole(entries[:, i]) - 1 for i in (0, 1))
+        if min(row.min(initial=0), column.min(initial=0)) < 0:
+            raise ValueError
+        np.add.at(matrix, (row, column), entries[:, 2])
+    if symmetry == "symmetric":
+        matrix[column, row] = matrix[row, column]
+    return matrix
+
+
+def _whole(numbers: Floats) -> NDArray[np.intp]:
+    """Counts and places; anything else, also what no integer holds, is a ValueError."""
+    if not (np.abs(numbers) < 2.0**31).all() or (numbers % 1.0).any():
+        raise ValueError
+    return numbers.astype(np.intp)
+
+
+def check_stiffness(matrix: ArrayLike, nodes: int) -> None:
+    """Refuse a stiffness of the wrong size or that is not symmetric.
+
+    Raises
+    ------
+    SceneError
+        Place within the member.
+    """
+    _check_symmetric(np.asarray(matrix), nodes, "stiffness")
+
+
+def check_mass(matrix: ArrayLike, nodes: int, condensed: bool) -> None:
+    """The same for a mass, which belongs to a stiffness."""
+    if not condensed:
+        raise SceneError("accepted with a stiffness only: a member with a section has the mass of that", ("mass",))
+    _check_symmetric(np.asarray(matrix), nodes, "mass")
+
+
+def _check_symmetric(matrix: Floats, nodes: int, key: str) -> None:
+    size = 6 * nodes
+    if matrix.shape != (size, size):
+        message = f"found {matrix.shape[0]} x {matrix.shape[1]}, accepted: {size} x {size}, 6 for each of {nodes} nodes"
+        raise SceneError(message, (key,))
+    gap = np.abs(matrix - matrix.T)
+    if gap.max() > SAME * np.abs(matrix).max():
+        i, j = np.unravel_index(int(gap.argmax()), gap.shape)
+        found = f"entry {i + 1}, {j + 1} is {matrix[i, j]:g} and entry {j + 1}, {i + 1} is {matrix[j, i]:g}"
+        raise SceneError(f"is not symmetric: {found}", (key,))
+
+
+def rigid_motions(rest: Floats) -> Floats:
+    """The six rigid motions of nodes at ``rest`` (n, 3) as columns, (6 n, 6): along and about three axes."""
+    modes = np.zeros((6 * len(rest), 6))
+    for i, r in enumerate(rest):
+        modes[6 * i : 6 * i + 3, :3] = np.eye(3)
+        modes[6 * i : 6 * i + 3, 3:] = np.cross(np.eye(3), r).T
+        modes[6 * i + 3 : 6 * i + 6, 3:] = np.eye(3)
+    return modes
+
+
+def check_rigid_motion(matrix: ArrayLike, rest: Floats) -> None:
+    """Refuse a stiffness that resists a rigid motion of its nodes, or that gives way with a force.
+
+    Parameters
+    ----------
+    matrix : (6 n, 6 n), N/m, N, N m, in the member's own axes
+    rest : (n, 3), m - places of the nodes from the first one, in the same axes
+
+    Raises
+    ------
+    SceneError
+        Names the motion, or the shape of the negative eigenvalue; place within the member.
+    """
+    length = float(np.linalg.norm(rest, axis=1).max())
+    unit = np.tile([1.0, 1.0, 1.0, length, length, length], len(rest))
+    scaled = np.asarray(matrix) / unit[:, None] / unit[None, :]
+    largest = float(np.abs(scaled).max())
+    modes = rigid_motions(rest / length)
+    names = [f"along {axis}" for axis in AXES] + [f"turning about {axis} at the first node" for axis in AXES]
+    for name, mode in zip(names, modes.T, strict=True):
+        force = np.abs(scaled @ mode).max() / np.abs(mode).max()
+        if force > 1e-6 * largest:
+            raise SceneError(f"resists the rigid motion {name}: {force / largest:.1e} of its largest", ("stiffness",))
+    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    if values[0] < -1e-7 * largest:
+        shape = ", ".join(f"{v + 0.0:.2g}" for v in vectors[:, 0])
+        raise SceneError(f"is indefinite: eigenvalue {values[0]:.3g} of the shape [{shape}]", ("stiffness",))
+
+
+AXES = ("b1", "b2", "b3")

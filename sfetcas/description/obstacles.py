@@ -1,0 +1,214 @@
+"""The geometry of obstacles: gaps and normals, of arrays of points, in SI units and fixed axes.
+
+Three kinds: *flat* (a plane), *round* (a circle, cylinder or sphere), and *sharp* (a point in the plane or a line in
+space: a member slides over it, and the normal is that of the member).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from .contacts import Contact
+from .loads import Motion
+from .structure import Node
+
+__all__ = [
+    "Obstacle",
+    "check_start",
+    "edge_slopes",
+    "members_of",
+    "nearest",
+    "obstacle",
+    "rounded",
+    "swept",
+    "takes_part",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """An obstacle by numbers.
+
+    Attributes
+    ----------
+    kind : str
+        flat, round or sharp.
+    place : ndarray (3,)
+        Point of a plane, centre, point of an edge.
+    across : ndarray (3, 3)
+        Projection on the directions that count: on the normal, on those across an axis, on those across an edge.
+    normal : ndarray (3,)
+        Of a plane; direction of an edge (z for a point in the plane); zero for what is round.
+    radius : float
+    sign : float
+        1, or -1 where members are inside.
+    side : ndarray (3,)
+        Of an edge: where members are allowed.
+    """
+
+    kind: Literal["flat", "round", "sharp"]
+    place: Array
+    across: Array
+    normal: Array
+    radius: float = 0.0
+    sign: float = 1.0
+    side: Array | None = None
+
+    def gaps(self, points: Array, tangents: Array, offset: float = 0.0, way: float = 1.0) -> Array:
+        """Distances (n,) of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
+        if self.kind == "round":
+            return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius) + offset
+        normals = self.normals(points, tangents, way)
+        if self.side is not None:
+            points = points + offset * self.side / np.linalg.norm(self.side)
+            return np.einsum("ni,ni->n", points - self.place, normals)
+        return np.einsum("ni,ni->n", points - self.place, normals) + offset
+
+    def normals(self, points: Array, tangents: Array, way: float = 1.0) -> Array:
+        """Unit normals (n, 3) towards where members are allowed."""
+        if self.kind == "flat":
+            return np.broadcast_to(self.normal, points.shape)
+        if self.kind == "round":
+            out = (points - self.place) @ self.across
+            return self.sign * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
+        normals = way * np.cross(self.normal, tangents)
+        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+    def curvature(self, point: Array, tangent: Array) -> float:
+        """Signed curvature of the section of the obstacle in the plane, 1/m: counter-clockwise along the tangent."""
+        if self.kind != "round":
+            return 0.0
+        out = (point - self.place) / self.radius
+        return float(-(out @ np.cross([0.0, 0.0, 1.0], tangent)) / self.radius)
+
+
+def rounded(stop: Obstacle, radius: float) -> Obstacle:
+    """The obstacle itself, or in the place of an edge something thin and round behind it."""
+    if stop.side is None:
+        return stop
+    side = stop.side / np.linalg.norm(stop.side)
+    return Obstacle("round", stop.place - radius * side, stop.across, np.zeros(3), radius)
+
+
+def _unit(vector: object) -> Array:
+    v = np.asarray(vector, dtype=float)
+    return np.asarray(v / np.linalg.norm(v))
+
+
+def obstacle(contact: Contact, space: bool) -> Obstacle:
+    """The numbers of an obstacle; in the plane a line along z is a point, one within it a wall."""
+    eye = np.eye(3)
+    if contact.type == "plane" or (contact.type == "line" and not space and abs(_unit(contact.direction)[2]) < 0.5):
+        side = None if contact.side is None else np.asarray(contact.side, dtype=float)
+        normal = _unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], _unit(contact.direction))
+        normal = -normal if side is not None and side @ normal < 0.0 else normal
+        return Obstacle("flat", np.asarray(contact.point), np.outer(normal, normal), normal)
+    if contact.type in ("point", "line"):
+        point = contact.position if contact.type == "point" else contact.point
+        edge = eye[2] if contact.type == "point" else _unit(contact.direction)
+        side = np.asarray(contact.side, dtype=float)
+        return Obstacle("sharp", np.asarray(point, dtype=float), eye - np.outer(edge, edge), edge, side=side)
+    axis = _unit(contact.axis)
+    across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
+    sign = -1.0 if contact.side == "inside" else 1.0
+    place = np.asarray(contact.center, dtype=float)
+    return Obstacle("round", place, across, np.zeros(3), float(contact.radius or 0.0), sign)
+
+
+def members_of(contact: Contact, members: Iterable[str]) -> list[str]:
+    """Names of the members that an obstacle stops, of all there are."""
+    if contact.member is not None:
+        return [contact.member]
+    return list(members) if contact.members == "all" else list(contact.members or ())
+
+
+def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle) -> bool:
+    """Whether a node can be pushed by an obstacle: no support holds it against it.
+
+    A slider takes part where its guide leads towards the obstacle and nothing drives it.
+    """
+    if node.support == "free":
+        return True
+    if not node.slides or any(m.node == name and m.displacement is not None for m in motions):
+        return False
+    guide = np.asarray(node.direction, dtype=float)
+    towards = stop.normal if stop.kind == "flat" else guide @ stop.across
+    return bool(abs(guide @ towards) > PARALLEL * np.linalg.norm(guide))
+
+
+def swept(stop: Obstacle, before: Array, after: Array) -> bool:
+    """Whether a curve that moves from some places (n, 3) to others (m, 3) runs over the middle of an obstacle.
+
+    The two curves and what joins their ends wind round it then.  A plane is nowhere run over, nor a sphere, nor what
+    members are inside of.
+    """
+    if stop.kind == "flat" or stop.sign < 0.0 or np.linalg.matrix_rank(stop.across) != 2:
+        return False
+    basis = np.linalg.svd(stop.across)[2][:2]
+    around = (np.vstack([before, after[::-1], before[:1]]) - stop.place) @ basis.T
+    angles = np.unwrap(np.arctan2(around[:, 1], around[:, 0]))
+    return bool(abs(angles[-1] - angles[0]) > np.pi)
+
+
+PARALLEL = 1e-6
+"""Sine of the angle below which a guide leads along a plane."""
+
+ROUNDING = 1e-9
+"""Share of the scene's size by which a start may be inside an obstacle: decimal fractions in a file."""
+
+Curve = Callable[[Array], Array]
+
+
+def nearest(edge: Obstacle, positions: Curve, tangents: Curve, samples: Array) -> list[float]:
+    """Fractions at which a curve comes nearest to an edge, by its neighbourhood."""
+    slopes = edge_slopes(edge, positions, tangents, samples)
+    found = []
+    for i in np.flatnonzero((slopes[:-1] <= 0.0) & (slopes[1:] > 0.0)):
+        low, high = samples[i], samples[i + 1]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            below = edge_slopes(edge, positions, tangents, np.array([middle]))[0] <= 0.0
+            low, high = (middle, high) if below else (low, middle)
+        found.append(float(low))
+    return found
+
+
+HALVINGS = 48
+"""Bisections of a sampling interval: to rounding."""
+
+
+def edge_slopes(edge: Obstacle, positions: Curve, tangents: Curve, x: Array) -> Array:
+    """Distances (n,) of places of a curve before (negative) an edge, along the tangents there, m."""
+    return np.einsum("ni,ni->n", (positions(x) - edge.place) @ edge.across, tangents(x))
+
+
+def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: float) -> None:
+    """Refuse a member that is inside an obstacle in the undeformed scene.
+
+    Raises
+    ------
+    SceneError
+        Where it is how far inside, or that it runs along the side that a point or line names.
+    """
+    x = np.linspace(0.0, 1.0, 257)
+    if obstacle.kind == "sharp":
+        x = np.array(nearest(obstacle, positions, tangents, x))
+        if not len(x):
+            return
+        assert obstacle.side is not None
+        normals = obstacle.normals(positions(x), tangents(x))
+        side = normals @ obstacle.side
+        if (np.abs(side) < 1e-6 * np.linalg.norm(obstacle.side)).any():
+            raise SceneError("passes along the key 'side', accepted: a direction across the member")
+        gaps = np.sign(side) * np.einsum("ni,ni->n", positions(x) - obstacle.place, normals)
+    else:
+        gaps = obstacle.gaps(positions(x), tangents(x))
+    deepest = int(np.argmin(gaps))
+    if gaps[deepest] < -ROUNDING * size:
+        raise SceneError(f"starts inside, by {-gaps[deepest]:.3g} m at the fraction {x[deepest]:.3g} of its length")

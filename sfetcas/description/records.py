@@ -1,0 +1,291 @@
+"""Records: frozen data validated at construction, and the number types they are made of."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping, Set
+from types import MappingProxyType
+from typing import Annotated, Any, TypeVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
+
+from ..errors import SceneError
+
+__all__ = [
+    "Direction",
+    "Fraction",
+    "Named",
+    "NotNegative",
+    "Number",
+    "Numbers",
+    "Positive",
+    "Record",
+    "Turn",
+    "Vector",
+    "counted",
+    "listed",
+    "nearest",
+    "number",
+    "plain",
+    "say",
+    "sentence",
+    "unknown",
+]
+
+T = TypeVar("T")
+R = TypeVar("R", bound="Record")
+
+
+def say(value: object) -> str:
+    """A found value, short enough for a sentence."""
+    text = repr(list(value) if isinstance(value, tuple) else value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """'; did you mean ...?' where one of the known words is near, else the list of them."""
+    known = sorted(known)
+    close = difflib.get_close_matches(word, known, n=1)
+    return f"did you mean {close[0]!r}?" if close else "accepted: " + ", ".join(known)
+
+
+def unknown(word: str, known: Iterable[str], kind: str = "names") -> str:
+    """'found ..., accepted: ...', with the nearest of the known words where one is near."""
+    known = sorted(known)
+    if not known:
+        return f"found {say(word)}, but the scene has no {kind}"
+    listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+    close = difflib.get_close_matches(word, known, n=1)
+    return f"found {say(word)}, accepted: {listed}" + (f"; did you mean {close[0]!r}?" if close else "")
+
+
+def number(value: Any) -> float:
+    """A finite number as a float.
+
+    Raises
+    ------
+    ValueError
+        Anything else, also a text, true and false.
+    """
+    kind = getattr(getattr(value, "dtype", None), "kind", "none")
+    scalar = getattr(value, "shape", None) == () and kind in "iuf"
+    if isinstance(value, bool) or not (scalar or isinstance(value, (int, float))):
+        raise ValueError(f"found {say(value)}, accepted: a number")
+    try:
+        found = float(value)
+    except OverflowError:
+        raise ValueError("found a whole number with over 300 digits, accepted: a finite number") from None
+    if not math.isfinite(found):
+        raise ValueError(f"found {found}, accepted: a finite number")
+    return found
+
+
+def listed(value: Any, accepted: str) -> tuple[Any, ...]:
+    """The entries of a list, a tuple or an array.
+
+    Raises
+    ------
+    ValueError
+        Anything else, also a text and a set, which has no order.
+    """
+    unordered = isinstance(value, (str, bytes, Mapping, Set))
+    if unordered or not isinstance(value, Iterable) or getattr(value, "shape", None) == ():
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return tuple(value)
+
+
+def _positive(value: float) -> float:
+    if value <= 0.0:
+        raise ValueError(f"found {value:g}, accepted: a number above zero")
+    return value
+
+
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise ValueError(f"found {say(value)}, accepted: zero or a number above zero")
+    return value
+
+
+def _vector(value: Any, accepted: str = "[x, y] or [x, y, z]") -> tuple[float, float, float]:
+    entries = tuple(number(entry) for entry in listed(value, accepted))
+    if len(entries) not in (2, 3):
+        raise ValueError(f"found {say(entries)}, accepted: {accepted}")
+    return (entries[0], entries[1], entries[2] if len(entries) == 3 else 0.0)
+
+
+def _turn(value: Any) -> float | tuple[float, float, float]:
+    scalar = isinstance(value, (int, float)) or getattr(value, "shape", None) == ()
+    return number(value) if scalar else _vector(value, "a number, [x, y] or [x, y, z]")
+
+
+def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(value):
+        raise ValueError(f"found {say(value)}, accepted: a direction, which is not of zero length")
+    return value
+
+
+def _fraction(value: float) -> float:
+    if not 0.0 <= value <= 1.0:
+        raise ValueError(f"found {value:g}, accepted: a fraction of the length, from 0 to 1")
+    return value
+
+
+def _numbers(value: Any) -> tuple[float, ...]:
+    entries = tuple(number(entry) for entry in listed(value, "a list of numbers"))
+    if not entries:
+        raise ValueError("found an empty list, accepted: a list of numbers")
+    return entries
+
+
+def _read_only(value: Mapping[str, T]) -> Mapping[str, T]:
+    for name in value:
+        if not name.strip() or "." in name or not name.isprintable():
+            raise ValueError(f"found the name {name!r}, accepted: a printable name without a dot")
+    return MappingProxyType(dict(value))
+
+
+Number = Annotated[float, BeforeValidator(number)]
+"""A finite number; integers are taken, booleans and strings are not."""
+
+Positive = Annotated[float, BeforeValidator(number), AfterValidator(_positive)]
+"""A finite number above zero."""
+
+NotNegative = Annotated[float, BeforeValidator(number), AfterValidator(_not_negative)]
+"""A number of zero or above."""
+
+Vector = Annotated[tuple[float, float, float], BeforeValidator(_vector)]
+"""Two or three finite numbers, kept as three (z = 0 where it is left out)."""
+
+Direction = Annotated[tuple[float, float, float], BeforeValidator(_vector), AfterValidator(_direction)]
+"""A vector of any length but zero."""
+
+Turn = Annotated[float | tuple[float, float, float], BeforeValidator(_turn)]
+"""A moment or a rotation: a number, about the axis that its place has, or a vector in the fixed axes."""
+
+Fraction = Annotated[float, BeforeValidator(number), AfterValidator(_fraction)]
+"""A fraction of a length, from 0 to 1."""
+
+Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
+"""One or more finite numbers."""
+
+Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]
+"""A read-only table by name."""
+
+
+class Record(BaseModel):
+    """Frozen data with known keys only; a wrong value raises :class:`SceneError` at construction."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise sentence(error, type(self)) from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restore, (type(self), self.to_dict())
+
+    def __deepcopy__(self: R, memo: dict[int, Any] | None = None) -> R:
+        return self
+
+    @classmethod
+    def from_dict(cls: type[R], values: Mapping[str, Any]) -> R:
+        """The record from a table of its keys, as a file gives it.
+
+        Raises
+        ------
+        SceneError
+            Anything that is not accepted.
+        """
+        if not isinstance(values, Mapping):
+            raise SceneError(f"found {say(values)}, accepted: a table")
+        return cls(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Tables, lists, texts and numbers; what stands at its default is left out, but for ``type``."""
+        pairs = ((name, getattr(self, name), field) for name, field in type(self).model_fields.items())
+        return {n: plain(v) for n, v, field in pairs if n == "type" or not _is_default(v, field)}
+
+    def replace(self: R, **changes: Any) -> R:
+        """A copy with other values, validated anew."""
+        kept = {name: getattr(self, name) for name in self.model_fields_set}
+        return type(self)(**{**kept, **changes})
+
+
+def counted(number: int, one: str, more: str | None = None) -> str:
+    """A number with what it counts: ``1 way out``, ``2 ways out``; without a third word the plural ends on s."""
+    return f"{number} {one if number == 1 else more or one + 's'}"
+
+
+def plain(value: Any) -> Any:
+    """A value of a record as tables, lists, texts and numbers."""
+    if isinstance(value, Record):
+        return value.to_dict()
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return [plain(entry) for entry in value] if isinstance(value, (tuple, list)) else value
+
+
+def _is_default(value: Any, field: FieldInfo) -> bool:
+    default = field.get_default(call_default_factory=True, validated_data={})
+    return bool(value is default or plain(value) == plain(default))
+
+
+def _restore(record: type[Record], values: dict[str, Any]) -> Record:
+    return record(**values)
+
+
+_KINDS = {
+    "string": "a text",
+    "bool": "true or false",
+    "tuple": "a list",
+    "list": "a list",
+    "model": "a table",
+    "dict": "a table",
+    "mapping": "a table",
+    "is": "one of its tables",
+}
+
+
+def sentence(error: ValidationError, record: type[BaseModel]) -> SceneError:
+    """The first finding of pydantic as one sentence with its place; unknown keys come first."""
+    findings = error.errors(include_url=False)
+    # a key is often missing because it is misspelt
+    finding = min(findings, key=lambda each: each["type"] != "extra_forbidden")
+    where = _place(finding["loc"], record)
+    context = finding.get("ctx", {})
+    match finding["type"]:
+        case "value_error" if isinstance(context["error"], SceneError):
+            return context["error"].within(*where)
+        case "value_error":
+            return SceneError(str(context["error"]), where)
+        case "extra_forbidden":
+            return SceneError(f"unknown key {say(where[-1])}; {nearest(where[-1], record.model_fields)}", where[:-1])
+        case "missing":
+            return SceneError(f"the key {where[-1]!r} is missing", where[:-1])
+        case "union_tag_not_found":
+            return SceneError("the key 'type' is missing", where)
+        case "union_tag_invalid":
+            return SceneError(_choice(context["tag"], context["expected_tags"]), (*where, "type"))
+        case "literal_error":
+            return SceneError(_choice(finding["input"], context["expected"]), where)
+    accepted = _KINDS.get(finding["type"].split("_")[0], finding["msg"].removeprefix("Input should be "))
+    return SceneError(f"found {say(finding['input'])}, accepted: {accepted}", where)
+
+
+def _place(loc: tuple[int | str, ...], record: type[BaseModel]) -> tuple[str, ...]:
+    """The keys on the way to a finding, without what pydantic adds to them."""
+    field = record.model_fields.get(str(loc[0])) if loc else None
+    tagged = field is not None and field.discriminator is not None
+    return tuple(str(part) for part in (loc[:1] + loc[2:] if tagged else loc) if part != "[key]")
+
+
+def _choice(found: Any, expected: str) -> str:
+    words = re.findall("'([^']*)'", expected)
+    return unknown(found, words) if isinstance(found, str) else f"found {say(found)}, accepted: {', '.join(words)}"

@@ -1,0 +1,423 @@
+"""The scene: what the user says, as frozen records that are checked when they are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field, model_validator
+
+from ..errors import SceneError
+from ..mathematics.quaternion import matrix
+from .contacts import Contact
+from .dimension import out_of_plane
+from .later import Staged
+from .loads import History, Load, Motion
+from .matrices import check_rigid_motion
+from .obstacles import check_start, members_of, obstacle
+from .records import Named, Vector, say, unknown
+from .sections import CrossSection
+from .shapes import CenterLine, place
+from .springs import Spring
+from .structure import SLIDING, Member, Node, released, unit
+from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
+from .task import Analysis, Expect
+
+__all__ = [
+    "Analysis",
+    "Contact",
+    "Expect",
+    "History",
+    "Load",
+    "Member",
+    "Motion",
+    "Node",
+    "Scene",
+    "Spring",
+    "check_loaded",
+]
+
+
+class Scene(Staged):
+    """Flexible members between nodes, how they are held, loaded and moved, and what is asked for.
+
+    Parameters
+    ----------
+    title, source : free text
+    dimension : plane (x-y), space, or auto: plane where everything lies in x-y
+    gravity : (3,), m/s2, fixed axes
+    sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only
+    analysis : what is asked for
+    expect : what is known about the answer
+
+    Raises
+    ------
+    SceneError
+        Anything that is not accepted: one sentence with its place.
+
+    Example
+    -------
+    >>> strip = CrossSection(EI3=1.0)
+    >>> nodes = {"A": Node(position=[0, 0], support="clamped"), "B": Node(position=[1, 0])}
+    >>> beam = Member(nodes=["A", "B"], section="strip")
+    >>> tip = Load(type="force", node="B", value=[0, 1])
+    >>> scene = Scene(sections={"strip": strip}, nodes=nodes, members={"beam": beam}, loads={"tip": tip})
+    >>> scene.resolved_dimension
+    'plane'
+    """
+
+    model_config = ConfigDict(validate_default=True)
+
+    title: str = ""
+    source: str = ""
+    dimension: Literal["auto", "plane", "space"] = "auto"
+    gravity: Vector | None = None
+    sections: Named[CrossSection] = Field(default_factory=dict)
+    nodes: Named[Node] = Field(default_factory=dict)
+    members: Named[Member] = Field(default_factory=dict)
+    springs: Named[Spring] = Field(default_factory=dict)
+    loads: Named[Load] = Field(default_factory=dict)
+    motions: Named[Motion] = Field(default_factory=dict)
+    histories: Named[History] = Field(default_factory=dict)
+    contacts: Named[Contact] = Field(default_factory=dict)
+    analysis: Analysis = Analysis()
+    expect: tuple[Expect, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Scene:
+        for rule in _RULES:
+            rule(self)
+        return self
+
+    @cached_property
+    def center_lines(self) -> Mapping[str, CenterLine]:
+        """The unloaded centre line of each member, by name."""
+        lines = {}
+        for name, member in self.members.items():
+            start, end = (self.nodes[node].position for node in (member.nodes[0], member.nodes[-1]))
+            lines[name] = place(member.shape, start, end, member.b2, ("members", name))
+        return MappingProxyType(lines)
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box of the undeformed members, m."""
+        samples = np.linspace(0.0, 1.0, 65)
+        points = np.vstack([line.positions(samples) for line in self.center_lines.values()])
+        return math.hypot(*np.ptp(points, axis=0))
+
+    def spring_axis(self, name: str) -> tuple[float, float, float]:
+        """Axis of a rotational spring, fixed axes of the undeformed scene: its own, or that of its node's joint."""
+        spring = self.springs[name]
+        return self.nodes[spring.node].joint_axis if spring.axis is None else spring.axis
+
+    @property
+    def resolved_dimension(self) -> Literal["plane", "space"]:
+        """How the scene is modelled: plane or space."""
+        return "plane" if self.dimension != "space" and self._out_of_plane is None else "space"
+
+    @property
+    def dimension_reason(self) -> str:
+        """Why the scene is modelled in the plane or in space."""
+        if self.dimension == "space":
+            return "dimension is set to 'space'"
+        if self._out_of_plane is None:
+            return "all positions, shapes, axes, loads and motions lie in x-y"
+        where, what = self._out_of_plane
+        return f"{'.'.join(where)} {what}"
+
+    @cached_property
+    def _out_of_plane(self) -> tuple[tuple[str, ...], str] | None:
+        return out_of_plane(
+            self.nodes,
+            self.center_lines,
+            self.loads,
+            self.motions,
+            self.springs,
+            self.gravity,
+            self.members,
+            self.contacts,
+        )
+
+
+def _check_members(scene: Scene) -> None:
+    if not scene.members:
+        raise SceneError("scene without members: a scene needs at least one member between two nodes")
+    for name, member in scene.members.items():
+        for node in member.nodes:
+            _known(node, scene.nodes, "nodes", "members", name, "nodes")
+        _known(member.section, scene.sections, "sections", "members", name, "section")
+    used = {node for member in scene.members.values() for node in member.nodes}
+    for name in scene.nodes:
+        if name not in used:
+            raise SceneError("node without member, accepted: a node where at least one member ends", ("nodes", name))
+
+
+def check_loaded(scene: Scene) -> None:
+    """Refuse a scene of which nothing moves or strains anything; it can be looked at, but there is nothing to solve.
+
+    Raises
+    ------
+    SceneError
+        There is no load, no motion, no gravity and no spring that is not at rest.
+    """
+    pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
+    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
+        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
+
+
+def _check_driven(scene: Scene) -> None:
+    for name, load in scene.loads.items():
+        _known(load.node, scene.nodes, "nodes", "loads", name, "node")
+        _known(load.member, scene.members, "members", "loads", name, "member")
+        _known(load.history, scene.histories, "histories", "loads", name, "history")
+    for name, motion in scene.motions.items():
+        _known(motion.node, scene.nodes, "nodes", "motions", name, "node")
+        _known(motion.history, scene.histories, "histories", "motions", name, "history")
+
+
+def _known(word: str | None, table: Iterable[str], kind: str, *where: str) -> None:
+    if word is not None and word not in table:
+        raise SceneError(unknown(word, table, kind), where)
+
+
+def _check_lengths(scene: Scene) -> None:
+    for name, line in scene.center_lines.items():
+        if not SHORTEST <= line.length <= LONGEST:
+            accepted = f"{SHORTEST:g} to {LONGEST:g} m, whose squares are still numbers"
+            raise SceneError(f"found a length of {line.length:.6g} m, accepted: {accepted}", ("members", name))
+
+
+SHORTEST, LONGEST = 1e-100, 1e100
+"""Of members, m."""
+
+
+def _check_releases(scene: Scene) -> None:
+    for name, member in scene.members.items():
+        for node, release in zip(member.nodes, member.release, strict=True):
+            joint = scene.nodes[node].joint
+            if release not in ("rigid", joint) and joint != "rigid":
+                message = (
+                    f"found {release!r} at node {node!r}, whose joint is {joint!r}, accepted: with a rigid joint only"
+                )
+                raise SceneError(message, ("members", name, "release"))
+
+
+def _check_axes(scene: Scene) -> None:
+    hinges, slides, universals = (
+        released(scene.nodes, scene.members, ends) for ends in (("hinge",), SLIDING, ("universal",))
+    )
+    for name, node in scene.nodes.items():
+        used = name in hinges or name in universals or node.has_hinge
+        if node.axis != (0.0, 0.0, 1.0) and not used:
+            message = "neither the support nor the joint nor a member end released here is a hinge with this axis"
+            raise SceneError(message, ("nodes", name, "axis"))
+        if node.direction is not None and not node.slides and name not in slides:
+            message = f"only a slider has a direction, and the support is {node.support!r}"
+            raise SceneError(message, ("nodes", name, "direction"))
+        if node.direction is None and name in slides:
+            message = "the key 'direction' is missing: a member end slides along its node"
+            raise SceneError(message, ("nodes", name))
+        if node.support != "slider" and node.rotation != "fixed":
+            found = f"found {node.rotation!r}, accepted: only for a slider, and the support is {node.support!r}"
+            raise SceneError(found, ("nodes", name, "rotation"))
+        _check_universal(name, node, name in universals)
+
+
+def _check_universal(name: str, node: Node, end: bool) -> None:
+    if not node.is_universal and not end:
+        if node.axis2 is not None:
+            message = "neither the support nor the joint nor a member end released here is a universal joint"
+            raise SceneError(message, ("nodes", name, "axis2"))
+        return
+    if node.axis2 is None:
+        raise SceneError("the key 'axis2' is missing: a universal joint has an axis on either side", ("nodes", name))
+    if abs(np.dot(unit(node.axis), unit(node.axis2))) > 1e-9:
+        message = f"found {say(node.axis2)}, accepted: a direction normal to the key 'axis', {say(node.axis)}"
+        raise SceneError(message, ("nodes", name, "axis2"))
+
+
+def _check_dimension(scene: Scene) -> None:
+    if scene.resolved_dimension == "space" and scene.dimension == "plane":
+        where = scene._out_of_plane[0] if scene._out_of_plane else ()
+        raise SceneError(f"dimension is set to 'plane', but {scene.dimension_reason}", where)
+
+
+def _check_sections(scene: Scene) -> None:
+    for name, member in scene.members.items():
+        missing = [] if member.section is None else list(scene.sections[member.section].missing(_needed(scene, name)))
+        if missing:
+            why = f"members.{name} needs it in {scene.resolved_dimension} ({scene.dimension_reason})"
+            if missing[0] == "rhoA":
+                why = "gravity acts on the mass per length"
+            raise SceneError(f"the key {missing[0]!r} is missing: {why}", ("sections", str(member.section)))
+        if member.stiffness is not None and member.mass is None and scene.gravity is not None:
+            raise SceneError("the key 'mass' is missing: gravity acts on the member", ("members", name))
+
+
+def _needed(scene: Scene, member: str) -> tuple[str, ...]:
+    in_plane = ("EI3",) if scene.center_lines[member].bending_axis == 3 else ("EI2",)
+    stiffness = in_plane if scene.resolved_dimension == "plane" else ("EI2", "EI3", "GJ")
+    needed: tuple[str, ...] = () if scene.members[member].type == "rigid" else stiffness
+    return needed if scene.gravity is None else (*needed, "rhoA")
+
+
+def _check_bodies(scene: Scene) -> None:
+    for name, member in scene.members.items():
+        if member.stiffness is None:
+            continue
+        try:
+            places = np.array([scene.nodes[node].position for node in member.nodes])
+            frame = matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0]
+            check_rigid_motion(member.stiffness, (places - places[0]) @ frame)
+        except SceneError as error:
+            raise error.within("members", name) from None
+
+
+def _check_loads(scene: Scene) -> None:
+    for name, load in scene.loads.items():
+        kind = "flexible" if load.member is None else scene.members[load.member].type
+        condensed = load.member is not None and scene.members[load.member].stiffness is not None
+        if kind == "small" and (condensed or load.type == "moment" or load.frame != "fixed"):
+            accepted = "a node there, or a fixed force or distributed load on a small member with a section"
+            raise SceneError(f"found the small member {load.member!r}, accepted: {accepted}", ("loads", name, "member"))
+        joint = "rigid" if load.node is None else scene.nodes[load.node].joint
+        if joint != "rigid" and load.type == "moment":
+            message = f"node {load.node!r} has no rotation of its own for a moment, as its joint is a {joint}"
+            raise SceneError(message, ("loads", name, "node"))
+        if joint != "rigid" and load.frame == "follower":
+            message = f"node {load.node!r} has no rotation of its own to follow, as its joint is a {joint}"
+            raise SceneError(message, ("loads", name, "node"))
+
+
+def _check_springs(scene: Scene) -> None:
+    for name, spring in scene.springs.items():
+        _known(spring.node, scene.nodes, "nodes", "springs", name, "node")
+        _known(spring.to, scene.nodes, "nodes", "springs", name, "to")
+        for party in spring.between or ():
+            ends = [n for n, m in scene.members.items() if spring.node in m.nodes]
+            if party not in ("ground", spring.node, *ends):
+                message = unknown(party, ("ground", spring.node, *ends), "parties")
+                raise SceneError(message, ("springs", name, "between"))
+        own = spring.between is None or spring.node in spring.between
+        if spring.type == "rotational" and own and scene.nodes[spring.node].joint != "rigid":
+            joint = scene.nodes[spring.node].joint
+            message = f"node {spring.node!r} has no rotation of its own, as its joint is a {joint}; name the members"
+            raise SceneError(message, ("springs", name, "between"))
+        if spring.axis is not None:
+            _check_spring_axis(name, spring, scene.nodes[spring.node])
+
+
+def _check_spring_axis(name: str, spring: Spring, node: Node) -> None:
+    """A hinge turns about its own axis only: a spring about another one would do nothing."""
+    parties = set(spring.between or ("ground", spring.node))
+    hinged = node.turn == "hinge" if parties == {"ground", spring.node} else node.joint == "hinge"
+    if not hinged or spring.axis is None or ("ground" in parties and spring.node not in parties):
+        return
+    if np.linalg.norm(np.cross(unit(spring.axis), unit(node.joint_axis))) > SKEW:
+        accepted = f"along the axis of the hinge at node {spring.node!r}, {say(node.joint_axis)}, or left out"
+        raise SceneError(f"found {say(spring.axis)}, accepted: {accepted}", ("springs", name, "axis"))
+
+
+SKEW = 1e-6
+"""Sine of the angle up to which an axis is along another one."""
+
+
+def _check_motions(scene: Scene) -> None:
+    reason = f"the scene is in space ({scene.dimension_reason})"
+    for name, motion in scene.motions.items():
+        try:
+            if motion.between is not None:
+                check_driven_joint(motion, scene.nodes[motion.node], scene.members)
+                continue
+            check_motion(motion, scene.nodes[motion.node], scene.resolved_dimension, reason)
+        except SceneError as error:
+            raise error.within("motions", name) from None
+    check_motions_once(scene.motions)
+
+
+def _check_supports(scene: Scene) -> None:
+    # What obstacles hold is known when it is found where members touch them.
+    if not scene.contacts:
+        check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+
+
+def _check_contacts(scene: Scene) -> None:
+    space = scene.resolved_dimension == "space"
+    for name, spring in scene.springs.items():
+        if spring.stop is not None and scene.analysis.type == "path":
+            message = "found a stop on a path, accepted: with analysis.type = 'static' and steps"
+            raise SceneError(message, ("springs", name, "stop"))
+    if scene.contacts and scene.analysis.branches:
+        message = (
+            f"found {scene.analysis.branches} with contacts, accepted: 0, as bifurcations in contact are not located"
+        )
+        raise SceneError(message, ("analysis", "branches"))
+    if scene.contacts and scene.analysis.equilibria == "all":
+        message = "found 'all' with contacts, accepted: 'one'; a node's 'start' chooses among several"
+        raise SceneError(message, ("analysis", "equilibria"))
+    for name, contact in scene.contacts.items():
+        _known(contact.member, scene.members, "members", "contacts", name, "member")
+        for member in contact.members if isinstance(contact.members, tuple) else ():
+            _known(member, scene.members, "members", "contacts", name, "members")
+        if contact.type == "point" and space:
+            message = f"found a point, accepted in space: a line, as {scene.dimension_reason}"
+            raise SceneError(message, ("contacts", name, "type"))
+        for member in members_of(contact, scene.members):
+            if scene.members[member].type == "small":
+                accepted = "flexible and rigid members, whose shape between their ends is known"
+                raise SceneError(
+                    f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
+                    ("contacts", name),
+                )
+            line = scene.center_lines[member]
+            try:
+                check_start(obstacle(contact, space), line.positions, line.tangents, scene.size)
+            except SceneError as error:
+                raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
+
+
+def _check_expect(scene: Scene) -> None:
+    tables = {
+        "nodes": scene.nodes,
+        "reactions": scene.nodes,
+        "members": scene.members,
+        "springs": scene.springs,
+        "motions": scene.motions,
+        "contacts": scene.contacts,
+    }
+    for i, expect in enumerate(scene.expect):
+        if expect.equilibrium is not None and scene.analysis.equilibria != "all":
+            message = "found with analysis.equilibria = 'one', accepted: with analysis.equilibria = 'all'"
+            raise SceneError(message, ("expect", str(i), "equilibrium"))
+        kind, _, rest = expect.quantity.partition(".")
+        if kind in tables:
+            _known(rest.partition(".")[0], tables[kind], kind, "expect", str(i), "quantity")
+        if expect.step is not None and not any(math.isclose(expect.step, f) for f in scene.analysis.steps):
+            accepted = f"a factor of analysis.steps, {say(scene.analysis.steps)}"
+            raise SceneError(f"found {expect.step:g}, accepted: {accepted}", ("expect", str(i), "step"))
+        for key in ("crossing", "limit_point", "bifurcation"):
+            if getattr(expect, key) is not None and scene.analysis.type != "path":
+                message = f"found the analysis {scene.analysis.type!r}, accepted: 'path' with this key"
+                raise SceneError(message, ("expect", str(i), key))
+
+
+_RULES: tuple[Callable[[Scene], None], ...] = (
+    _check_members,
+    _check_lengths,
+    _check_driven,
+    _check_axes,
+    _check_dimension,
+    _check_sections,
+    _check_releases,
+    _check_bodies,
+    _check_loads,
+    _check_springs,
+    _check_motions,
+    _check_supports,
+    _check_contacts,
+    _check_expect,
+)

@@ -1,0 +1,155 @@
+"""Scene files: TOML and JSON with the same keys, read into a scene and written from one."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneError
+from .records import say
+from .scene import Scene
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+try:
+    import tomli_w
+except ImportError:
+    tomli_w = None  # type: ignore[assignment]
+
+__all__ = ["dump", "load", "parse"]
+
+_ENDINGS = {".toml": "toml", ".json": "json"}
+
+
+def load(path: str | os.PathLike[str]) -> Scene:
+    """The scene in a file, TOML or JSON by its ending.
+
+    Raises
+    ------
+    SceneError
+        Missing, unreadable or empty file, syntax error, or anything that a scene does not accept; the
+        sentence starts with the path.
+    """
+    try:
+        return parse(_read(Path(path)), _format(Path(path)), Path(path).parent)
+    except SceneError as error:
+        raise SceneError(str(error), (os.fspath(path),)) from None
+
+
+def parse(text: str, format: str, folder: Path | None = None) -> Scene:
+    """The scene in a text.
+
+    Parameters
+    ----------
+    text : the content of a scene file
+    format : toml or json
+    folder : where files that the scene names are, unless they are named from the root; left out: where one is
+
+    Raises
+    ------
+    SceneError
+        Syntax error with its line, or anything that a scene does not accept.
+    """
+    if format not in _ENDINGS.values():
+        raise SceneError(f"found the format {format!r}, accepted: toml, json")
+    if not text.strip():
+        raise SceneError("the file is empty, accepted: a scene with sections, nodes and members")
+    try:
+        values = _values(text, format)
+        return Scene.from_dict(values if folder is None else _within(values, folder))
+    except RecursionError:
+        raise SceneError(f"not read as {format.upper()}: lists or tables are nested too deeply") from None
+
+
+def _values(text: str, format: str) -> Any:
+    """The tables of a text."""
+    try:
+        return tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
+    except SceneError:
+        raise
+    except ValueError as error:
+        raise SceneError(f"not read as {format.upper()}: {error}") from None
+
+
+def dump(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene, TOML or JSON by the ending of the path; a file there is replaced only as a whole.
+
+    Raises
+    ------
+    SceneError
+        Other ending, no permission, no space or no package for TOML; the sentence starts with the path.
+    """
+    try:
+        _write(Path(path), _text(scene, _format(Path(path))))
+    except SceneError as error:
+        raise SceneError(str(error), (os.fspath(path),)) from None
+
+
+def _format(path: Path) -> str:
+    if path.suffix.lower() not in _ENDINGS:
+        raise SceneError(f"found the ending {path.suffix!r}, accepted: {', '.join(_ENDINGS)}")
+    return _ENDINGS[path.suffix.lower()]
+
+
+def _read(path: Path) -> str:
+    _format(path)
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise SceneError("there is no such file") from None
+    except IsADirectoryError:
+        raise SceneError("this is a folder, accepted: a scene file") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"found a byte that is not UTF-8 at position {error.start}, accepted: UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise SceneError(f"the file cannot be read: {_reason(error)}") from None
+
+
+def _within(values: Any, folder: Path) -> Any:
+    """The values with the files of matrices named from the folder of the scene."""
+    members = values.get("members") if isinstance(values, dict) else None
+    for member in members.values() if isinstance(members, dict) else ():
+        for key in ("stiffness", "mass"):
+            if isinstance(member, dict) and isinstance(member.get(key), str):
+                member[key] = str(folder / member[key])
+    return values
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        keys = [key for key, _ in pairs]
+        double = next(key for key in keys if keys.count(key) > 1)
+        raise SceneError(f"not read as JSON: the key {say(double)} stands twice in one table")
+    return table
+
+
+def _text(scene: Scene, format: str) -> str:
+    if format == "json":
+        return json.dumps(scene.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if tomli_w is None:
+        raise SceneError("TOML cannot be written without the package tomli-w: install it or write .json")
+    return tomli_w.dumps(scene.to_dict())
+
+
+def _write(path: Path, text: str) -> None:
+    target = path.resolve()
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.replace(part, target)
+    except (OSError, ValueError) as error:
+        raise SceneError(f"the file cannot be written: {_reason(error)}") from None
+    finally:
+        part.unlink(missing_ok=True)

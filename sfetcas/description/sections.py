@@ -1,0 +1,366 @@
+"""Cross-sections: stiffness and mass per length about b1, b2, b3, constant or varying along the member."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal, final
+
+import numpy as np
+from numpy.polynomial import polynomial
+from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, BeforeValidator, TypeAdapter, model_validator
+
+from ..errors import SceneError
+from .records import Number, Numbers, Record, say
+
+__all__ = ["CrossSection", "Polynomial", "Table", "Varying", "breaks", "evaluate"]
+
+Floats = NDArray[np.float64]
+
+
+@final
+class Table(Record):
+    """Values at fractions of the length, linear between.
+
+    Parameters
+    ----------
+    at : (m,)
+        Fractions of the length, rising from 0 to 1, at least two.
+    value : (m,)
+        The values there.
+    """
+
+    at: Numbers
+    value: Numbers
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Table:
+        if len(self.at) < 2:
+            raise SceneError(f"found {len(self.at)} fractions, accepted: two or more, from 0 to 1", ("at",))
+        if len(self.at) != len(self.value):
+            found = f"found {len(self.value)} values at {len(self.at)} fractions"
+            raise SceneError(f"{found}, accepted: one at each", ("value",))
+        if self.at[0] != 0.0 or self.at[-1] != 1.0:
+            raise SceneError(f"found {self.at[0]:g} to {self.at[-1]:g}, accepted: from 0 to 1", ("at",))
+        for before, after in pairwise(self.at):
+            if after <= before:
+                raise SceneError(f"found {after:g} after {before:g}, accepted: rising fractions", ("at",))
+        return self
+
+
+@final
+class Polynomial(Record):
+    """c0 + c1 x + c2 x^2 + ... in x = s/L.
+
+    Parameters
+    ----------
+    polynomial : (m,)
+        The coefficients c0, c1, ..., at least one.
+    """
+
+    polynomial: Numbers
+
+
+_NUMBER: TypeAdapter[float] = TypeAdapter(Number)
+
+
+def _varying(value: Any) -> Any:
+    if isinstance(value, (Table, Polynomial)):
+        return value
+    if isinstance(value, Mapping) and "polynomial" in value:
+        return Polynomial(**value)
+    if isinstance(value, Mapping) and ("at" in value or "value" in value):
+        return Table(**value)
+    if isinstance(value, (Mapping, str, Iterable)) and getattr(value, "shape", None) != ():
+        accepted = "a number, {at = [..], value = [..]} or {polynomial = [..]}"
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return _NUMBER.validate_python(value)
+
+
+Quantity = float | Table | Polynomial
+Varying = Annotated[Quantity, BeforeValidator(_varying)]
+"""A quantity along a member: a number, a :class:`Table` or a :class:`Polynomial`."""
+
+
+def evaluate(varying: Quantity, x: ArrayLike) -> Floats:
+    """Values of a quantity along a member.
+
+    Parameters
+    ----------
+    varying : float, Table or Polynomial
+        The quantity.
+    x : (n,)
+        Fractions of the length.
+
+    Returns
+    -------
+    (n,) - in the unit of the quantity
+    """
+    x = np.atleast_1d(np.asarray(x, float))
+    if isinstance(varying, Table):
+        return np.asarray(np.interp(x, varying.at, varying.value))
+    if isinstance(varying, Polynomial):
+        return np.asarray(polynomial.polyval(x, varying.polynomial), float)
+    return np.full(x.shape, varying)
+
+
+def breaks(varying: Quantity) -> tuple[float, ...]:
+    """Fractions strictly between 0 and 1 where the slope of a quantity jumps or may jump."""
+    return varying.at[1:-1] if isinstance(varying, Table) else ()
+
+
+def _coefficients(varying: Quantity, left: float, right: float) -> Floats:
+    """Coefficients in x of a quantity that has no kink between left and right."""
+    if isinstance(varying, Polynomial):
+        return np.array(varying.polynomial)
+    ends = evaluate(varying, [left, right])
+    slope = (ends[1] - ends[0]) / (right - left)
+    return np.array([ends[0] - slope * left, slope])
+
+
+def _lowest(varying: Quantity, less: Quantity = 0.0) -> tuple[float, float]:
+    """Fraction and value of the minimum of varying - less on [0, 1]; rounding below zero counts as zero."""
+    edges = sorted({0.0, *breaks(varying), *breaks(less), 1.0})
+    candidates = list(edges)
+    for left, right in pairwise(edges):
+        difference = polynomial.polysub(_coefficients(varying, left, right), _coefficients(less, left, right))
+        # the real parts of all roots: a multiple root comes out as a cluster of nearly real ones
+        slope = polynomial.polytrim(polynomial.polyder(difference))
+        candidates += list(np.clip(polynomial.polyroots(slope).real, left, right))
+    values = evaluate(varying, candidates) - evaluate(less, candidates)
+    where = int(np.argmin(values))
+    terms = varying.polynomial if isinstance(varying, Polynomial) else ()
+    noise = 4.0 * np.finfo(float).eps * sum(map(abs, terms))
+    return float(candidates[where]), 0.0 if abs(values[where]) <= noise else float(values[where])
+
+
+def _bounded(varying: Quantity, accepted: str, zero: bool) -> Quantity:
+    where, lowest = _lowest(varying)
+    if lowest > 0.0 or (zero and lowest == 0.0):
+        return varying
+    if isinstance(varying, float):
+        raise ValueError(f"found {varying:g}, accepted: {accepted}")
+    raise ValueError(f"found {lowest:g} at {where:g} of the length, accepted: {accepted} everywhere")
+
+
+def _above_zero(varying: Quantity) -> Quantity:
+    return _bounded(varying, "a number above zero", zero=False)
+
+
+def _not_negative(varying: Quantity) -> Quantity:
+    return _bounded(varying, "zero or a number above zero", zero=True)
+
+
+def _three(value: Any) -> tuple[Any, ...]:
+    if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
+        raise ValueError(f"found {say(value)}, accepted: three numbers, about b1, b2 and b3")
+    entries = tuple(value)
+    if len(entries) != 3:
+        raise ValueError(f"found {len(entries)} numbers, accepted: three, about b1, b2 and b3")
+    return entries
+
+
+def _poisson(value: float) -> float:
+    if not -1.0 < value <= 0.5:
+        raise ValueError(f"found {value:g}, accepted: a number above -1 and up to 0.5")
+    return value
+
+
+Above = Annotated[Varying, AfterValidator(_above_zero)]
+Inertia = Annotated[Varying, AfterValidator(_not_negative)]
+
+Outline = Callable[..., tuple[Floats, Floats, Floats, Floats]]
+
+
+def _rectangle(width: Floats, height: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    long, short = np.maximum(width, height), np.minimum(width, height)
+    return (
+        width * height,
+        height * width**3 / 12.0,
+        width * height**3 / 12.0,
+        long * short**3 * _torsion_factor(long / short),
+    )
+
+
+def _torsion_factor(ratio: Floats) -> Floats:
+    """J / (long short^3) of a rectangle with the ratio of its sides >= 1.
+
+        1/3 - 64 / (pi^5 ratio) sum over odd n of tanh(n pi ratio / 2) / n^5
+
+    The sum of 1/n^5 is known; what tanh lacks to 1 falls like exp(-n pi ratio), so few terms give all digits.
+
+    Source: Timoshenko and Goodier, Theory of Elasticity, torsion of rectangular bars (Saint-Venant).
+    """
+    n = np.arange(1.0, 15.0, 2.0)
+    decay = np.exp(-np.pi * n * ratio[:, None])
+    odd = 31.0 / 32.0 * 1.0369277551433699263  # zeta(5)
+    total = odd - np.sum(2.0 * decay / (1.0 + decay) / n**5, axis=1)
+    return np.asarray(1.0 / 3.0 - 64.0 / (np.pi**5 * ratio) * total)
+
+
+def _circle(radius: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    second = np.pi * radius**4 / 4.0
+    return np.pi * radius**2, second, second, 2.0 * second
+
+
+def _tube(outer: Floats, inner: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    # factored, since the difference of fourth powers of a thin wall loses digits
+    area = np.pi * (outer - inner) * (outer + inner)
+    second = area * (outer**2 + inner**2) / 4.0
+    return area, second, second, 2.0 * second
+
+
+_OUTLINES: dict[str, tuple[tuple[str, ...], Outline]] = {
+    "rectangle": (("width", "height"), _rectangle),
+    "circle": (("radius",), _circle),
+    "tube": (("outer", "inner"), _tube),
+}
+_NUMBERS = ("EI2", "EI3", "GJ", "rhoA", "rhoI")
+_MATERIAL = ("E", "nu", "G", "rho")
+_DIMENSIONS = ("width", "height", "radius", "outer", "inner")
+
+
+@final
+class CrossSection(Record):
+    """Stiffness and mass of a member per length, as numbers or as a shape with a material.
+
+    Each quantity but nu may vary along the member (a :class:`Table` or a :class:`Polynomial`).
+
+    Parameters
+    ----------
+    EI2, EI3 : N m2
+        Bending stiffness about b2, b3.
+    GJ : N m2
+        Torsional stiffness about b1, the tangent.
+    rhoA : kg/m
+        Mass per length.
+    rhoI : (3,) kg m
+        Rotary inertia per length about b1, b2, b3; zero where it is left out.
+    shape : rectangle (width along b3, height along b2), circle (radius) or tube (outer, inner radius), in m
+    E, G : N/m2
+        Young's and shear modulus.
+    nu : 1
+        Poisson's ratio in place of G.
+    rho : kg/m3
+        Density.
+
+    Raises
+    ------
+    SceneError
+        A stiffness or mass not above zero somewhere, numbers mixed with a shape, a shape without E or with
+        dimensions of another, or nothing at all.
+    """
+
+    EI2: Above | None = None
+    EI3: Above | None = None
+    GJ: Above | None = None
+    rhoA: Above | None = None
+    rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
+    shape: Literal["rectangle", "circle", "tube"] | None = None
+    E: Above | None = None
+    nu: Annotated[Number, AfterValidator(_poisson)] | None = None
+    G: Above | None = None
+    rho: Above | None = None
+    width: Above | None = None
+    height: Above | None = None
+    radius: Above | None = None
+    outer: Above | None = None
+    inner: Above | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> CrossSection:
+        numbers = self._given(_NUMBERS)
+        if self.shape is not None:
+            if numbers:
+                raise SceneError(
+                    f"found {numbers[0]!r} together with shape = {self.shape!r}, accepted: either "
+                    f"{', '.join(_NUMBERS)} or a shape with {', '.join(_MATERIAL)} and its dimensions"
+                )
+            self._check_shape(self.shape)
+        elif outlined := self._given(_MATERIAL + _DIMENSIONS):
+            raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
+        elif not numbers:
+            raise SceneError(f"found nothing in it, accepted: {', '.join(_NUMBERS)} or a shape")
+        return self
+
+    def _given(self, names: Iterable[str]) -> list[str]:
+        return [name for name in names if getattr(self, name) is not None]
+
+    def _check_shape(self, shape: str) -> None:
+        needed = _OUTLINES[shape][0]
+        for name in self._given(_DIMENSIONS):
+            if name not in needed:
+                raise SceneError(f"found {name!r} for a {shape}, accepted: {' and '.join(needed)}")
+        for name in (*needed, "E"):
+            if getattr(self, name) is None:
+                raise SceneError(f"the key {name!r} is missing, a {shape} needs {', '.join(needed)} and E")
+        if self.nu is not None and self.G is not None:
+            raise SceneError("found both nu and G, accepted: one of them, the other follows from E")
+        if self.outer is not None and self.inner is not None:
+            self._check_wall(self.outer, self.inner)
+
+    def _check_wall(self, outer: Quantity, inner: Quantity) -> None:
+        where, wall = _lowest(outer, inner)
+        if wall <= 0.0:
+            radii = f"inner {evaluate(inner, where)[0]:g} and outer {evaluate(outer, where)[0]:g}"
+            raise SceneError(f"found {radii} at {where:g} of the length, accepted: inner below outer")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Fractions strictly between 0 and 1 where the slope of some quantity jumps, rising."""
+        names = ("EI2", "EI3", "GJ", "rhoA", "E", "G", "rho", *_DIMENSIONS)
+        varying = [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
+        return tuple(sorted({kink for item in varying for kink in breaks(item)}))
+
+    def missing(self, names: Iterable[str]) -> list[str]:
+        """Which of EI2, EI3, GJ, rhoA (N m2, kg/m) this section cannot tell, in the order asked."""
+        if self.shape is None:
+            known = set(self._given(_NUMBERS)) | {"rhoI"}
+        else:
+            known = {"EI2", "EI3"}
+            known |= {"GJ"} if self._given(("nu", "G")) else set()
+            known |= {"rhoA", "rhoI"} if self.rho is not None else set()
+        return [name for name in names if name not in known]
+
+    def stiffness(self, x: ArrayLike) -> Floats:
+        """Stiffness along the member.
+
+        Parameters
+        ----------
+        x : (n,)
+            Fractions of the length.
+
+        Returns
+        -------
+        (n, 3) - GJ, EI2, EI3 in N m2 (about b1, b2, b3), nan where not known
+        """
+        if self.shape is None:
+            return np.stack([self._value(name, x) for name in ("GJ", "EI2", "EI3")], axis=1)
+        _, about_2, about_3, torsion = self._outline(x)
+        young = self._value("E", x)
+        shear = self._value("G", x) if self.nu is None else young / (2.0 * (1.0 + self.nu))
+        return np.stack([shear * torsion, young * about_2, young * about_3], axis=1)
+
+    def mass(self, x: ArrayLike) -> Floats:
+        """Mass per length: x (n,) fractions of the length -> (n,) kg/m, nan where not known."""
+        return self._value("rhoA", x) if self.shape is None else self._value("rho", x) * self._outline(x)[0]
+
+    def inertia(self, x: ArrayLike) -> Floats:
+        """Rotary inertia per length: x (n,) fractions -> (n, 3) kg m about b1, b2, b3.
+
+        Zero for a section of numbers without rhoI, nan for a shape without rho.
+        """
+        if self.shape is None:
+            return np.stack([evaluate(item, x) for item in self.rhoI or (0.0, 0.0, 0.0)], axis=1)
+        _, about_2, about_3, _ = self._outline(x)
+        return self._value("rho", x)[:, None] * np.stack([about_2 + about_3, about_2, about_3], axis=1)
+
+    def _value(self, name: str, x: ArrayLike) -> Floats:
+        varying = getattr(self, name)
+        return evaluate(np.nan if varying is None else varying, x)
+
+    def _outline(self, x: ArrayLike) -> tuple[Floats, Floats, Floats, Floats]:
+        """Area (m2), second moments about b2 and b3 and torsion constant (m4), each (n,)."""
+        dimensions, outline = _OUTLINES[self.shape or ""]
+        return outline(*(self._value(name, x) for name in dimensions))

@@ -1,0 +1,90 @@
+"""Springs between members, nodes and the ground."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, model_validator
+
+from ..errors import SceneError
+from .later import Staged
+from .records import Direction, Number, Vector, listed, number, say
+
+__all__ = ["Spring"]
+
+
+def _stiffness(value: Any) -> float:
+    stiffness = number(value)
+    if stiffness < 0.0:
+        raise ValueError(f"found {stiffness:g}, accepted: zero or a number above zero, N/m or N m")
+    return stiffness
+
+
+def _parties(value: Any) -> tuple[Any, ...]:
+    accepted = "a list of two: 'ground', a member that ends at the node, or the node itself"
+    entries = listed(value, accepted)
+    if len(entries) != 2:
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return entries
+
+
+def _stop(value: Any) -> tuple[float, float]:
+    accepted = "[low, high] with zero, the undeformed scene, between them or at one end"
+    entries = tuple(number(entry) for entry in listed(value, accepted))
+    if len(entries) != 2 or not entries[0] <= 0.0 <= entries[1] or entries[0] == entries[1]:
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return entries[0], entries[1]
+
+
+class Spring(Staged):
+    """A rotational spring at a node, or a translational one between two nodes or a node and the ground.
+
+    Parameters
+    ----------
+    type : rotational or translational
+    node : name of the node
+    stiffness : N m, or N/m of a translational one
+    axis : (3,), fixed axes of the undeformed scene - of a rotational spring; turns with the first party, at a
+        universal joint with the side that has this axis; left out: the axis about which the node's hinge turns
+    between : rotational: the two parties, of ground, the node, or members that end there; the angle is that of the
+        second against the first since the undeformed scene; left out: the ground and the node
+    rest : rad - angle at which it gives no moment; of a translational spring with a direction m, the travel
+    to : translational: the other node; left out: the ground
+    anchor : (3,), m - where it is fixed to the ground; left out: the place of the node in the undeformed scene
+    length : m - free length of a translational spring; left out: the distance in the undeformed scene
+    direction : (3,), fixed axes - a translational spring that acts along this direction only
+    stop : [low, high], rad, or m of a spring with a direction - the angle or travel goes no further; statics only
+    """
+
+    type: Literal["rotational", "translational"] = "rotational"
+    node: str
+    stiffness: Annotated[float, BeforeValidator(_stiffness)]
+    axis: Direction | None = None
+    between: Annotated[tuple[str, str], BeforeValidator(_parties)] | None = None
+    rest: Number = 0.0
+    to: str | None = None
+    anchor: Vector | None = None
+    length: Annotated[float, BeforeValidator(_stiffness)] | None = None
+    direction: Direction | None = None
+    stop: Annotated[tuple[float, float], BeforeValidator(_stop)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Spring:
+        turning = self.type == "rotational"
+        useless = ("to", "anchor", "length", "direction") if turning else ("between", "axis")
+        for key in useless:
+            if key in self.model_fields_set and getattr(self, key) is not None:
+                raise SceneError(f"not accepted: the spring is {self.type}", (key,))
+        if self.to is not None and self.to == self.node:
+            raise SceneError(f"found {self.to!r}, which is the node itself, accepted: another node", ("to",))
+        if self.to is not None and self.anchor is not None:
+            raise SceneError("found the keys 'to' and 'anchor', accepted: one of them")
+        if self.between is not None and self.between[0] == self.between[1]:
+            raise SceneError(f"found {self.between[0]!r} twice, accepted: two parties", ("between",))
+        if not turning and self.direction is None and "rest" in self.model_fields_set:
+            raise SceneError("accepted with a direction only; the free length is the key 'length'", ("rest",))
+        if self.stop is not None and not turning and self.direction is None:
+            raise SceneError("accepted with a rotational spring, or with a direction", ("stop",))
+        if self.direction is not None and self.length is not None:
+            raise SceneError("accepted without a direction only; with one it is the key 'rest'", ("length",))
+        return self

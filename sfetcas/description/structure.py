@@ -1,0 +1,232 @@
+"""Nodes and the members between them."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, model_validator
+
+from ..errors import SceneError
+from .later import Staged
+from .matrices import Mass, Stiffness, check_mass, check_stiffness
+from .records import Direction, NotNegative, Vector, counted, listed, say
+from .shapes import Shape, Straight
+
+__all__ = ["SLIDING", "Member", "Node", "released", "unit"]
+
+
+def unit(direction: Iterable[float]) -> tuple[float, float, float]:
+    """The direction with length one, also where its square is no number of the machine."""
+    x, y, z = direction
+    largest = max(abs(x), abs(y), abs(z))
+    x, y, z = x / largest, y / largest, z / largest
+    length = (x * x + y * y + z * z) ** 0.5
+    return (x / length, y / length, z / length)
+
+
+def _count(value: Any) -> int:
+    try:
+        count = operator.index(value)
+    except TypeError:
+        count = 0
+    if isinstance(value, bool) or not 1 <= count <= 1_000_000:
+        raise ValueError(f"found {say(value)}, accepted: a whole number from 1 to 1000000")
+    return count
+
+
+def _ends(value: Any) -> tuple[Any, ...]:
+    accepted = "a list of two, or more for a small member, one for each end"
+    entries = listed(value, accepted)
+    if len(entries) < 2:
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return entries
+
+
+def _weld(value: Any) -> Any:
+    return "rigid" if value == "weld" else value
+
+
+def _welds(value: Any) -> tuple[Any, ...]:
+    return tuple(_weld(entry) for entry in _ends(value))
+
+
+Turning = Annotated[Literal["rigid", "hinge", "ball", "universal"], BeforeValidator(_weld)]
+Release = Literal["rigid", "hinge", "ball", "universal", "slider", "cylindrical", "slot"]
+
+SLIDING = ("slider", "cylindrical", "slot")
+"""Releases whose end slides along its node."""
+Count = Annotated[int, BeforeValidator(_count)]
+
+
+class Node(Staged):
+    """A point where members end, are joined and are held.
+
+    Parameters
+    ----------
+    position : (3,), m, fixed axes - in the undeformed scene
+    support : what holds the node: free, clamped, hinge (about axis), ball, universal (about axis, fixed in the
+        ground, and axis2, fixed in the node), slider (along direction) or cylindrical (along and about direction)
+    axis : (3,), fixed axes - of the hinges of this node: support, joint, or member ends released here; of a
+        universal joint the axis in the first side (ground, node or first member end)
+    axis2 : (3,), fixed axes - of a universal joint the axis in the other side, normal to the first
+    direction : (3,), fixed axes - the guide of a slider; for member ends released as slider or cylindrical the
+        line along which they slide, which turns with the node
+    rotation : how a slider turns: fixed, hinge (about axis) or ball
+    joint : how the member ends are joined: rigid (or weld), hinge (about axis), ball or universal; but for the
+        first case each end turns against every other and the node has no rotation of its own
+    mass : kg, lumped in the node; has weight where there is gravity
+    inertia : (3,), kg m2, of the lumped mass; for dynamics
+    start : (3,), m, fixed axes - roughly where the node ends up, as a first guess
+    """
+
+    position: Vector
+    support: Literal["free", "clamped", "hinge", "ball", "slider", "cylindrical", "universal"] = "free"
+    axis: Direction = (0.0, 0.0, 1.0)
+    axis2: Direction | None = None
+    direction: Direction | None = None
+    rotation: Literal["fixed", "hinge", "ball"] = "fixed"
+    joint: Turning = "rigid"
+    mass: NotNegative = 0.0
+    inertia: Vector | None = None
+    start: Vector | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Node:
+        if self.slides and self.direction is None:
+            raise SceneError("the key 'direction' is missing: a slider needs the direction of its guide")
+        if self.support != "slider" and self.rotation != "fixed":
+            raise SceneError(
+                f"found {self.rotation!r}, accepted: only for a slider, and the support is {self.support!r}",
+                ("rotation",),
+            )
+        return self
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is held but for one direction."""
+        return self.support in ("slider", "cylindrical")
+
+    @property
+    def has_hinge(self) -> bool:
+        """Whether its support or its joint turns about the axis."""
+        return "hinge" in (self.support, self.rotation, self.joint) or self.is_universal
+
+    @property
+    def is_universal(self) -> bool:
+        """Whether its support or its joint needs a second axis."""
+        return "universal" in (self.support, self.joint)
+
+    @property
+    def turn(self) -> Literal["free", "fixed", "hinge", "ball", "universal"]:
+        """How the ground lets the node turn."""
+        if self.support == "slider":
+            return self.rotation
+        if self.support == "cylindrical":
+            return "hinge"
+        return "fixed" if self.support == "clamped" else self.support
+
+    @property
+    def turn_axis(self) -> tuple[float, float, float]:
+        """Axis about which its support lets it turn: the direction of a cylindrical one."""
+        return self.direction if self.support == "cylindrical" and self.direction is not None else self.axis
+
+    @property
+    def joint_axis(self) -> tuple[float, float, float]:
+        """Axis about which its support or its joint turns: the direction of a cylindrical one."""
+        cylindrical = self.direction is not None and "cylindrical" in (self.support, self.joint)
+        return self.direction if cylindrical and self.direction is not None else self.axis
+
+
+class Member(Staged):
+    """A member between nodes: a flexible inextensible beam, a rigid body, or a body of small deformation.
+
+    Parameters
+    ----------
+    nodes : names of the nodes at its first and second end; a small member with a stiffness may have more
+    section : name of the cross-section; a rigid member needs it for its mass only, a small one has it instead of
+        a stiffness
+    type : flexible, rigid, or small (linear elasticity in a frame that the member carries)
+    shape : the unloaded centre line
+    b2 : (3,), fixed axes - direction of the section's axis b2 at the first end; left out: b3 along z
+        where the member lies in x-y
+    element : SFET2 to SFET9, by the nodes of an element; left out: chosen by the accuracy
+    elements : number of elements, 1 to 1000000; left out: chosen by the accuracy
+    release : how each end is joined to its node: rigid (or weld), hinge (about the node's axis), ball, universal,
+        slider (along the node's direction), cylindrical (along and about it) or slot (along it, turning freely)
+    stiffness : (6 n, 6 n), N/m, N, N m - of a small member: forces and moments at its n nodes by displacements
+        and rotations (x, y, z, about x, y, z at the first node, then at the next), along the section's axes b1,
+        b2, b3 at its start; or the name of a file, .npz (array ``stiffness``, or the only one) or Matrix Market;
+        in a scene file relative to its folder
+    mass : (6 n, 6 n), kg, kg m, kg m2 - of a small member, in the same way; for its weight and for dynamics
+    """
+
+    nodes: Annotated[tuple[str, ...], BeforeValidator(_ends)]
+    section: str | None = None
+    type: Literal["flexible", "rigid", "small"] = "flexible"
+    shape: Shape = Straight()
+    b2: Direction | None = None
+    element: Literal["SFET2", "SFET3", "SFET4", "SFET5", "SFET6", "SFET7", "SFET8", "SFET9"] | None = None
+    elements: Count | None = None
+    release: Annotated[tuple[Release, ...], BeforeValidator(_welds)] = ("rigid", "rigid")
+    stiffness: Stiffness | None = None
+    mass: Mass | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _released(cls, values: Any) -> Any:
+        """Ends are rigid unless said otherwise, however many there are."""
+        if isinstance(values, Mapping) and "release" not in values and len(values.get("nodes") or ()) > 2:
+            return {**values, "release": ("rigid",) * len(values["nodes"])}
+        return values
+
+    @model_validator(mode="after")
+    def _check(self) -> Member:
+        if len(set(self.nodes)) < len(self.nodes):
+            double = next(n for n in self.nodes if self.nodes.count(n) > 1)
+            at, accepted = (
+                ("both ends", "two different nodes") if len(self.nodes) == 2 else ("two ends", "different ones")
+            )
+            raise SceneError(f"found {double!r} at {at}, accepted: {accepted}", ("nodes",))
+        if len(self.nodes) > 2 and self.type != "small":
+            message = f"found {len(self.nodes)} nodes, accepted: two; only a small member may have more"
+            raise SceneError(message, ("nodes",))
+        if len(self.release) != len(self.nodes):
+            found = counted(len(self.release), "entry", "entries")
+            message = f"found {found}, accepted: one for each of {len(self.nodes)} nodes"
+            raise SceneError(message, ("release",))
+        self._check_kind()
+        return self
+
+    def _check_kind(self) -> None:
+        """What each type needs and what it has no use for."""
+        if self.type != "small":
+            for key in ("stiffness", "mass"):
+                if getattr(self, key) is not None:
+                    raise SceneError(f"only a small member has a matrix, and the type is {self.type!r}", (key,))
+        if self.type != "flexible":
+            for key in ("element", "elements"):
+                if getattr(self, key) is not None:
+                    raise SceneError(f"a {self.type} member is not cut into elements; only a flexible one is", (key,))
+        if self.type == "flexible" and self.section is None:
+            raise SceneError("the key 'section' is missing: a flexible member needs a cross-section")
+        if self.type == "small" and (self.section is None) == (self.stiffness is None):
+            raise SceneError("accepted for a small member: either a section or a stiffness, one of them")
+        if len(self.nodes) > 2 and self.stiffness is None:
+            raise SceneError("the key 'stiffness' is missing: a small member with more than two nodes needs it")
+        if self.stiffness is not None:
+            check_stiffness(self.stiffness, len(self.nodes))
+        if self.mass is not None:
+            check_mass(self.mass, len(self.nodes), self.stiffness is not None)
+
+
+def released(nodes: Mapping[str, Node], members: Mapping[str, Member], how: Iterable[str]) -> set[str]:
+    """Names of the nodes at which a member end is released in one of these ways."""
+    kinds = set(how)
+    return {
+        node
+        for member in members.values()
+        for node, release in zip(member.nodes, member.release, strict=True)
+        if release in kinds
+    }

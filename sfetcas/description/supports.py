@@ -1,0 +1,186 @@
+"""What supports hold, and which motions they can be given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .loads import Motion
+from .records import say
+from .springs import Spring
+from .structure import SLIDING, Member, Node, unit
+
+__all__ = ["check_driven_joint", "check_floating", "check_motion", "check_motions_once", "drives"]
+
+Floats = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+
+def drives(node: Node, displacement: Triple | None) -> bool:
+    """Whether a displacement drives a slider along its guide: it has a component along it."""
+    if not node.slides or node.direction is None or displacement is None or not any(displacement):
+        return False
+    return bool(abs(np.dot(unit(displacement), unit(node.direction))) > 1e-12)
+
+
+def held_directions(node: Node, displacement: Triple | None = None) -> Floats:
+    """(k, 3): directions in which the ground holds the node, a slider that is driven in all of them."""
+    if node.support == "free":
+        return np.zeros((0, 3))
+    if not node.slides or node.direction is None or drives(node, displacement):
+        return np.eye(3)
+    return np.eye(3) - np.outer(unit(node.direction), unit(node.direction))
+
+
+def components(
+    nodes: Iterable[str], members: Mapping[str, Member], springs: Mapping[str, Spring]
+) -> Iterator[list[str]]:
+    """The names of the nodes of each part that members and springs connect."""
+    neighbours: dict[str, list[str]] = {name: [] for name in nodes}
+    pairs = [(m.nodes[0], other) for m in members.values() for other in m.nodes[1:]]
+    for first, second in pairs + [(s.node, s.to) for s in springs.values() if s.to is not None]:
+        neighbours[first].append(second)
+        neighbours[second].append(first)
+    left = dict.fromkeys(neighbours)
+    while left:
+        part = [next(iter(left))]
+        del left[part[0]]
+        for name in part:
+            new = [other for other in dict.fromkeys(neighbours[name]) if other in left]
+            part += new
+            for other in new:
+                del left[other]
+        yield part
+
+
+def free_directions(held: Floats, dimension: str) -> Floats:
+    """(k, 3): unit directions across all of the held ones, within x-y in a plane scene."""
+    axes = 2 if dimension == "plane" else 3
+    if not len(held):
+        return np.eye(3)[:axes]
+    _, values, rows = np.linalg.svd(held[:, :axes], full_matrices=False)
+    return np.pad(rows[values < 1e-9], ((0, 0), (0, 3 - axes)))
+
+
+def check_floating(
+    nodes: Mapping[str, Node],
+    members: Mapping[str, Member],
+    springs: Mapping[str, Spring],
+    motions: Mapping[str, Motion],
+    dimension: str,
+) -> None:
+    """Refuse a part of the structure that supports do not hold in every direction.
+
+    Raises
+    ------
+    SceneError
+        Names the nodes of the part and how it can move.
+    """
+    moved = {motion.node: motion.displacement for motion in motions.values() if motion.displacement is not None}
+    sprung: dict[str, list[Floats]] = {name: [] for name in nodes}
+    for spring in springs.values():
+        if spring.type == "translational" and spring.to is None and spring.stiffness > 0.0:
+            along = spring.direction
+            sprung[spring.node].append(np.eye(3) if along is None else np.array([unit(along)]))
+    for part in components(nodes, members, springs):
+        held = np.vstack([held_directions(nodes[name], moved.get(name)) for name in part])
+        held = np.vstack([held, *(rows for name in part for rows in sprung[name])])
+        free = free_directions(held, dimension)
+        if len(free):
+            raise SceneError(_floating(part, held, free))
+
+
+def _floating(part: list[str], held: Floats, free: Floats) -> str:
+    listed = ", ".join(part[:6]) + (", ..." if len(part) > 6 else "")
+    if not len(held):
+        axes = "x, y" if len(free) == 2 else "x, y, z"
+        return f"nothing holds nodes {listed}: free to move along {axes} and to turn; add a support"
+    along = " and ".join(_rounded(direction) for direction in free)
+    return f"the supports of nodes {listed} leave them free to move along {along}; add a support"
+
+
+def _rounded(direction: Floats) -> str:
+    sign = np.sign(direction[np.argmax(np.abs(direction) > 1e-9)])
+    return "[" + ", ".join(f"{round(sign * entry, 4) + 0.0:g}" for entry in direction) + "]"
+
+
+def check_motions_once(motions: Mapping[str, Motion]) -> None:
+    """Refuse two motions of the same kind of one node.
+
+    Raises
+    ------
+    SceneError
+        Names both.
+    """
+    taken: dict[tuple[str, str, tuple[str, str] | None], str] = {}
+    for name, motion in motions.items():
+        for kind in ("displacement", "rotation"):
+            if getattr(motion, kind) is None:
+                continue
+            other = taken.setdefault((motion.node, kind, motion.between), name)
+            if other != name:
+                message = f"node {motion.node!r} has a {kind} from motions.{other} already"
+                raise SceneError(message, ("motions", name, kind))
+
+
+def check_motion(motion: Motion, node: Node, dimension: str, reason: str) -> None:
+    """Refuse what the support of the node does not hold, and a rotation in the wrong form.
+
+    Raises
+    ------
+    SceneError
+        Place within the motion.
+    """
+    if node.support == "free":
+        accepted = "a node with a support (a slider leaves it one direction), or a joint with the key 'between'"
+        raise SceneError(f"found {motion.node!r}, which is free and cannot be moved, accepted: {accepted}", ("node",))
+    if motion.rotation is not None:
+        _check_rotation(motion, node, dimension, reason)
+
+
+def _check_rotation(motion: Motion, node: Node, dimension: str, reason: str) -> None:
+    where, found = ("rotation",), say(motion.rotation)
+    number = isinstance(motion.rotation, float)
+    if node.joint != "rigid":
+        message = f"node {motion.node!r} has no rotation of its own, as its joint is a {node.joint}"
+        raise SceneError(message, where)
+    if node.turn == "ball":
+        accepted = "only nodes that are clamped, a hinge or a slider that does not turn as a ball can be turned"
+        raise SceneError(f"node {motion.node!r} turns freely as a ball; {accepted}", where)
+    if node.turn == "hinge" and not number:
+        raise SceneError(f"found {found}, accepted: a number, the angle about the axis of the hinge", where)
+    if node.turn == "fixed" and number and dimension == "space":
+        raise SceneError(f"found {found}, accepted: a rotation vector [x, y, z], as {reason}", where)
+
+
+def check_driven_joint(motion: Motion, node: Node, members: Mapping[str, Member]) -> None:
+    """Refuse to drive what is no hinge or slide between two members.
+
+    Raises
+    ------
+    SceneError
+        Place within the motion.
+    """
+    assert motion.between is not None
+    how = []
+    for name in motion.between:
+        member = members.get(name)
+        if member is None or motion.node not in member.nodes:
+            raise SceneError(f"found {name!r}, accepted: two members that end at {motion.node!r}", ("between",))
+        release = member.release[member.nodes.index(motion.node)]
+        how.append(node.joint if node.joint != "rigid" else release)
+    if motion.rotation is not None and (
+        not isinstance(motion.rotation, float) or not {"hinge", "cylindrical"} & {*how}
+    ):
+        accepted = "a number, the angle of a hinge between the two members"
+        raise SceneError(
+            f"found {say(motion.rotation)} where they are joined {' and '.join(how)}, accepted: {accepted}",
+            ("rotation",),
+        )
+    if motion.displacement is not None and how[1] not in SLIDING:
+        raise SceneError(
+            f"the second member is joined as {how[1]}, accepted: as slider, cylindrical or slot", ("displacement",)
+        )

@@ -1,0 +1,105 @@
+"""The meshes of a run of statics, chosen or asked for, and an equilibrium on one of them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mechanics.elements import ELEMENTS
+from ..mechanics.mesh import Mesh, first_mesh, uniform_mesh
+from ..mechanics.model import assemble
+from ..solvers.newton import Corrected
+from ..solvers.prepared import Prepared
+from ..solvers.stability import Stability
+from .settings import Settings
+
+__all__ = ["PILOT_ELEMENTS", "Found", "Meshing"]
+
+FINE = 1e-8
+"""Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
+
+PILOT_ELEMENTS = 60
+"""A mesh that was asked for is its own pilot up to this many elements."""
+
+PILOT_ORDER = 4
+"""Coarse meshes of lower order have equilibria that no beam has."""
+
+
+@dataclass
+class Found:
+    """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other."""
+
+    prepared: Prepared
+    corrected: Corrected
+    stability: Stability
+    notes: tuple[str, ...] = ()
+    iterations: int = 0
+    left: tuple[float, ...] = ()
+    kept: bool = False
+
+
+class Meshing:
+    """A scene with its settings, and the meshes to solve it on: the pilot and the one that is asked for.
+
+    Attributes
+    ----------
+    scene, settings, stops
+        As given to :func:`~sfetcas.equilibria.statics.solve`.
+    accuracy : float
+        Wanted error; ``asked`` says whether to be short of it matters.
+    seconds : dict
+        Time spent on models and on solving.
+    target, pilot_mesh : Mesh
+        Where to arrive, and where to begin.
+    fixed : set of str
+        Members whose number of elements is asked for.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
+        self.scene, self.settings, self.stops = scene, settings, stops
+        self.accuracy = settings.accuracy or scene.analysis.accuracy
+        self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
+        self.seconds = {"model": 0.0, "solve": 0.0}
+        self.assembly: Any = settings.assembly
+        self._choose_meshes()
+        # Where the mesh is the library's own, its default accuracy is a promise as well.
+        self.asked = self.asked or not self.fixed
+
+    def _choose_meshes(self) -> None:
+        scene, settings = self.scene, self.settings
+        names: set[str] = {m.element for m in scene.members.values() if m.element is not None}
+        if settings.element is not None:
+            names = {settings.element}
+        if len(names) > 1:
+            raise SceneError(f"members: found the elements {', '.join(sorted(names))}, accepted: one for all members")
+        name = next(iter(names), "SFET7" if self.accuracy < FINE else "SFET5")
+        order = ELEMENTS.index(name) + 1
+        # A coarser turning an element for low orders: they need more elements to be near at all.
+        mesh = first_mesh(scene, order, turning=min(2.0, 0.5 * order))
+        flexible = {n: m for n, m in scene.members.items() if m.type == "flexible"}
+        counts = {n: settings.elements or m.elements for n, m in flexible.items()}
+        self.fixed = {n for n, count in counts.items() if count is not None}
+        equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
+        cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
+        self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops)
+        if order >= PILOT_ORDER and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
+            self.pilot_mesh = self.target
+        else:
+            self.pilot_mesh = replace(first_mesh(scene, max(order, PILOT_ORDER), turning=1.0), stops=self.stops)
+
+    @property
+    def _prescribed(self) -> bool:
+        """Whether the meshes of all flexible members are asked for."""
+        return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
+
+    def _prepared(self, mesh: Mesh) -> Prepared:
+        begin = time.perf_counter()
+        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly))
+        # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
+        self.assembly = prepared.model.assembly
+        _ = prepared.equations
+        self.seconds["model"] += time.perf_counter() - begin
+        return prepared

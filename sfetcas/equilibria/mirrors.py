@@ -1,0 +1,102 @@
+"""Mirror images of states: a scene whose centre lines are symmetric maps equilibria to candidates for others.
+
+A reflection or half turn ``S`` of the undeformed centre lines onto themselves carries a member's places to those
+of its image; a rotation vector ``r`` there becomes ``det(S) S r``.  Whether supports, stiffness and loads are
+symmetric too does not matter: images are places to start from, not answers.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from ..mechanics.fields import rotations_along
+from ..mechanics.model import Model
+from ..mechanics.rotations import Turn
+
+__all__ = ["Mirror", "mirrored", "mirrors"]
+
+SAME = 1e-6
+"""Places of a centre line and of an image that are nearer than this, relative to the scene, are the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """A symmetry of the undeformed centre lines.
+
+    Attributes
+    ----------
+    matrix : ndarray (3, 3)
+        Orthogonal map of positions relative to the middle of the scene.
+    images : mapping of str to (str, bool)
+        The member that each member's image is the image of, and whether it runs against it.
+    """
+
+    matrix: Array
+    images: dict[str, tuple[str, bool]]
+
+
+def mirrors(model: Model) -> tuple[Mirror, ...]:
+    """All symmetries about the fixed axes and the principal axes of the scene, the identity left out."""
+    x = np.linspace(0.0, 1.0, 9)
+    places = {name: model.scene.center_lines[name].positions(x) for name in model.members}
+    if not places:
+        return ()
+    cloud = np.vstack(list(places.values()))
+    ends = 0.5 * (cloud.max(axis=0) + cloud.min(axis=0))
+    found: list[Mirror] = []
+    for middle in (cloud.mean(axis=0), ends):
+        principal = np.linalg.eigh((cloud - middle).T @ (cloud - middle))[1]
+        for axes, signs in itertools.product((np.eye(3), principal), itertools.product((1.0, -1.0), repeat=3)):
+            matrix = axes @ np.diag(signs) @ axes.T
+            in_plane = model.space or np.allclose(matrix[2], [0.0, 0.0, 1.0])
+            known = any(np.allclose(matrix, other.matrix) for other in found)
+            # The identity of a straight plane scene about its own line is a mirror: only the matrix counts.
+            if not in_plane or known or np.allclose(matrix, np.eye(3)):
+                continue
+            images = _images(places, middle, matrix, SAME * model.scene.size)
+            if images is not None:
+                found.append(Mirror(matrix, images))
+    return tuple(found)
+
+
+def _images(places: dict[str, Array], middle: Array, matrix: Array, near: float) -> dict[str, tuple[str, bool]] | None:
+    images: dict[str, tuple[str, bool]] = {}
+    for name, line in places.items():
+        for other, source in places.items():
+            image = middle + (source - middle) @ matrix.T
+            for backwards in (False, True):
+                if name not in images and np.abs((image[::-1] if backwards else image) - line).max() < near:
+                    images[name] = other, backwards
+    return images if len(images) == len(places) else None
+
+
+def mirrored(model: Model, state: State, mirror: Mirror) -> State:
+    """The rotations of a state mirrored; held rotations and multipliers are left to the equations."""
+    sign = float(np.linalg.det(mirror.matrix))
+    q = state.q.copy()
+    for name, (source, backwards) in mirror.images.items():
+        x = model.along(name)
+        values = rotations_along(model, state.q, source, 1.0 - x if backwards else x)
+        if model.space:
+            values = np.column_stack([values[:, 0], sign * values[:, 1:] @ mirror.matrix.T])
+        else:
+            values = sign * mirror.matrix[2, 2] * values
+        q[model.chain(name)] = values
+    if model.space:
+        _onto_axes(model, q)
+    nothing = {name: np.zeros_like(getattr(state, name)) for name in ("y", "lam", "wound")}
+    return replace(state, q=q, **nothing)
+
+
+def _onto_axes(model: Model, q: Array) -> None:
+    """Leave of rotations about held axes what is about these, in place: nothing else would bring them back."""
+    about = np.flatnonzero(model.rotations.kind == Turn.AXIS)
+    axis = model.rotations.axis[about]
+    q[about, 1:] = (q[about, 1:] * axis).sum(axis=1, keepdims=True) * axis
+    size = np.linalg.norm(q[about], axis=1, keepdims=True)
+    q[about] = np.where(size > 0.0, q[about] / np.where(size > 0.0, size, 1.0), [1.0, 0.0, 0.0, 0.0])

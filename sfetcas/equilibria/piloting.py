@@ -1,0 +1,197 @@
+"""The equilibrium on the pilot mesh: by IPOPT in one go, checked against where the loads lead from zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..description.records import counted
+from ..description.scene import Scene
+from ..errors import SolveError, Status
+from ..mechanics.equations import State
+from ..mechanics.loading import Loading
+from ..solvers.continuation import JUMPED, follow, near_factor
+from ..solvers.prepared import Prepared
+from .meshing import PILOT_ELEMENTS, Found, Meshing
+from .settings import Settings
+from .single import cold
+
+__all__ = ["KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting"]
+
+KEPT = "the loads growing from zero lead to this unstable equilibrium, and no way from it to a stable one was found"
+
+NO_ENERGY = "loads without potential: no energy tells whether this is stable"
+
+NO_POTENTIAL = (
+    f"{NO_ENERGY}; the static tangent is regular all the way from zero load, and flutter would only show in dynamics"
+)
+
+TAUT = (
+    "straight between places that come no closer, where an inextensible member cannot bend and takes any force; "
+    "let one end slide"
+)
+
+CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
+"""Growth of the loads from step to step where a structure between obstacles becomes unstable."""
+
+
+class Piloting(Meshing):
+    """Meshes, and the way to the equilibrium on the pilot."""
+
+    def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
+        super().__init__(scene, settings, stops)
+        self.leave = scene.analysis.unstable == "leave"
+        self.started = any(node.start is not None for node in scene.nodes.values())
+
+    def _found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+        """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
+        try:
+            return self._on_pilot(pilot, factor, last)
+        except SolveError as error:
+            if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
+                raise
+            try:
+                return self._on_pilot(self._prepared(pilot.model.mesh.refined().refined()), factor, None)
+            except SolveError:
+                raise error from None
+
+    def _named(self, pilot: Prepared, error: SolveError) -> SolveError:
+        """The error with the motions that nothing holds, and the members that have no slack, where there are any."""
+        try:
+            free, taut = pilot.diagnosis, pilot.lacks_slack
+        except np.linalg.LinAlgError:
+            return error
+        details = [error.detail] if error.detail else []
+        if free.mobility:
+            details.append(f"free to move without load: {'; '.join(free.motions[:3])}")
+        if taut and error.status is not Status.INFEASIBLE:
+            rows = ", ".join(dict.fromkeys(free.redundant))
+            details.append(f"{TAUT}: {rows}")
+        return SolveError(error.status, "; ".join(details), error.last)
+
+    def _on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+        loading = pilot.model.loading(factor)
+        if not pilot.model.minimisable:
+            return self._only_grown(pilot, factor, last)
+        alone, failure = self._direct(pilot, loading)
+        if self.started or not self.settings.branch:
+            return self._accepted(pilot, alone, failure, loading)
+        reached = self._grown(pilot, factor, last)
+        if reached is None:
+            return self._accepted(pilot, alone, failure, loading)
+        if alone is not None:
+            reached.iterations = alone.iterations
+            apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
+            if apart and not reached.notes and alone.stability.negative == 0:
+                reached.notes += (
+                    "the loads growing from zero lead here, not to the minimum nearest to the start guess",
+                )
+        return reached
+
+    def _only_grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+        """Loads that cannot be minimised: the state that they lead to from zero, stable or not."""
+        found = self._grown(pilot, factor, last)
+        if found is None:
+            detail = "the loads could not be followed from zero, and without a potential there is no other way"
+            raise SolveError(Status.FAILED, detail)
+        if not pilot.model.conservative:
+            found.notes += (NO_POTENTIAL,)
+        return found
+
+    def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
+        """IPOPT from the start guess."""
+        try:
+            corrected, iterations = cold(pilot, loading)
+        except SolveError as error:
+            return None, error
+        return Found(pilot, corrected, pilot.stability(corrected), iterations=iterations), None
+
+    def _accepted(self, pilot: Prepared, alone: Found | None, failure: SolveError | None, loading: Loading) -> Found:
+        """What IPOPT found, an unstable state left if that is wanted."""
+        if alone is None:
+            assert failure is not None
+            raise failure
+        if alone.stability.negative == 0 or not self.leave:
+            return alone
+        corrected, stability = pilot.leave(alone.corrected.state, alone.stability, loading)
+        ways = counted(alone.stability.negative, "way out", "ways out")
+        note = f"left an unstable equilibrium with {ways} along its escape shape"
+        return Found(pilot, corrected, stability, (note,), alone.iterations)
+
+    def _grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
+        """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
+        model = pilot.model
+        if last is not None and last[0] * (factor - last[0]) >= 0.0:
+            found = self._through(pilot, last[0], factor, last[1].corrected.state)
+            if found is not None:
+                return found
+        zero = pilot.equations.start(model.loading(0.0, 0.0))
+        if pilot.lacks_slack:
+            # Straight members without slack: no way leads from here but the one that motions make.
+            moved = np.any(model.loading(factor).shift) and not self.scene.histories
+            return self._grown_from_bent(pilot, factor) if moved else None
+        if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
+            # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
+            return self._grown_from_bent(pilot, factor)
+        if self.scene.histories and factor != 0.0:
+            # With histories the way leads through the factors, after the loads of factor 0 have grown.
+            first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None)
+            if first is None:
+                return None
+            zero = first.corrected.state
+        return self._through(pilot, 0.0, factor, zero)
+
+    def _through(self, pilot: Prepared, begin: float, end: float, state: State) -> Found | None:
+        """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
+        knots = {
+            t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)
+        }
+        stops = [begin, *sorted(knots, reverse=end < begin), end]
+        found: Found | None = None
+        for a, b in zip(stops, stops[1:], strict=False):
+            part = self._followed(pilot, lambda t, a=a, b=b: pilot.model.loading(a + t * (b - a)), state, (a, b))
+            if part is None:
+                return None
+            found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
+        return found
+
+    def _grown_from_bent(self, pilot: Prepared, factor: float) -> Found | None:
+        """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
+        begin = 0.01 * factor
+        bent, _ = self._direct(pilot, pilot.model.loading(begin))
+        if bent is None:
+            return None
+        state = bent.corrected.state
+        if bent.stability.negative and self.leave:
+            try:
+                state = pilot.leave(state, bent.stability, pilot.model.loading(begin))[0].state
+            except SolveError:
+                return None
+        way = (begin, factor)
+        return self._followed(pilot, lambda t: pilot.model.loading(begin + t * (factor - begin)), state, way)
+
+    def _followed(self, pilot: Prepared, way: Any, state: State, factors: tuple[float, float] | None) -> Found | None:
+        """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
+        leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
+        result = follow(pilot, way, state, leave=leave)
+        if not result.reached and leave and not energy_known:
+            # What cannot be minimised has this one way: better an unstable state that says so than none.
+            result = follow(pilot, way, state, leave=False)
+        if not result.reached:
+            return None
+        corrected = pilot.correct(result.state, way(1.0))
+        stability = pilot.stability(corrected)
+        notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
+        if stability.negative and self.leave and not energy_known:
+            notes += (KEPT,)
+        return Found(pilot, corrected, stability, notes, left=result.left)
+
+
+def _at(part: float, factors: tuple[float, float] | None) -> str:
+    """Where on a way something was, in words; parts of the way are known to a few percent of them."""
+    if factors is None:
+        return f"near {100.0 * part:.2g} % of the loads of factor 0"
+    begin, end = factors
+    return near_factor(begin + part * (end - begin))

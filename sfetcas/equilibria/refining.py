@@ -1,0 +1,218 @@
+"""From the pilot to an answer: finer meshes, the estimate of the error, and what makes an answer unique."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.accuracy import every_other, largest_difference, roughness
+from ..mechanics.equations import Equations, State
+from ..mechanics.fields import Fields, transferred
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import Mesh
+from ..solvers.deflation import deflated
+from ..solvers.doctor import in_words, moves_nodes
+from ..solvers.newton import Corrected, loose_rows, relative_residual, rows_in
+from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.stability import Stability
+from .meshing import Found
+from .piloting import KEPT, Piloting
+from .single import finished
+from .solution import Equilibrium
+
+__all__ = ["LEVELS", "Refining"]
+
+HUGE = 2000
+"""From this many elements on the error is estimated from the mesh with half the elements, not with twice."""
+
+LEVELS = 40
+"""Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
+
+MOST_FURTHER = 300
+"""The same for what a search found: what needs more is seldom an equilibrium of a beam."""
+
+DRIFT = 1.0
+"""An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
+
+MOST_ELEMENTS = 20_000
+"""A mesh that the library chooses does not grow beyond this."""
+
+BEYOND = 1e4
+"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
+
+
+class Refining(Piloting):
+    """The pilot, and the way from it to the accuracy asked for."""
+
+    def _onto(self, mesh: Mesh, source: Found, factor: float) -> Found:
+        """The same equilibrium on another mesh."""
+        if mesh.same(source.prepared.model.mesh):
+            # Without flexible members nothing is halved.
+            return source
+        prepared = self._prepared(mesh)
+        loading = prepared.model.loading(factor)
+        state = transferred(source.prepared.model, source.corrected.state, prepared.model)
+        corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        if source.kept and not corrected.converged:
+            corrected = deflated(prepared, state, loading, ()) or corrected
+        if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
+            raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
+        if not corrected.converged:
+            corrected, _ = prepared.minimise(loading, state)
+        return replace(source, prepared=prepared, corrected=corrected)
+
+    def _refined(self, pilot: Found, factor: float) -> Equilibrium:
+        if self._prescribed:
+            return self._on_target(pilot, factor)
+        mesh = pilot.prepared.model.mesh
+        own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
+        there = mesh is self.target or own
+        now = pilot if there else self._onto(self.target, pilot, factor)
+        smooth = np.sqrt(self.accuracy)
+        loading = now.prepared.model.loading(factor)
+        for _ in range(LEVELS):
+            marked = self._marked(now, loading, smooth)
+            if not any(m.any() for m in marked.values()):
+                finer = self._onto(self._halved(now), now, factor)
+                error = self._difference(now, finer, factor)
+                now = finer
+                if error <= self.accuracy:
+                    return self._answer(now, factor, error)
+                smooth *= 0.1
+            elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
+                break
+            else:
+                now = self._onto(now.prepared.model.mesh.refined(marked), now, factor)
+            loading = now.prepared.model.loading(factor)
+        finer = self._onto(self._halved(now), now, factor)
+        return self._answer(finer, factor, self._difference(now, finer, factor))
+
+    def _halved(self, now: Found) -> Mesh:
+        cuts = now.prepared.model.mesh.cuts
+        marks = {n: np.full(len(c) - 1, n not in self.fixed) for n, c in cuts.items()}
+        return now.prepared.model.mesh.refined(marks)
+
+    def _on_target(self, pilot: Found, factor: float) -> Equilibrium:
+        """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
+        mesh = self.target
+        if mesh.elements > HUGE:
+            half = replace(mesh, cuts={n: every_other(c) for n, c in mesh.cuts.items()})
+            coarse = self._onto(half, pilot, factor)
+            now = self._onto(mesh, coarse, factor)
+            # The error falls by 4^p a halving; twice that share for not being there yet.
+            error = self._difference(coarse, now, factor) * 2.0 / (4.0**mesh.order - 1.0)
+            return self._answer(now, factor, error)
+        now = pilot if self.pilot_mesh is mesh else self._onto(mesh, pilot, factor)
+        finer = self._onto(mesh.refined(), now, factor)
+        return self._answer(now, factor, self._difference(now, finer, factor))
+
+    def _answer(self, found: Found, factor: float, error: float) -> Equilibrium:
+        prepared = found.prepared
+        found = _with_unique_reactions(found, prepared.model.loading(factor))
+        stability = prepared.stability(found.corrected)
+        loading = prepared.model.loading(factor)
+        if not found.kept:
+            _refuse_free(prepared, found.corrected, stability)
+        if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
+            corrected, stability = prepared.leave(found.corrected.state, stability, loading)
+            note = "left an equilibrium that is unstable on the fine mesh only"
+            found = replace(found, corrected=corrected, notes=(*found.notes, note))
+        return finished(
+            prepared,
+            found.corrected,
+            loading,
+            factor,
+            stability,
+            estimate=error,
+            notes=found.notes,
+            iterations=found.iterations,
+        )
+
+    def _difference(self, coarse: Found, fine: Found, factor: float) -> float:
+        sides = [
+            Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (coarse, fine)
+        ]
+        return largest_difference(*sides)
+
+    def _marked(self, found: Found, loading: Loading, smooth: float) -> dict[str, Array]:
+        """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""
+        rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
+        model = found.prepared.model
+        return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+
+def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> None:
+    """Refuse a mechanism of which neither stiffness nor loads hold some motion.
+
+    Raises
+    ------
+    SceneError
+        Names the motion.
+    """
+    if stability.stable != "neutral" or not prepared.diagnosis.mobility:
+        return
+    shape = np.concatenate([stability.shape, stability.travel])
+    if moves_nodes(prepared.equations, shape, found.state):
+        motion = in_words(prepared.equations, shape)
+        message = f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
+        raise SceneError(message)
+
+
+def _least_reactions(equations: Equations, state: State, loading: Loading, loose: Array) -> State:
+    """The state with the reactions of supports whose sum of squares is least, then the least multipliers.
+
+    Moments count over the unit of length.  Loose multipliers change nothing else.
+    """
+    model = equations.model
+    supported = [name for name, node in model.scene.nodes.items() if node.support != "free"]
+    units = np.concatenate([np.full(3, model.scales.force), np.full(3, model.scales.moment)])
+
+    def reactions(lam: Array) -> Array:
+        fields = Fields(equations, replace(state, lam=lam), loading)
+        return np.concatenate([np.concatenate(fields.reaction(name)) / units for name in supported])
+
+    if not supported or loose.shape[1] > MOST_LOOSE:
+        return state
+    own = reactions(state.lam)
+    gains = np.column_stack([reactions(state.lam + column) - own for column in loose.T])
+    left, sizes, right = np.linalg.svd(gains, full_matrices=False)
+    # Columns are of length 1 and reactions dimensionless: what gains less says nothing but rounding.
+    kept = sizes > FELT
+    change = right[kept].T @ ((left[:, kept].T @ own) / sizes[kept])
+    return replace(state, lam=state.lam - loose @ change)
+
+
+FELT = 1e-6
+"""A combination of redundant rows that changes reactions by less than this share changes none."""
+
+MOST_LOOSE = 60
+"""Up to so many redundant rows reactions are made least; beyond, the multipliers only."""
+
+
+def _with_unique_reactions(found: Found, loading: Loading) -> Found:
+    """The same, with the smallest reactions and a note where closings are redundant.
+
+    Raises
+    ------
+    SolveError
+        Members stretched between held points: no finite reaction holds an inextensible member straight.
+    """
+    equations, corrected = found.prepared.equations, found.corrected
+    loose = loose_rows(equations, corrected.point)
+    if not loose.size:
+        return found
+    names = ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
+    lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
+    state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
+    point = equations.at(state, loading)
+    residual = relative_residual(equations, point)
+    if residual <= SOLVED:
+        corrected = replace(corrected, state=state, point=point, residual=residual)
+    elif np.abs(corrected.state.lam).max() > BEYOND * max(1.0, found.prepared.load_size(corrected)):
+        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
+        raise SolveError(Status.INFEASIBLE, detail, corrected.state)
+    note = f"reactions are not unique, the smallest are given; redundant: {names}"
+    return replace(found, corrected=corrected, notes=(*found.notes, note))

@@ -1,0 +1,52 @@
+"""How to solve: what a run of statics may be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ..errors import SceneError
+from ..mechanics.elements import ELEMENTS
+
+__all__ = ["Settings"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to solve; everything has a default that suits.
+
+    Attributes
+    ----------
+    accuracy : float or None
+        Wanted error of the positions over the size of the scene; None takes that of the scene.
+    element, elements : str, int or None
+        Element of all members and number of elements of each; None takes those of the members, or chooses.
+    gauss : bool
+        Gauss integration with the norm divided out instead of integration at the nodes.
+    assembly : str
+        ``auto``, ``closing`` or ``nodal``.
+    branch : bool
+        Check the branch by following the loads from zero.
+    runs : int or None
+        Newton runs at most in a search for several equilibria, for each factor; None takes what suits the size.
+    """
+
+    accuracy: float | None = None
+    element: str | None = None
+    elements: int | None = None
+    gauss: bool = False
+    assembly: Literal["auto", "closing", "nodal"] = "auto"
+    branch: bool = True
+    runs: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.accuracy is not None and not 0.0 < self.accuracy <= 0.1:
+            raise SceneError(f"accuracy: found {self.accuracy:g}, accepted: a number above 0 and up to 0.1")
+        if self.element is not None and self.element not in ELEMENTS:
+            raise SceneError(f"element: found {self.element!r}, accepted: {', '.join(ELEMENTS)}")
+        if self.elements is not None and not 1 <= self.elements <= 1_000_000:
+            raise SceneError(f"elements: found {self.elements}, accepted: 1 to 1000000")
+        if self.runs is not None and not 0 <= self.runs <= 1_000_000:
+            raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
+        if self.assembly not in ("auto", "closing", "nodal"):
+            raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")

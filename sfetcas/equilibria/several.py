@@ -1,0 +1,385 @@
+"""A search for further equilibria under the same loads.
+
+Newton runs, with and without deflation (see :mod:`~sfetcas.solvers.deflation`), begin at the undeformed scene, at its
+lowest shapes, at known equilibria nudged along their lowest shapes, mirrored, or half-way to each other.  From each
+unstable equilibrium the energy falls to both sides of its escape shape: what lies down there is found as well, as
+is what larger and reversed loads lead to when they come back.  What the search does not find may still exist: it
+counts what it did, and says so.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from ..description.records import counted
+from ..mathematics.arrays import Array
+from ..mechanics.accuracy import largest_difference
+from ..mechanics.equations import State
+from ..mechanics.loading import Loading
+from ..solvers.continuation import follow
+from ..solvers.deflation import deflated, turned_between, unheld
+from ..solvers.guess import restore
+from ..solvers.newton import Corrected, descend
+from ..solvers.prepared import Prepared
+from .mirrors import Mirror, mirrored, mirrors
+from .solution import Equilibrium
+
+__all__ = ["Search", "long_elements", "missing", "same", "search"]
+
+RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
+"""Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
+
+APART = 1e-4
+"""States that differ by more than this somewhere, rad, are different equilibria."""
+
+SHAPES = 4
+"""Lowest shapes, of each equilibrium and of the undeformed scene, along which states are moved."""
+
+NUDGE, FARTHER_NUDGE = 0.5, 1.5
+"""Largest rotation of a nudge, rad, and of one when all else was tried."""
+
+BENT = (2.0, -2.0, 4.0, -4.0, 6.5, -6.5)
+"""Largest rotations of the shapes of the undeformed scene that a run begins with, rad."""
+
+SHARES, FARTHER = (0.1, 0.3162), 3.162
+"""Shares of the loads at which the search begins, since fewer equilibria are easier to find, and their ratio."""
+
+KINK = 1.3
+"""A larger rotation from node to node within an element, rad, is an artefact of the mesh."""
+
+LARGE = 700
+"""From this many unknowns on all eigenvalues cost more than they bring: nudges along the escape shape alone."""
+
+EQUAL = 1e-8
+"""Energies that differ by less than this, relative, are those of one family."""
+
+FAMILY = "one of a continuous family of neutral equilibria with the same energy, of which no other is listed"
+
+LAYERS = 1.2
+"""Longest element of the search in ``sqrt(EI / force)``, within which a beam turns over."""
+
+MOST_ELEMENTS = 80
+"""The mesh of the search is not refined beyond this."""
+
+DOWN = 0.3
+"""Largest rotation of the step off an unstable equilibrium, to where the energy falls, rad."""
+
+DESCENT = 60
+"""Steps downhill at most."""
+
+BEYOND = (3.162, 10.0, -1.0, -10.0)
+"""Shares of the loads from which states come back: larger ones snap, reversed ones snap to the other side."""
+
+KINDS = ("carried", "returned", "given", "mirrored", "downhill", "nudged", "bent", "half-way", "farther")
+"""Kinds of starts in the order of what they bring for their cost (measured)."""
+
+
+@dataclass(eq=False)
+class Search:
+    """What was found, and how.
+
+    Attributes
+    ----------
+    found : list of Corrected
+        Distinct equilibria; the first is the one that the search began with.
+    counts : dict
+        Newton runs by the kind of their start.
+    deflated, arrived : int
+        Runs with deflation, and runs that ended in an equilibrium, known or not.
+    family : set of int
+        Numbers of the equilibria that stand for a continuous family.
+    exhausted : bool
+        Whether the runs were used up before the starts.
+    smaller : int
+        Runs under smaller loads that were done before.
+    waiting : dict
+        Starts still to be tried, by kind.
+    """
+
+    prepared: Prepared
+    loading: Loading
+    runs: int
+    images: tuple[Mirror, ...]
+    found: list[Corrected] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    deflated: int = 0
+    arrived: int = 0
+    family: set[int] = field(default_factory=set)
+    exhausted: bool = False
+    smaller: int = 0
+    waiting: dict[str, deque[tuple[Callable[[], State], bool]]] = field(
+        default_factory=lambda: {kind: deque() for kind in KINDS}
+    )
+
+    def sentence(self) -> str:
+        """How the search was done, for a reader."""
+        kinds = ", ".join(f"{n} {kind}" for kind, n in self.counts.items())
+        end = "stopped at its largest number of runs" if self.exhausted else "went through all its starts"
+        return (
+            f"searched by {counted(self.total, 'Newton run')}, {self.deflated} of them deflated ({kinds}), of which "
+            f"{self.arrived} arrived, after {self.smaller} under smaller loads; the search {end}; there may be more "
+            "equilibria"
+        )
+
+    def family_note(self, number: int) -> tuple[str, ...]:
+        """What to say of an equilibrium that stands for others."""
+        return (FAMILY,) if number in self.family else ()
+
+    # -- one run --------------------------------------------------------------------------------
+
+    def run(self, kind: str, start: State, *, deflate: bool) -> bool:
+        """One Newton run from a start; whether it found a new equilibrium."""
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+        self.deflated += deflate
+        there = deflated(self.prepared, start, self.loading, [f.state for f in self.found] if deflate else ())
+        there = there and self._wound_back(there)
+        if there is None:
+            return False
+        self.arrived += 1
+        if self._known(there.state) or self._kinked(there.state) or self._in_family(there):
+            return False
+        self.found.append(there)
+        return True
+
+    def _wound_back(self, there: Corrected) -> Corrected:
+        """The same without whole turns of parts that nothing holds."""
+        turns = there.state.q.copy()
+        parts = () if self.prepared.model.space else unheld(self.prepared.model)
+        for part in parts:
+            turns[part] -= 2.0 * np.pi * np.round(turns[part].mean() / (2.0 * np.pi))
+        if np.array_equal(turns, there.state.q):
+            return there
+        return self.prepared.correct(replace(there.state, q=turns), self.loading)
+
+    def _known(self, state: State) -> bool:
+        equations = self.prepared.equations
+        return any(np.abs(turned_between(equations, state, f.state)).max(initial=0.0) <= APART for f in self.found)
+
+    def _kinked(self, state: State) -> bool:
+        q = state.q[self.prepared.model.rotations.turns]
+        if self.prepared.model.space:
+            cosine = np.abs((q[:, 1:] * q[:, :-1]).sum(axis=-1))
+            return bool((cosine < np.cos(0.5 * KINK)).any())
+        return bool((np.abs(np.diff(q[..., 0], axis=1)) > KINK).any())
+
+    def _in_family(self, there: Corrected) -> bool:
+        """Whether an equilibrium is a neighbour of a known one in all but a neutral direction."""
+        if not self._neutral(there):
+            return False
+        for i, other in enumerate(self.found):
+            size = max(abs(other.point.strain), abs(other.point.potential), 1e-12)
+            near = abs(there.point.potential - other.point.potential) <= EQUAL * size
+            if near and abs(there.point.strain - other.point.strain) <= EQUAL * size and self._neutral(other):
+                self.family.add(i)
+                return True
+        return False
+
+    def _neutral(self, there: Corrected) -> bool:
+        if self.prepared.equations.turning_unknowns > LARGE:
+            return self.prepared.stability(there).stable == "neutral"
+        return bool((self.prepared.spectrum(there, 0)[0] == 0.0).any())
+
+    # -- starts ---------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def begin(self) -> State:
+        """The undeformed scene with its closings restored."""
+        return self.closed(self.prepared.equations.start(self.loading))
+
+    def closed(self, state: State) -> State:
+        """The state with motions and closings restored."""
+        equations = self.prepared.equations
+        state = equations.holding(state, self.loading)
+        if not equations.rows:
+            return state
+        lam = state.lam
+        return replace(restore(equations, state, self.loading, self.prepared.weight)[0], lam=lam)
+
+    def moved(self, state: State, shape: Array) -> State:
+        """The state moved along a shape of the turning unknowns, closings restored."""
+        step = np.zeros(self.prepared.equations.total)
+        step[: len(shape)] = shape
+        return self.closed(self.prepared.equations.moved(state, step))
+
+    def _mirrored(self, state: State, image: Mirror) -> State:
+        return self.closed(mirrored(self.prepared.model, state, image))
+
+    def _downhill(self, state: State, shape: Array) -> State:
+        """Where the energy falls to from the state moved along a shape."""
+        prepared = self.prepared
+        return descend(prepared.equations, self.moved(state, shape), self.loading, prepared.weight, iterations=DESCENT)
+
+    def _shapes(self, found: Corrected, count: int) -> Array:
+        if self.prepared.equations.turning_unknowns > LARGE:
+            return self.prepared.stability(found).shape[None, :]
+        return self.prepared.spectrum(found, count)[1]
+
+    def offer(self, kind: str, *starts: Callable[[], State], deflate: bool) -> None:
+        """Put starts, made when their turn comes, to the others of their kind."""
+        self.waiting[kind].extend((start, deflate) for start in starts)
+
+    def offer_bent(self) -> None:
+        """The undeformed scene moved along its lowest shapes."""
+        unloaded = self.loading.scaled(0.0)
+        rest = self.prepared.correct(self.prepared.equations.start(unloaded), unloaded, iterations=0)
+        shapes = self._shapes(rest, SHAPES)
+        starts = [partial(self.moved, self.begin, size * shape) for size in BENT for shape in shapes]
+        self.offer("bent", *starts, deflate=False)
+
+    def offer_around(self, found: Corrected) -> None:
+        """What a new equilibrium gives: mirror images, nudges, and places half-way to those found before."""
+        equations, state = self.prepared.equations, found.state
+        for image in self.images:
+            self.offer("mirrored", partial(self._mirrored, state, image), deflate=False)
+        shapes = self._shapes(found, SHAPES)
+        if self.prepared.negative(found):
+            sides = (partial(self._downhill, state, size * shapes[0]) for size in (DOWN, -DOWN))
+            self.offer("downhill", *sides, deflate=False)
+        for kind, size in (("nudged", NUDGE), ("farther", FARTHER_NUDGE)):
+            sides = (partial(self.moved, state, way * shape) for shape in shapes for way in (size, -size))
+            self.offer(kind, *sides, deflate=True)
+        for other in self.found:
+            if other is not found:
+                half = 0.5 * turned_between(equations, other.state, state)
+                self.offer("half-way", partial(self.moved, state, half), deflate=True)
+
+    def look(self) -> None:
+        """Begin at the undeformed scene and go on until there is no start or no run left."""
+        for deflate in (False, True):
+            self.offer("given", partial(self.closed, self.begin), deflate=deflate)
+        self.offer_bent()
+        while self.go_on():
+            pass
+
+    @property
+    def total(self) -> int:
+        """Runs done."""
+        return sum(self.counts.values())
+
+    def go_on(self) -> bool:
+        """Try the next start; whether there was one and a run left for it."""
+        kind = next((kind for kind, queue in self.waiting.items() if queue), None)
+        if kind is None:
+            return False
+        if self.total >= self.runs:
+            self.exhausted = True
+            return False
+        make, deflate = self.waiting[kind].popleft()
+        start = make()
+        if kind == "mirrored" and self._known(start):
+            return True
+        if self.run(kind, start, deflate=deflate):
+            self.offer_around(self.found[-1])
+        return True
+
+
+def search(
+    prepared: Prepared, loading: Loading, first: Corrected, starts: Sequence[State] = (), runs: int | None = None
+) -> Search:
+    """Look for further equilibria under the loads of a known one.
+
+    Parameters
+    ----------
+    first : Corrected
+        Equilibrium under ``loading``.
+    starts : sequence of State
+        Further states to begin with, such as equilibria under other loads.
+    runs : int, optional
+        Newton runs at most; the default falls with the number of unknowns.
+    """
+    if runs is None:
+        effort = max(1, prepared.equations.unknowns * (2 if prepared.model.space else 1))
+        runs = max(FEWEST_RUNS, min(RUNS, EFFORT // effort))
+    images = mirrors(prepared.model)
+    if not prepared.equations.turning_unknowns:
+        return Search(prepared, loading, runs, images, [first])
+    carried: list[State] = []
+    left = runs
+    for share in SHARES:
+        part = Search(prepared, loading.scaled(share), runs // 5, images)
+        part.offer("carried", *(partial(part.closed, state) for state in carried), deflate=False)
+        part.look()
+        left -= part.total
+        carried = _carried(part, loading.scaled(share * FARTHER))
+    result = Search(prepared, loading, left, images, [first])
+    result.offer_around(first)
+    returned = _returned(prepared, loading, first) if left else []
+    for kind, states in (("carried", carried), ("returned", returned), ("given", starts)):
+        result.offer(kind, *(partial(result.closed, state) for state in states), deflate=False)
+    result.smaller = runs - left
+    result.look()
+    return result
+
+
+def _carried(smaller: Search, loading: Loading) -> list[State]:
+    """Equilibria followed from smaller loads to larger ones, as far as their branches go."""
+    change = loading.plus(smaller.loading.scaled(-1.0))
+    states = []
+    for found in smaller.found:
+        followed = follow(smaller.prepared, lambda t: smaller.loading.plus(change.scaled(t)), found.state, leave=False)
+        if followed.reached:
+            states.append(followed.state)
+    return states
+
+
+def _returned(prepared: Prepared, loading: Loading, first: Corrected) -> list[State]:
+    """What larger and reversed loads lead to by a jump, as far as it stays when they come back; motions keep."""
+    alone = loading.plus(loading.unloaded().scaled(-1.0))
+    found = (_there_and_back(prepared, loading, alone.scaled(share - 1.0), first.state) for share in BEYOND)
+    return [state for state in found if state is not None]
+
+
+def _there_and_back(prepared: Prepared, loading: Loading, more: Loading, state: State) -> State | None:
+    out = follow(prepared, lambda t: loading.plus(more.scaled(t)), state)
+    if not (out.reached and out.left):
+        return None
+    back = follow(prepared, lambda t: loading.plus(more.scaled(1.0 - t)), out.state, leave=False)
+    return back.state if back.reached else None
+
+
+def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dict[str, Array]:
+    """Elements within which a beam under these loads may turn over, to be halved for the search, by member.
+
+    Where it is only straight at first a search finds it curled anywhere, not just at its ends.
+    """
+    model, equations = prepared.model, prepared.equations
+    pulls = np.abs(equations.segment_pulls(found.state.lam, loading)).max(initial=0.0)
+    force = (pulls + np.abs(loading.pull).max(initial=0.0)) * model.scales.force
+    marks = {}
+    for name in model.members:
+        if model.scene.members[name].type == "rigid":
+            marks[name] = np.zeros(len(model.mesh.cuts[name]) - 1, dtype=bool)
+            continue
+        section = model.scene.sections[str(model.scene.members[name].section)]
+        softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
+        longest = LAYERS * np.sqrt(softest / max(force, 1e-300)) / model.scene.center_lines[name].length
+        marks[name] = np.diff(model.mesh.cuts[name]) > longest
+    return marks if model.mesh.elements <= MOST_ELEMENTS else {name: m & False for name, m in marks.items()}
+
+
+def same(one: Equilibrium, other: Equilibrium) -> bool:
+    """Whether two answers, on whatever meshes, differ by no more than their errors and have the same ways out."""
+    if one.certificate.negative != other.certificate.negative:
+        return False
+    errors = (one.certificate.error_estimate or 0.0) + (other.certificate.error_estimate or 0.0)
+    return largest_difference(one.fields, other.fields) <= 2.0 * errors + 1e-9
+
+
+def missing(answers: Sequence[Equilibrium]) -> str:
+    """What the numbers of ways out tell about equilibria that were not found; empty where they tell nothing.
+
+    Angles of an open chain that is held somewhere form a space without holes, in which the energy grows to all
+    sides: equilibria with even numbers of ways out are one more than those with odd numbers (Morse).
+    """
+    model = answers[0].model
+    neutral = any(answer.certificate.stable == "neutral" for answer in answers)
+    if model.space or neutral or len(model.positions.rows) or unheld(model):
+        return ""
+    balance = sum((-1) ** answer.certificate.negative for answer in answers)
+    return "" if balance == 1 else "; their numbers of ways out do not balance, so at least one more exists"

@@ -1,0 +1,105 @@
+"""One equilibrium of a prepared model on its own mesh: from a start guess, or from a near answer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..mathematics.threads import single_threaded
+from ..mechanics.loading import Loading
+from ..solvers.continuation import follow
+from ..solvers.doctor import contradiction
+from ..solvers.newton import Corrected
+from ..solvers.prepared import Prepared
+from ..solvers.stability import Stability
+from .solution import Equilibrium, equilibrium
+
+__all__ = ["cold", "finished", "solve_model"]
+
+
+@single_threaded
+def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = None) -> Equilibrium:
+    """One equilibrium of a prepared model: IPOPT from the start guess, or Newton's method from a near answer.
+
+    Parameters
+    ----------
+    model : Model or Prepared
+        Pass the same :class:`Prepared` for repeated solves: nothing is built again.
+    factor : float
+        Factor of loads and motions.
+    start : Equilibrium, optional
+        Answer of the same model for a near factor.
+
+    Raises
+    ------
+    SceneError
+        The scene has contacts or stops of springs, which only :func:`solve` looks for.
+    SolveError
+        No equilibrium was found.
+    """
+    prepared = model if isinstance(model, Prepared) else Prepared(model)
+    prepared.model.check_complete()
+    loading = prepared.model.loading(factor)
+    found, iterations = _warm(prepared, start, loading) if start is not None else None, 0
+    if found is None:
+        found, iterations = cold(prepared, loading)
+    return finished(prepared, found, loading, factor, prepared.stability(found), iterations=iterations)
+
+
+def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected | None:
+    found = prepared.correct(start.state, loading, iterations=20, most=2.0)
+    return found if found.converged else None
+
+
+def cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
+    """The equilibrium from the start guess and IPOPT's iterations; what cannot be minimised is followed from zero.
+
+    Raises
+    ------
+    SolveError
+        None was found.
+    """
+    if not prepared.model.minimisable:
+        start = prepared.equations.start(prepared.model.loading(0.0, 0.0))
+        followed = follow(prepared, loading.scaled, start, leave=False)
+        if not followed.reached:
+            raise SolveError(Status.FAILED, "the loads could not be followed from zero", followed.state)
+        return prepared.correct(followed.state, loading), 0
+    state, gap = prepared.guess(loading)
+    if gap > 0.2:
+        equations = prepared.equations
+        rows = np.abs(equations.at(state, loading).residual[equations.unknowns :])
+        worst = ", ".join(equations.row_names[i] for i in np.flatnonzero(rows > 0.3 * rows.max())[:4])
+        detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at {worst}"
+        told = contradiction(equations, state, loading)
+        detail += f"; {told}" if told else ""
+        raise SolveError(Status.INFEASIBLE, detail, state)
+    return prepared.minimise(loading, state)
+
+
+def finished(
+    prepared: Prepared,
+    found: Corrected,
+    loading: Loading,
+    factor: float,
+    stability: Stability,
+    *,
+    estimate: float | None = None,
+    notes: tuple[str, ...] = (),
+    iterations: int = 0,
+) -> Equilibrium:
+    """The equilibrium with its name, certificate and notes."""
+    return equilibrium(
+        prepared.equations,
+        found.state,
+        loading,
+        factor,
+        found.point,
+        found.residual,
+        stability,
+        error_estimate=estimate,
+        notes=notes,
+        iterations=iterations,
+    )

@@ -1,0 +1,320 @@
+"""Equilibria by name: positions, reactions, section forces, energies and the certificate."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..contact.touches import answers
+from ..description.records import counted, nearest, plain
+from ..errors import SceneError, SolveError, Status
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mechanics.balance import SpringState
+from ..mechanics.equations import Equations, Point, State
+from ..mechanics.fields import Fields
+from ..mechanics.loading import Loading
+from ..mechanics.model import Model
+from ..solvers.stability import Stability
+
+__all__ = ["Certificate", "Equilibrium", "Solution", "at_factor", "equilibrium"]
+
+MOST_PLACES = 400
+"""Places listed along a member at most; with more elements only their ends, thinned out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What proves an answer, all recomputed from the state and not taken from a solver.
+
+    Attributes
+    ----------
+    residual : float
+        Largest out-of-balance force or moment over the largest that was added up, or gap over the length scale.
+    stable : bool, "neutral", or "not defined" for loads without potential
+        Inertia of the energy on the closings.
+    negative : int
+        Its negative eigenvalues.
+    smallest : float
+        Its smallest eigenvalue, N: second variation by a rotation field over the integral of its square.
+    error_estimate : float or None
+        Estimated discretisation error of the positions over the size of the scene.
+    escape : mapping
+        Escape shape by member: rotations about the fixed axes, largest 1, at the places of ``Equilibrium.places``.
+    """
+
+    residual: float
+    stable: bool | str
+    negative: int
+    smallest: float
+    error_estimate: float | None
+    escape: Mapping[str, Array] = field(repr=False, default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in the JSON answer."""
+        smallest = self.smallest if np.isfinite(self.smallest) else None
+        negative = None if self.stable == "not defined" else self.negative
+        answer = {"residual": self.residual, "stable": self.stable, "negative": negative, "smallest": smallest}
+        return {**answer, "error_estimate": self.error_estimate}
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """One equilibrium, made by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
+
+    Attributes
+    ----------
+    factor : float
+        Factor of the loads and motions.
+    model : Model
+        Discretisation that the answer is on.
+    state, loading
+        Unknowns and loads, dimensionless.
+    certificate : Certificate
+    notes : tuple of str
+        What a reader should know: an unstable state that was left, reactions that are not unique.
+    iterations : int
+        Iterations of IPOPT.
+    """
+
+    factor: float
+    model: Model
+    state: State
+    loading: Loading
+    certificate: Certificate
+    notes: tuple[str, ...]
+    iterations: int
+    strain: float
+    potential: float
+    fields: Fields = field(repr=False)
+
+    def position(self, node: str) -> Array:
+        """Position of a node, (3,) m."""
+        return self.fields.position(self._known(node, self.model.nodes, "node"))
+
+    def quaternion(self, node: str) -> Array | None:
+        """Rotation of a node since the undeformed scene, (4,); None where it has no rotation of its own."""
+        rotation = self.fields.rotation(self._known(node, self.model.nodes, "node"))
+        return None if rotation is None else self._as_quaternions(rotation[None, :])[0]
+
+    def angle(self, node: str) -> float | None:
+        """Rotation about z since the undeformed scene, rad, counting turns; in the plane only."""
+        rotation = self.fields.rotation(self._known(node, self.model.nodes, "node"))
+        return None if rotation is None or self.model.space else float(rotation[0])
+
+    def reaction(self, node: str) -> tuple[Array, Array]:
+        """Force (3,) N and moment about the node (3,) N m that the ground exerts on the structure."""
+        if self.model.scene.nodes[self._known(node, self.model.nodes, "node")].support == "free":
+            raise SceneError(f"node {node!r} is free: no ground acts on it")
+        return self.fields.reaction(node)
+
+    def spring(self, name: str) -> SpringState:
+        """A spring: angle (rad) and moment (N m) on its second party, or travel (m) and force (N)."""
+        return self.fields.spring(self._known(name, tuple(self.model.scene.springs), "spring"))
+
+    def motion(self, name: str) -> dict[str, Any]:
+        """What makes a motion: ``moment`` with a rotation, ``force`` with a displacement, see :meth:`Fields.drive`."""
+        return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
+
+    def along(self, member: str, at: Any) -> dict[str, Array]:
+        """Fields of a member at fractions of its length, see :meth:`Fields.along`; quaternions added."""
+        found = self.fields.along(self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at))
+        rotation = found.pop("rotation")
+        found["quaternion"] = self._as_quaternions(rotation)
+        if not self.model.space:
+            found["angle"] = rotation[:, 0]
+        return found
+
+    def places(self, member: str) -> Array:
+        """Fractions of the length that the answer lists: nodes of the elements, or fewer."""
+        if self.model.scene.members[member].type != "flexible":
+            return np.array([0.0, 1.0])
+        places = self.model.along(member)
+        if len(places) > MOST_PLACES:
+            places = self.model.mesh.cuts[member]
+            places = places[np.unique(np.linspace(0, len(places) - 1, MOST_PLACES).round().astype(int))]
+        return places
+
+    @functools.cached_property
+    def energy(self) -> dict[str, float]:
+        """Elastic energy, potential of the loads, and their sum, N m; zero for the undeformed scene."""
+        unit = self.model.scales.moment
+        elastic, total = self.strain * unit, self.potential * unit
+        return {"elastic": elastic, "loads": total - elastic, "total": total}
+
+    @functools.cached_property
+    def contacts(self) -> dict[str, dict[str, Any]]:
+        """Of each obstacle ``force`` (3,) N on the member, ``at``, ``gap`` m, ``member``; lists where several touch.
+
+        ``at`` is a fraction of the length, or [from, to] of a stretch whose whole force is given; None, with the
+        smallest gap, where nothing touches.
+        """
+        return answers(self.fields) if self.model.scene.contacts else {}
+
+    def _as_quaternions(self, rotation: Array) -> Array:
+        if self.model.space:
+            return rotation
+        zero = np.zeros(len(rotation))
+        return quaternion.from_rotation_vector(np.stack([zero, zero, rotation[:, 0]], axis=-1))
+
+    @staticmethod
+    def _known(name: str, names: tuple[str, ...], kind: str) -> str:
+        if name not in names:
+            raise SceneError(f"found {kind} {name!r}; {nearest(name, names)}")
+        return name
+
+    def to_dict(self) -> dict[str, Any]:
+        """As an entry of ``steps`` in the JSON answer."""
+        scene = self.model.scene
+        nodes: dict[str, Any] = {}
+        for name in self.model.nodes:
+            entry: dict[str, Any] = {"position": self.position(name).tolist()}
+            turned = self.quaternion(name)
+            if turned is not None:
+                entry["quaternion"] = turned.tolist()
+                if not self.model.space:
+                    entry["angle"] = self.angle(name)
+            nodes[name] = entry
+        reactions = {}
+        for name, node in scene.nodes.items():
+            if node.support != "free":
+                force, moment = self.reaction(name)
+                reactions[name] = {"force": force.tolist(), "moment": moment.tolist()}
+        members = {}
+        for name in scene.members:
+            places = self.places(name)
+            found = self.along(name, places)
+            members[name] = {"s": places.tolist(), **{key: value.tolist() for key, value in found.items()}}
+        answer: dict[str, Any] = {"factor": self.factor, "nodes": nodes, "reactions": reactions, "members": members}
+        answer |= {"springs": {name: self.spring(name).to_dict() for name in scene.springs}} if scene.springs else {}
+        if scene.motions:
+            answer["motions"] = {name: plain(self.motion(name)) for name in scene.motions}
+        if self.contacts:
+            answer["contacts"] = {name: plain(entry) for name, entry in self.contacts.items()}
+        answer |= {"energy": self.energy, "certificate": self.certificate.to_dict()}
+        return {**answer, "notes": list(self.notes)}
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The answer of a scene: one equilibrium a load factor.
+
+    Attributes
+    ----------
+    status : Status
+        SOLVED, or SHORT where an accuracy that was asked for is not reached on the mesh that was asked for; of the
+        steps that a :class:`SolveError` reached, why the next one failed.
+    steps : tuple of Equilibrium
+    seconds : dict
+        Time spent on models and on solving.
+    failure : str
+        Where a step failed: which, and what was tried.
+    """
+
+    scene: Any
+    status: Status
+    steps: tuple[Equilibrium, ...]
+    seconds: Mapping[str, float]
+    failure: str = ""
+
+    @property
+    def last(self) -> Equilibrium:
+        """The equilibrium of the last factor."""
+        return self.steps[-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON answer."""
+        model = self.last.model
+        return {
+            "status": self.status.value,
+            **({"failure": self.failure} if self.failure else {}),
+            "title": self.scene.title,
+            "dimension": model.dimension,
+            "unknowns": model.unknowns,
+            "seconds": dict(self.seconds),
+            "steps": [step.to_dict() for step in self.steps],
+        }
+
+
+def at_factor(
+    error: SolveError, scene: Any, factor: float, steps: Sequence[Equilibrium], seconds: Mapping[str, float]
+) -> SolveError:
+    """The error of one of several steps: with its factor, and with the steps before it."""
+    if len(scene.analysis.steps) == 1:
+        return error
+    detail = f"at factor {factor:.10g}" + (f": {error.detail}" if error.detail else "")
+    if steps:
+        detail += f"; {counted(len(steps), 'step', 'steps')} before it solved"
+    named = SolveError(error.status, detail, error.last)
+    if steps:
+        named.reached = Solution(scene, error.status, tuple(steps), seconds, detail)
+    return named
+
+
+def equilibrium(
+    equations: Equations,
+    state: State,
+    loading: Loading,
+    factor: float,
+    point: Point,
+    residual: float,
+    stability: Stability,
+    *,
+    error_estimate: float | None = None,
+    notes: tuple[str, ...] = (),
+    iterations: int = 0,
+) -> Equilibrium:
+    """Put an equilibrium together; dimensionless in, by name and in SI out.
+
+    Raises
+    ------
+    SolveError
+        The angle of a spring cannot be told.
+    """
+    model, notes = equations.model, tuple(dict.fromkeys(notes))
+    doubt = model.winding.doubt(state.q, state.wound, loading)
+    if doubt is not None:
+        raise SolveError(Status.FAILED, doubt, state)
+    turn = np.where(equations.number >= 0, stability.shape[equations.number], 0.0) if len(stability.shape) else None
+    escape = {} if turn is None else {name: turn[model.chain(name)] for name in model.members}
+    certificate = Certificate(
+        residual=residual,
+        stable=stability.stable,
+        negative=stability.negative,
+        smallest=stability.smallest * model.scales.force,
+        error_estimate=error_estimate,
+        escape=escape,
+    )
+    fields = Fields(equations, state, loading)
+    return Equilibrium(
+        factor=factor,
+        model=model,
+        state=state,
+        loading=loading,
+        certificate=certificate,
+        notes=(*notes, *_not_small(fields)),
+        iterations=iterations,
+        strain=point.strain,
+        potential=point.potential,
+        fields=fields,
+    )
+
+
+def _not_small(fields: Fields) -> tuple[str, ...]:
+    """A note where small members bend so far that linear elasticity is wrong, which no error estimate sees."""
+    members = fields.model.scene.members
+    bent = {name: fields.bent(name) for name, member in members.items() if member.type == "small"}
+    far = sorted((name for name in bent if bent[name] > SMALL), key=lambda name: -bent[name])
+    if not far:
+        return ()
+    others = f", as {counted(len(far) - 1, 'other', 'others')} do" if far[1:] else ""
+    found = f"the small member {far[0]!r} bends by {bent[far[0]]:.2g} of its length or rad{others}"
+    return (f"{found}: its linear elasticity is for a few percent, and the error estimate does not tell",)
+
+
+SMALL = 0.1
+"""Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""

@@ -1,0 +1,285 @@
+"""Static equilibria of a scene: from the undeformed state, in one go, to the accuracy asked for.
+
+1. A coarse *pilot* mesh: IPOPT from a start guess at the full load, then Newton's method to rounding.
+2. The branch is checked by following the loads from zero on the pilot (see :mod:`~sfetcas.solvers.continuation`), and
+   an unstable equilibrium is left along its escape shape.
+3. The mesh is refined where the solution is not smooth enough; Newton's method goes on from the coarser state.
+4. All elements are halved once more: the difference is the estimate of the error, the halved mesh the answer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+from ..contact.contact_balance import refuse_lost_forces, refuse_unbalanced
+from ..contact.contact_statics import ContactRun, Pressed
+from ..contact.settling import Held
+from ..contact.touches import Touched
+from ..description.records import counted
+from ..description.scene import Scene
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.threads import single_threaded
+from ..mechanics.equations import State
+from ..mechanics.fields import transferred
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import Model
+from ..solvers.prepared import Prepared
+from .meshing import Found
+from .piloting import NO_ENERGY, NO_POTENTIAL
+from .refining import LEVELS, Refining
+from .settings import Settings
+from .several import Search, long_elements, missing, same, search
+from .single import finished, solve_model
+from .solution import Equilibrium, Solution, at_factor
+
+__all__ = ["Settings", "pilot_of", "solve", "solve_model"]
+
+CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
+"""Growth of the loads from step to step where a structure between obstacles becomes unstable."""
+
+
+@single_threaded
+def solve(
+    scene: Scene, settings: Settings | None = None, *, stops: tuple[tuple[str, str], ...] = (), **changes: Any
+) -> Solution:
+    """Equilibria of a scene for the load factors of its analysis.
+
+    Parameters
+    ----------
+    scene : Scene
+    settings : Settings, optional
+        Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
+    stops : tuple of (str, str)
+        Springs that stand at a stop, ``low`` or ``high``; others pass theirs (see :mod:`~sfetcas.equilibria.stops`).
+
+    Raises
+    ------
+    SceneError
+        The scene asks for what cannot be modelled.
+    SolveError
+        A factor has no equilibrium that could be found; the sentence says why.
+
+    Example
+    -------
+    >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
+    >>> solve(scene).last.position("tip")                       # doctest: +SKIP
+    """
+    settings = replace(settings or Settings(), **changes)
+    return _Run(scene, settings, stops).solution()
+
+
+def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
+    """The mesh that :func:`solve` begins with."""
+    return _Run(scene, settings or Settings()).target
+
+
+class _Run(Refining):
+    """One run over the load factors of a scene."""
+
+    def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
+        super().__init__(scene, settings, stops)
+        self.creeping = False
+        self.others: list[tuple[Model, State]] = []
+
+    def solution(self) -> Solution:
+        """All steps."""
+        begin = time.perf_counter()
+        pilot = self._prepared(self.pilot_mesh)
+        if self.scene.analysis.equilibria == "all":
+            self._refuse_all(pilot.model)
+        steps: list[Equilibrium] = []
+        last: tuple[float, Found] | None = None
+        contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed) if self.scene.contacts else None
+        for factor in self.scene.analysis.steps:
+            try:
+                if contact is not None:
+                    steps.append(self._in_contact(contact, pilot, factor))
+                    continue
+                found = self._found(pilot, factor, last)
+                last = (factor, found) if found.prepared is pilot else None
+                steps.append(self._refined(found, factor))
+                if self.scene.analysis.equilibria == "all":
+                    steps[-1:] = self._several(found, steps[-1], factor)
+            except SolveError as error:
+                self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
+                raise at_factor(self._named(pilot, error), self.scene, factor, steps, self.seconds) from None
+        self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
+        reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
+        status = Status.SOLVED if reached or not self.asked else Status.SHORT
+        return Solution(self.scene, status, tuple(steps), self.seconds)
+
+    # -- several equilibria ---------------------------------------------------------------------
+
+    def _several(self, found: Found, answer: Equilibrium, factor: float) -> list[Equilibrium]:
+        """The answer, which tells of the search, then further equilibria of the same factor with rising energy."""
+        result = self._searched(found, factor)
+        answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
+        for number, corrected in enumerate(result.found[1:], start=1):
+            stability = result.prepared.stability(corrected)
+            candidate = Found(result.prepared, corrected, stability, result.family_note(number), kept=True)
+            further = self._further(candidate, factor)
+            if further is None:
+                dropped += 1
+            elif not any(same(further, other) for other in answers):
+                answers.append(further)
+        note = result.sentence() + missing(answers)
+        if dropped:
+            coarse = counted(dropped, "equilibrium", "equilibria")
+            note += f"; {coarse} of the mesh of the search not found on finer ones"
+        answers[0] = replace(answers[0], notes=(*answers[0].notes, note))
+        return [answers[0], *sorted(answers[1:], key=lambda other: other.potential)]
+
+    @staticmethod
+    def _refuse_all(model: Model) -> None:
+        """Refuse to search under loads whose energy is not there, or not known.
+
+        Raises
+        ------
+        SceneError
+            Such loads.
+        """
+        if model.has_potential:
+            return
+        why = "loads without potential have no energy to search by"
+        if model.conservative:
+            why = "the energy of pressure, by which equilibria are sorted and told apart, is not evaluated"
+        raise SceneError(f"found 'all', accepted: 'one', as {why}", ("analysis", "equilibria"))
+
+    def _further(self, candidate: Found, factor: float) -> Equilibrium | None:
+        """The answer to what a search found; None where finer meshes do not have it."""
+        try:
+            answer = self._refined(candidate, factor)
+        except SolveError:
+            return None
+        short = (answer.certificate.error_estimate or 0.0) > self.accuracy
+        return None if short and not self._prescribed else answer
+
+    def _searched(self, found: Found, factor: float) -> Search:
+        """The search, on a mesh fine enough for what is strongly curled, but for elements that are prescribed."""
+        first = found
+        if not self._prescribed:
+            first = self._onto(self._halved(found), found, factor)
+        elif self.pilot_mesh is not self.target:
+            first = self._onto(found.prepared.model.mesh.refined(), found, factor)
+        for _ in range(LEVELS if first is not found else 0):
+            long = long_elements(first.prepared, first.prepared.model.loading(factor), first.corrected)
+            marks = {name: marked & (name not in self.fixed) for name, marked in long.items()}
+            if not any(marked.any() for marked in marks.values()):
+                break
+            first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
+        prepared, loading = first.prepared, first.prepared.model.loading(factor)
+        starts = [transferred(model, state, prepared.model) for model, state in self.others]
+        result = search(prepared, loading, first.corrected, starts, self.settings.runs)
+        self.others = [(prepared.model, other.state) for other in result.found]
+        return result
+
+    # -- contact --------------------------------------------------------------------------------
+
+    def _in_contact(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium:
+        """The answer where obstacles may stop members."""
+        base = self.pilot_mesh.refined()
+        notes: tuple[str, ...] = ()
+        last = contact.continued(base, factor)
+        falls = bool(pilot.diagnosis.mobility) and not contact.first_touches(base)
+        held, failure = None, None
+        if last is None or not last.mesh.touches:
+            free, failure = self._unstopped(pilot, factor)
+            if free is not None and free.left and not self.creeping and not self.scene.histories:
+                return self._crept(contact, pilot, factor, free.left[0])
+            last = None
+            if free is not None:
+                there = self._onto(base, free, factor)
+                held = _as_held(there, factor)
+                # What was seen on the way without obstacles says nothing about the one in contact.
+                notes = tuple(note for note in there.notes if note != NO_POTENTIAL)
+                free_way = contact.reviser.wrong(held, contact.at(factor)) is None
+                over = contact.reviser.ran_over(None, held)
+                if free_way and not over:
+                    answer = self._refined(free, factor)
+                    if contact.clear(answer.fields):
+                        contact.last = (factor, held)
+                        return answer
+                # Beyond an obstacle and clear of it: only a start may choose that.
+                held = None if free_way and over and not self.started else held
+        ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
+        notes += () if pilot.model.conservative else (NO_ENERGY,)
+        # Of what is free to move nothing else says more: without obstacles it falls, whatever they hold.
+        failure = None if pilot.diagnosis.mobility else failure
+        return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
+
+    def _first_pressed(
+        self,
+        contact: ContactRun,
+        ways: Iterator[Held | None],
+        factor: float,
+        notes: tuple[str, ...],
+        failure: SolveError | None,
+    ) -> Equilibrium:
+        """The first stable answer among states in contact that were found in different ways; else the first."""
+        refused: SolveError | None = None
+        unstable: Equilibrium | None = None
+        for held in ways:
+            if held is None:
+                continue
+            try:
+                answer = self._pressed(contact.answered(held, factor, self.target, (*notes, *contact.jumped)), factor)
+            except SolveError as error:
+                refused = refused or error
+                continue
+            if not self.leave or answer.certificate.negative == 0:
+                return answer
+            unstable = unstable or answer
+        if unstable is not None:
+            return unstable
+        if refused is not None:
+            raise refused
+        contact.refuse_what_cannot_be(self._prepared(self.pilot_mesh), factor)
+        detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
+        raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
+
+    def _crept(self, contact: ContactRun, pilot: Prepared, factor: float, unstable: float) -> Equilibrium:
+        """The same by small steps from where the loads would make it jump: nothing jumps over an obstacle."""
+        self.creeping = True
+        try:
+            beyond = unstable
+            for growth in CREEP:
+                beyond *= growth
+                if beyond >= 1.0:
+                    break
+                self._in_contact(contact, pilot, beyond * factor)
+            return self._in_contact(contact, pilot, factor)
+        finally:
+            self.creeping = False
+
+    def _unstopped(self, pilot: Prepared, factor: float) -> tuple[Found | None, SolveError | None]:
+        """The answer as if there were no obstacles; None where nothing else holds the structure."""
+        try:
+            return self._on_pilot(pilot, factor, None), None
+        except SolveError as error:
+            return None, error
+
+    def _pressed(self, found: Pressed, factor: float) -> Equilibrium:
+        held = found.held
+        refuse_unbalanced(held.touched.fields)
+        answer = finished(
+            held.prepared,
+            held.corrected,
+            held.loading,
+            factor,
+            found.stability,
+            estimate=found.error,
+            notes=found.notes,
+        )
+        refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
+        return answer
+
+
+def _as_held(found: Found, factor: float) -> Held:
+    """An equilibrium without contact as one that may begin it."""
+    loading = found.prepared.model.loading(factor)
+    touched = Touched(found.prepared.equations, found.corrected.state, loading)
+    return Held(found.prepared, found.corrected, loading, touched)

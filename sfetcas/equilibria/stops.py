@@ -1,0 +1,82 @@
+"""Statics where springs may stand at their stops.
+
+Each load factor is solved by itself: of the stops that pull the one that pulls most is left, else the one that is
+passed by most is taken, until all that are taken push and none is passed.  A stop that is taken is a row, and its
+multiplier is what the stop does.
+"""
+
+from __future__ import annotations
+
+from ..description.scene import Scene
+from ..errors import SceneError, SolveError, Status
+from .solution import Equilibrium, Solution, at_factor
+from .statics import Settings, solve
+
+__all__ = ["solve_stopped"]
+
+Stops = tuple[tuple[str, str], ...]
+"""Springs that stand at a stop: name, and low or high."""
+
+
+def solve_stopped(scene: Scene, settings: Settings) -> Solution:
+    """Equilibria of a scene whose springs have stops.
+
+    Raises
+    ------
+    SceneError
+        All equilibria are asked for.
+    SolveError
+        No choice of stops holds, or a factor has no equilibrium that could be found.
+    """
+    if scene.analysis.equilibria == "all":
+        message = "found 'all' with stops of springs, accepted: 'one'"
+        raise SceneError(message, ("analysis", "equilibria"))
+    steps: list[Equilibrium] = []
+    status, seconds = Status.SOLVED, {"model": 0.0, "solve": 0.0}
+    stops: Stops = ()
+    for factor in scene.analysis.steps:
+        try:
+            found, stops = _at_stops(scene, settings, factor, stops)
+        except SolveError as error:
+            raise at_factor(error, scene, factor, steps, seconds) from None
+        steps += found.steps
+        status = found.status if status is Status.SOLVED else status
+        seconds = {key: seconds[key] + found.seconds[key] for key in seconds}
+    return Solution(scene, status, tuple(steps), seconds)
+
+
+def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> tuple[Solution, Stops]:
+    """The answer of one factor, from the stops that the factor before it reached."""
+    alone = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"steps": (factor,)})})
+    tried = set()
+    while stops not in tried:
+        tried.add(stops)
+        found = solve(alone, settings, stops=stops)
+        change = _next_stops(found.last, stops)
+        if change == stops:
+            return found, stops
+        stops = change
+    names = ", ".join(f"springs.{name}" for name, _ in stops)
+    raise SolveError(Status.FAILED, f"no choice of stops holds: {names}")
+
+
+def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
+    """The stops without the one that pulls most or, where none does, with the one that is passed most."""
+    scene, held = answer.model.scene, dict(stops)
+    pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops}
+    if pulls and max(pulls.values()) > 0.0:
+        worst = max(pulls, key=lambda name: pulls[name])
+        return tuple(stop for stop in stops if stop[0] != worst)
+    passed: dict[tuple[str, str], float] = {}
+    for name, spring in scene.springs.items():
+        if spring.stop is not None and name not in held:
+            travel, (low, high) = answer.spring(name).travel, spring.stop
+            passed[name, "low"], passed[name, "high"] = low - travel, travel - high
+    if passed and max(passed.values()) > 0.0:
+        return (*stops, max(passed, key=lambda stop: passed[stop]))
+    return stops
+
+
+def _pull(effort: float, side: str) -> float:
+    """How much a stop holds back instead of pushing back: a high one pushes down, a low one up."""
+    return effort if side == "high" else -effort

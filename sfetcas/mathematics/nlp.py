@@ -1,0 +1,238 @@
+"""Nonlinear programs as plain records, and their solution by IPOPT or any other nlpsol plugin.
+
+    minimise f(x, p)  over x,   lower <= g(x, p) <= upper,   x_lower <= x <= x_upper
+
+This module knows no mechanics.  Multipliers have the sign of CasADi: ``grad f + J^T lam = 0``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SolveError, Status
+from .arrays import Array
+
+__all__ = ["NLP", "Ipopt", "NLPResult", "Solver"]
+
+
+@dataclass(frozen=True, eq=False)
+class NLP:
+    """A nonlinear program with named rows; terms, rows and bounds are added by making a new one.
+
+    Attributes
+    ----------
+    x, p, f, g : casadi.MX
+        Unknowns, parameters, objective and rows.
+    lower, upper : ndarray
+        Bounds of the rows.
+    x_lower, x_upper, guess : ndarray
+        Bounds of the unknowns and where to begin.
+    p_value : ndarray
+        Values of the parameters.
+    rows : tuple of str
+        Names of the rows.
+    gradient, jacobian : casadi.MX
+        Derivatives of f and g by x.
+    hessian : callable
+        (lam_f, lam_g) -> Hessian of ``lam_f f + lam_g.g`` by x, full and symmetric.
+    """
+
+    x: ca.MX
+    p: ca.MX
+    f: ca.MX
+    g: ca.MX
+    lower: Array
+    upper: Array
+    x_lower: Array
+    x_upper: Array
+    guess: Array
+    p_value: Array
+    rows: tuple[str, ...]
+    gradient: ca.MX
+    jacobian: ca.MX
+    hessian: Callable[[ca.MX, ca.MX], ca.MX]
+
+    def with_term(self, term: ca.MX) -> NLP:
+        """The program with a term added to the objective (in the unit of the objective)."""
+        old = self.hessian
+
+        def hessian(lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
+            return old(lam_f, lam_g) + lam_f * ca.hessian(term, self.x)[0]
+
+        gradient = self.gradient + ca.gradient(term, self.x)
+        return replace(self, f=self.f + term, gradient=gradient, hessian=hessian)
+
+    def with_row(self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None) -> NLP:
+        """The program with rows ``lower <= row <= upper`` added (equality with ``lower`` by default)."""
+        row = ca.vec(row)
+        size = row.numel()
+        old, before = self.hessian, self.g.numel()
+
+        def hessian(lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
+            own = ca.hessian(ca.dot(lam_g[before:], row), self.x)[0]
+            # An empty slice of a column is no column.
+            return old(lam_f, lam_g[:before] if before else ca.MX(0, 1)) + own
+
+        low = np.broadcast_to(np.asarray(lower, dtype=float), (size,))
+        high = low if upper is None else np.broadcast_to(np.asarray(upper, dtype=float), (size,))
+        return replace(
+            self,
+            g=ca.vertcat(self.g, row),
+            lower=np.concatenate([self.lower, low]),
+            upper=np.concatenate([self.upper, high]),
+            rows=(*self.rows, *([name] if size == 1 else [f"{name}[{i}]" for i in range(size)])),
+            jacobian=ca.vertcat(self.jacobian, ca.jacobian(row, self.x)),
+            hessian=hessian,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class NLPResult:
+    """What a solver returned; ``status`` says whether it is a solution."""
+
+    status: Status
+    x: Array
+    lam: Array
+    f: float
+    iterations: int
+    message: str
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Any nlpsol plugin with its options.
+
+    Attributes
+    ----------
+    plugin : str
+        Name of the plugin: ipopt, sqpmethod, fatrop, ...
+    options : mapping
+        Options of nlpsol and of the plugin, as CasADi takes them.
+    exact : bool
+        Hand the record's derivatives over where the plugin takes them (IPOPT does); otherwise CasADi
+        differentiates the expressions again.
+    """
+
+    plugin: str = "ipopt"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    exact: bool = True
+
+    def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
+        """A function (p, guess, lam) -> NLPResult; each argument defaults to that of the record."""
+        options = dict(self.options)
+        if self.exact and self.plugin == "ipopt":
+            options |= _derivatives(nlp)
+        function = ca.nlpsol("nlp", self.plugin, {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}, options)
+
+        def solve(p: Array | None = None, guess: Array | None = None, lam: Array | None = None) -> NLPResult:
+            try:
+                solution = function(
+                    x0=nlp.guess if guess is None else guess,
+                    p=nlp.p_value if p is None else p,
+                    lbx=nlp.x_lower,
+                    ubx=nlp.x_upper,
+                    lbg=nlp.lower,
+                    ubg=nlp.upper,
+                    lam_g0=np.zeros(nlp.g.numel()) if lam is None else lam,
+                )
+            except RuntimeError as error:
+                # What a plugin cannot cope with, CasADi says in many lines, the reason last.
+                reason = str(error).strip().splitlines()[-1]
+                raise SolveError(Status.FAILED, f"{self.plugin}: {reason}") from None
+            stats = function.stats()
+            if stats.get("return_status") == "NonIpopt_Exception_Thrown":
+                # The one exception that reaches IPOPT from outside is Ctrl-C.
+                raise KeyboardInterrupt
+            return NLPResult(
+                status=_status(stats),
+                x=solution["x"].full().ravel(),
+                lam=solution["lam_g"].full().ravel(),
+                f=float(solution["f"]),
+                iterations=int(stats.get("iter_count", 0)),
+                message=str(stats.get("return_status", "")),
+            )
+
+        return solve
+
+    def solve(self, nlp: NLP) -> NLPResult:
+        """Solve the program as it stands."""
+        return self.prepare(nlp)()
+
+
+def _derivatives(nlp: NLP) -> dict[str, ca.Function]:
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", nlp.g.numel())
+    return {
+        "grad_f": ca.Function("nlp_grad_f", [nlp.x, nlp.p], [nlp.f, nlp.gradient]),
+        "jac_g": ca.Function("nlp_jac_g", [nlp.x, nlp.p], [nlp.g, nlp.jacobian]),
+        "hess_lag": ca.Function("nlp_hess_l", [nlp.x, nlp.p, lam_f, lam_g], [ca.triu(nlp.hessian(lam_f, lam_g))]),
+    }
+
+
+def _status(stats: Mapping[str, Any]) -> Status:
+    if stats.get("success"):
+        return Status.SOLVED
+    message = str(stats.get("return_status", ""))
+    for part, status in {
+        "nfeasible": Status.INFEASIBLE,
+        "Diverging": Status.UNBOUNDED,
+        "Maximum_Iterations": Status.ITERATIONS,
+    }.items():
+        if part in message:
+            return status
+    return Status.FAILED
+
+
+@dataclass(frozen=True)
+class Ipopt:
+    """IPOPT with settings that suit equilibria.
+
+    Attributes
+    ----------
+    tolerance : float
+        Tolerance of IPOPT; the last digits come from a Newton step afterwards.
+    iterations : int
+        Largest number of iterations.
+    objective_scale : float
+        What IPOPT multiplies the objective by.
+    verbose : bool
+        Let IPOPT print.
+    extra : mapping
+        Further options of IPOPT by its own names, e.g. ``{"mu_strategy": "adaptive"}``.
+    """
+
+    tolerance: float = 1e-9
+    iterations: int = 500
+    objective_scale: float = 1.0
+    verbose: bool = False
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
+        """A function (p, guess, lam) -> NLPResult."""
+        ipopt = {
+            "tol": self.tolerance,
+            "max_iter": self.iterations,
+            "print_level": 5 if self.verbose else 0,
+            "sb": "yes",
+            # The problem is dimensionless; IPOPT's own scaling by first gradients would undo that.
+            "nlp_scaling_method": "none",
+            "obj_scaling_factor": self.objective_scale,
+            **self.extra,
+        }
+        options = {
+            "print_time": False,
+            "calc_lam_p": False,
+            "calc_lam_x": False,
+            "error_on_fail": False,
+            "no_nlp_grad": True,
+        }
+        return Solver("ipopt", {**options, "ipopt": ipopt}).prepare(nlp)
+
+    def solve(self, nlp: NLP) -> NLPResult:
+        """Solve the program as it stands."""
+        return self.prepare(nlp)()

@@ -1,0 +1,332 @@
+"""Balance of nodes: reactions, what springs and small members do, and moments inside rigid members.
+
+Every force and moment here is what one thing takes from its surroundings; at a node they add up to the load and
+the reaction.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mathematics.linear import SparseMap, smallest
+from .connections import GROUND, Group
+from .equations import Equations, State
+from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
+from .joints import Spring as Tension
+from .loading import Loading
+from .rotations import STIFF, end_joints
+
+__all__ = ["Balance", "SpringState", "three"]
+
+
+@dataclass(frozen=True)
+class SpringState:
+    """A spring at a state: angle (rad) and moment (N m), or elongation (m) and force (N), on the second party."""
+
+    rotational: bool
+    travel: float
+    effort: float
+    stop: float | None = None
+
+    def to_dict(self) -> dict[str, float]:
+        """As in the JSON answer; ``stop`` is what a stop does, zero while it is not reached."""
+        names = ("angle", "moment") if self.rotational else ("travel", "force")
+        found = dict(zip(names, (self.travel, self.effort), strict=True))
+        return found if self.stop is None else {**found, "stop": self.stop}
+
+
+def three(a: Array) -> Array:
+    """Vectors (..., 2) or (..., 3) as (..., 3)."""
+    return a if a.shape[-1] == 3 else np.concatenate([a, np.zeros((*a.shape[:-1], 1))], axis=-1)
+
+
+class Balance:
+    """The balance of one state, dimensionless.
+
+    Parameters
+    ----------
+    start_forces, end_forces : sequences of ndarray (axes,)
+        Internal force at both ends of each segment.
+    places : ndarray (places, axes)
+        Displacements.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        state: State,
+        loading: Loading,
+        start_forces: Sequence[Array],
+        end_forces: Sequence[Array],
+        places: Array,
+    ) -> None:
+        self.model, self._state, self._loading = equations.model, state, equations.effective(state, loading)
+        self._moments, self._links = equations.shares(state, loading)
+        self._start_forces, self._end_forces, self._places = start_forces, end_forces, places
+        self._turns = equations.model.element.turns
+
+    # -- shares of connections ------------------------------------------------------------------
+
+    def _moment_of(self, group: Group, links: Array, number: int, side: int) -> Array:
+        moment = np.zeros(3)
+        moment[3 - self._turns :] = links[number, side * self._turns : (side + 1) * self._turns]
+        return moment
+
+    def _force_of(self, group: Group, links: Array, number: int, side: int) -> Array:
+        axes = self.model.element.axes
+        first = group.turns.shape[1] * self._turns + side * axes
+        return three(links[number, first : first + axes])
+
+    @functools.cached_property
+    def _totals(self) -> Array:
+        """Moments (rotations, 3) that are left to supports."""
+        model = self.model
+        totals = -self._loading.moment
+        np.add.at(totals, model.rotations.turns, self._moments)
+        for group, links in zip(model.connections, self._links, strict=True):
+            for side in range(group.turns.shape[1]):
+                for number, turn in enumerate(group.turns[:, side]):
+                    if turn != GROUND and not self._is_ground(group, number):
+                        totals[turn] += self._moment_of(group, links, number, side)
+        return totals
+
+    @staticmethod
+    def _is_ground(group: Group, number: int) -> bool:
+        """A universal support: what it does is a reaction."""
+        return isinstance(group.kind, Universal) and bool((group.turns[number] == GROUND).any())
+
+    def reaction(self, node: str) -> tuple[Array, Array]:
+        """Force and moment about the node that the ground exerts."""
+        return self._force(node), self._moment(node)
+
+    def _force(self, node: str) -> Array:
+        model, place = self.model, self.model.segments.place(node)
+        force = -three(self._loading.own[place])
+        for i, part in enumerate(model.segments.parts):
+            if part.start == node:
+                force = force - three(self._start_forces[i])
+            if part.end == node:
+                force = force + three(self._end_forces[i])
+        for group, links in zip(model.connections, self._links, strict=True):
+            for number, side in np.argwhere(group.places == place):
+                force = force + self._force_of(group, links, number, side)
+        return force
+
+    def _moment(self, node: str) -> Array:
+        number = self.model.rotations.node_turn[node]
+        if number is None:
+            return sum((self._totals[turn] for turn in self._pinned(node)), np.zeros(3))
+        if self._shared(number):
+            return self._rigid[1].get(node, np.zeros(3))
+        return self._totals[number]
+
+    def _pinned(self, node: str) -> list[int]:
+        """Rotations of member ends that the support itself pins, the node having none."""
+        record = self.model.scene.nodes[node]
+        if record.support == "free" or record.joint != "hinge":
+            return []
+        ends = self.model.rotations.ends
+        return [ends[name][m.nodes.index(node)] for name, m in self.model.scene.members.items() if node in m.nodes]
+
+    def starting_moments(self, elements: slice) -> Array:
+        """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
+        return np.asarray(self._moments[elements, 0])
+
+    # -- rigid members ----------------------------------------------------------------------------
+
+    def _shared(self, number: int) -> bool:
+        return sum(other == number for other in self.model.rotations.node_turn.values()) > 1
+
+    def start_moment(self, member: str) -> Array:
+        """Moment that the surroundings exert on the first end of a member of elements."""
+        if self.model.scene.members[member].type == "rigid":
+            return self._rigid[0][member]
+        return np.asarray(self._moments[self.model.beams.first[member], 0])
+
+    @functools.cached_property
+    def _rigid(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Moments on first ends of rigid members, and reactions of nodes that share a rotation.
+
+        From the balance of every node that a rigid member is joined to.  Where that leaves a choice (rigid members
+        in loops, one body with several supports) the smallest reactions are taken, then the smallest moments inside.
+        """
+        scene = self.model.scene
+        names = [name for name in self.model.members if scene.members[name].type == "rigid"]
+        nodes = list(dict.fromkeys(n for name in names for n in scene.members[name].nodes))
+        held = [n for n in nodes if scene.nodes[n].turn not in ("free", "ball")]
+        columns = {("member", name): i for i, name in enumerate(names)}
+        columns |= {("node", n): len(names) + i for i, n in enumerate(held)}
+        balances = [self._at_node(columns, names, node) for node in nodes]
+        for name in names:
+            ends = end_joints(scene, scene.members[name])
+            balances += [self._at_pin(columns, name, i) for i, (_, joint) in enumerate(ends) if joint not in STIFF]
+        rows = [({3 * i + k: gain for i, gain in row.items()}, right[k]) for row, right in balances for k in range(3)]
+        for n in filter(self._turns_freely, held):
+            first, axis = 3 * columns["node", n], np.asarray(scene.nodes[n].turn_axis)
+            rows.append(({first + k: part for k, part in enumerate(axis / np.linalg.norm(axis))}, 0.0))
+        weights = np.repeat([INSIDE, 1.0], [3 * len(names), 3 * len(held)])
+        solved = _smallest(rows, weights).reshape(-1, 3)
+        starts = {name: solved[i] for (kind, name), i in columns.items() if kind == "member"}
+        return starts, {name: solved[i] for (kind, name), i in columns.items() if kind == "node"}
+
+    def _turns_freely(self, node: str) -> bool:
+        """A supported hinge that nothing drives: the ground exerts no moment about its axis."""
+        scene = self.model.scene
+        driven = any(m.node == node and m.rotation is not None and m.between is None for m in scene.motions.values())
+        return scene.nodes[node].turn == "hinge" and not driven
+
+    def _at_node(
+        self, columns: dict[tuple[str, str], int], rigid: list[str], node: str
+    ) -> tuple[dict[int, float], Array]:
+        """All that takes moments at a node, the reaction on the other side."""
+        row, known = dict[int, float](), self._node_known(node)
+        for name in rigid:
+            for i, at in enumerate(self.model.scene.members[name].nodes):
+                if at == node:
+                    row[columns["member", name]] = 1.0 - 2.0 * i
+                    known = known + i * self._gain(name)
+        if ("node", node) in columns:
+            row[columns["node", node]] = -1.0
+        return row, -known
+
+    def _at_pin(self, columns: dict[tuple[str, str], int], member: str, i: int) -> tuple[dict[int, float], Array]:
+        """What the joint at a released end takes, a rigid member does not."""
+        node, turn = self.model.scene.members[member].nodes[i], self.model.rotations.ends[member][i]
+        right = -self._connected(node, turn) - i * self._gain(member)
+        return {columns["member", member]: 1.0 - 2.0 * i}, right
+
+    def _connected(self, node: str, turn: int | None = None) -> Array:
+        """Moments that joints and springs at a node take from one rotation, or springs and slides from all.
+
+        A hinge takes from one side what it gives to the other; a slide has a lever, a spring may go to the ground.
+        """
+        moment = np.zeros(3)
+        for group, links in zip(self.model.connections, self._links, strict=True):
+            if isinstance(group.kind, Body):
+                continue
+            for number, side in np.argwhere(group.turns != GROUND):
+                mine = isinstance(group.kind, ONE_SIDED) if turn is None else group.turns[number, side] == turn
+                if mine and group.nodes[number] == node:
+                    moment = moment + self._moment_of(group, links, number, side)
+        return moment
+
+    def spring_moment(self, node: str) -> Array:
+        """Moment that rotational springs at a node take from its surroundings."""
+        return self._connected(node)
+
+    def _gain(self, member: str) -> Array:
+        """Moment on the second end of a rigid member plus that on the first: what its forces leave."""
+        part = self.model.elements_of(member)
+        return self._moments[part].sum(axis=(0, 1)) - self._loading.jump[part].sum(axis=0)
+
+    def _node_known(self, node: str) -> Array:
+        """Moments that all but rigid members take at a node, less the load there."""
+        model, scene = self.model, self.model.scene
+        known = np.zeros(3)
+        for name, member in scene.members.items():
+            if node not in member.nodes or member.type == "rigid":
+                continue
+            i = member.nodes.index(node)
+            if member.type == "small":
+                known = known + self.body_ends(name)[i][1]
+            else:
+                part = model.elements_of(name)
+                known = known + (self._moments[part.start, 0] if i == 0 else self._moments[part.stop - 1, -1])
+        place = model.segments.place(node)
+        return known + self._connected(node) - self._loading.couple[place]
+
+    # -- springs and small members ----------------------------------------------------------------
+
+    def spring(self, name: str) -> SpringState:
+        """Angle and moment, or travel and force, and what its stop does, in SI units."""
+        state, record = self._spring(name), self.model.scene.springs[name]
+        if record.stop is None:
+            return state
+        unit, row = self.model.scales.moment if state.rotational else self.model.scales.force, f"springs.{name}.stop"
+        names = self.model.row_names
+        effort = -float(self._state.lam[names.index(row)]) * unit if row in names else 0.0
+        return replace(state, stop=effort)
+
+    def drive(self, name: str) -> dict[str, float]:
+        """What drives a joint, in SI units: the derivatives of the energy by its angle and its travel."""
+        found: dict[str, float] = {}
+        first = len(self.model.positions.rows)
+        for group, loads in zip(self.model.connections, self._loading.loads, strict=True):
+            if isinstance(group.kind, (DrivenTurn, DrivenSlide)) and name in group.names:
+                i = group.names.index(name)
+                effort = -float(self._state.lam[first + i])
+                if isinstance(group.kind, DrivenTurn):
+                    found["moment"] = self._way(group, i, float(loads[i, 0])) * effort * self.model.scales.moment
+                else:
+                    found["force"] = effort * self.model.scales.force
+            first += len(group.rows)
+        return found
+
+    def _way(self, group: Group, number: int, angle: float) -> float:
+        """Sign of a driven turn's row, which in space is a sine: it changes with each whole turn."""
+        if not self.model.space:
+            return 1.0
+        a, b = (np.array([1.0, 0, 0, 0]) if turn == GROUND else self._state.q[turn] for turn in group.turns[number])
+        r = quaternion.multiply(quaternion.conjugate(a), b)
+        return float(np.sign(np.cos(0.5 * angle) * r[0] + np.sin(0.5 * angle) * (group.data[number] @ r[1:])))
+
+    def _spring(self, name: str) -> SpringState:
+        model, scales = self.model, self.model.scales
+        group, i = next((g, g.names.index(name)) for g in model.connections if name in g.names and _is_spring(g))
+        data, axes = group.data[i], model.element.axes
+        if isinstance(group.kind, TurnSpring):
+            stiffness, rest = data[group.kind.first :][:2].tolist()
+            angle = self._angle(group, i)
+            return SpringState(True, angle, -stiffness * (angle - rest) * scales.moment)
+        gap = [np.zeros(axes) if place == GROUND else self._places[place] for place in group.places[i]]
+        moved = gap[1] - gap[0]
+        if isinstance(group.kind, LineSpring):
+            travel = float(data[:axes] @ moved)
+            return SpringState(False, travel * scales.length, -data[axes] * (travel - data[axes + 1]) * scales.force)
+        travel = float(np.linalg.norm(data[:axes] + moved) - data[axes + 1])
+        return SpringState(False, travel * scales.length, -data[axes] * travel * scales.force)
+
+    def _angle(self, group: Group, number: int) -> float:
+        """Angle of a rotational spring, all turns counted."""
+        model, state = self.model, self._state
+        part = model.winding.parts[next(i for i, other in enumerate(model.connections) if other is group)]
+        if part is not None:
+            return float(model.winding.angles(state.q, state.wound)[part][number])
+        a, b = (0.0 if turn == GROUND else float(state.q[turn, 0]) for turn in group.turns[number])
+        return float(group.data[number, 2]) * (b - a)
+
+    def body_ends(self, member: str) -> list[tuple[Array, Array]]:
+        """Force and moment that the surroundings exert on each end of a small member."""
+        for group, links in zip(self.model.connections, self._links, strict=True):
+            if isinstance(group.kind, Body) and member in group.names:
+                i = group.names.index(member)
+                sides = range(group.kind.nodes)
+                return [(self._force_of(group, links, i, k), self._moment_of(group, links, i, k)) for k in sides]
+        raise KeyError(member)
+
+
+ONE_SIDED = (TurnSpring, TurnStop, Slide, DrivenSlide)
+"""Kinds whose moments on the rotations of a node do not add up to nothing."""
+
+
+def _smallest(rows: Sequence[tuple[dict[int, float], float]], weights: Array) -> Array:
+    """The smallest solution of rows, each its entries by column and its right side."""
+    row = np.repeat(np.arange(len(rows)), [len(entries) for entries, _ in rows])
+    column = np.concatenate([list(entries) for entries, _ in rows])
+    value = np.concatenate([list(entries.values()) for entries, _ in rows])
+    matrix = SparseMap(row, column, value, (len(rows), len(weights)))
+    return smallest(matrix, np.array([right for _, right in rows]), weights)
+
+
+INSIDE = 1e-8
+"""Weight of moments inside rigid members where reactions count 1: reactions are made small first."""
+
+
+def _is_spring(group: Group) -> bool:
+    return isinstance(group.kind, (TurnSpring, LineSpring, Tension))

@@ -1,0 +1,120 @@
+"""Units of a model, and what the elements of its members are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from .elements import Element
+from .mesh import Mesh
+
+__all__ = ["Beams", "Scales", "beams_of", "scales_of"]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units of a model: length (m), force (N) and moment or energy (N m)."""
+
+    length: float
+    moment: float
+
+    @property
+    def force(self) -> float:
+        """Unit of force, N."""
+        return self.moment / self.length
+
+
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """What the elements of all members are made of, dimensionless.
+
+    Attributes
+    ----------
+    stiffness : ndarray (elements, points, stiffnesses)
+        Stiffness times weight over length, fixed axes of the undeformed scene.
+    tangent : ndarray (elements, points, axes)
+        Tangent of the unloaded centre line times weight times length.
+    weight : ndarray (elements, points)
+        Weight times length.
+    first : dict
+        Number of the first element of a member.
+    """
+
+    stiffness: Array
+    tangent: Array
+    weight: Array
+    first: dict[str, int]
+
+
+def scales_of(scene: Scene) -> Scales:
+    """Units that suit a scene: its longest member and its largest stiffness."""
+    length = max(line.length for line in scene.center_lines.values())
+    x = np.linspace(0.0, 1.0, 5)
+    found = []
+    for name, member in scene.members.items():
+        if member.section is not None and member.type != "rigid":
+            found.append(float(np.nanmax(scene.sections[member.section].stiffness(x))) / length)
+        elif member.stiffness is not None:
+            turning = np.abs(np.diag(np.asarray(member.stiffness)).reshape(-1, 2, 3)[:, 1]).max()
+            found.append(float(turning) * scene.center_lines[name].length / length)
+    found = found or [spring.stiffness for spring in scene.springs.values() if spring.type == "rotational"]
+    found = found or [spring.stiffness * length**2 for spring in scene.springs.values()]
+    return Scales(length, max(found, default=0.0) or _load_size(scene, length) or 1.0)
+
+
+def _load_size(scene: Scene, length: float) -> float:
+    """Size of the loads as moments, N m, for scenes in which nothing is elastic."""
+    forces = [float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "force"]
+    moments = [float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "moment"]
+    spread = [float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "distributed"]
+    masses = [node.mass for node in scene.nodes.values()]
+    for name, member in scene.members.items():
+        if member.section is not None:
+            masses.append(
+                float(scene.sections[member.section].mass(np.array([0.5]))[0]) * scene.center_lines[name].length
+            )
+    weight = 0.0 if scene.gravity is None else max(masses, default=0.0) * float(np.linalg.norm(scene.gravity))
+    return max([*(force * length for force in [*forces, weight]), *moments, *(q * length**2 for q in spread)])
+
+
+def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
+    """Data of the elements of all members but the small ones, which have none."""
+    stiffness, tangent, weight = [], [], []
+    first: dict[str, int] = {}
+    count = 0
+    for name, member in scene.members.items():
+        if member.type == "small":
+            continue
+        cuts, line = mesh.cuts[name], scene.center_lines[name]
+        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.points
+        length = line.length / scales.length * np.diff(cuts)
+        w = length[:, None] * element.weights
+        values = np.zeros((x.size, 3))
+        if member.type == "flexible":
+            section = scene.sections[str(member.section)]
+            values = section.stiffness(x.ravel()) / (scales.moment * scales.length)
+        frames = quaternion.matrix(line.quaternions(x.ravel()))
+        # Integrals over xi of squares of derivatives by xi: weight over length.
+        per_length = (element.weights / length[:, None])[..., None]
+        stiffness.append(_in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
+        tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
+        weight.append(w)
+        first[name] = count
+        count += len(w)
+    n = element.order + 1
+    stiffness.append(np.zeros((0, n, element.stiffnesses)))
+    tangent.append(np.zeros((0, n, element.axes)))
+    weight.append(np.zeros((0, n)))
+    return Beams(np.concatenate(stiffness), np.concatenate(tangent), np.concatenate(weight), first)
+
+
+def _in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:
+    """Stiffness (n, 3) about b1, b2, b3 in the fixed axes: upper triangles (n, 6), or about z (n, 1)."""
+    if not element.space:
+        return values[:, 1:2] if bending_axis == 2 else values[:, 2:3]
+    full = np.einsum("nij,nj,nkj->nik", frames, values, frames)
+    return full[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]

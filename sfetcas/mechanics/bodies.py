@@ -1,0 +1,209 @@
+"""Small members as bodies: stiffness, deformations that do not exist, and levers of their loads.
+
+From a section the stiffness is that of linear beam theory, inextensible and unshearable as the flexible members
+are, of any shape and any variation along it.  With the first end held, a wrench at the second moves that by
+
+    C = int B^T D^-1 B ds,      B the moment at s of a unit wrench at the end,
+
+exactly up to quadrature; the stiffness is the inverse of C where it has one, and what C cannot move (the length
+of a straight member) are rows.
+
+Loads along a member are a profile times a vector fixed in space.  What they do to a body in a frame is given by
+their sum, their first moment, and consistent forces at its ends: those that hold the ends still.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.matrices import rigid_motions
+from ..description.scene import Scene
+from ..description.sections import breaks
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mathematics.interpolation import gauss, integration
+
+__all__ = ["BodyData", "Lever", "body_of", "lever_along", "own_axes", "quadrature"]
+
+PANELS, POINTS = 24, 6
+"""Quadrature along a member: exact for polynomials of degree 11 a panel, and no panel turns by much."""
+
+RIGID = 1e-11
+"""Compliances below this share of the largest do not exist."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lever:
+    """A load profile along a body, in the fixed axes of the undeformed scene.
+
+    Attributes
+    ----------
+    total : float
+        Its integral, m (kg where the profile is a mass per length).
+    first : ndarray (3,)
+        Its first moment about the first node.
+    ends : ndarray (3, 6 n)
+        For a unit vector along each axis the consistent forces and moments at the nodes.
+    """
+
+    total: float
+    first: Array
+    ends: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyData:
+    """A small member in SI units and the fixed axes of the undeformed scene.
+
+    Attributes
+    ----------
+    rest : ndarray (n, 3)
+        Nodes from the first one.
+    stiffness : ndarray (6 n, 6 n)
+    stiff : ndarray (rows, 6 n)
+        Deformations that do not exist, unit rows with rotations times the size of the body.
+    weight : Lever or None
+        Mass; None where none is given.
+    """
+
+    rest: Array
+    stiffness: Array
+    stiff: Array
+    weight: Lever | None
+
+
+def body_of(scene: Scene, name: str) -> BodyData:
+    """The body of a small member."""
+    member = scene.members[name]
+    places = np.array([scene.nodes[n].position for n in member.nodes], dtype=float)
+    rest = places - places[0]
+    if member.stiffness is None:
+        return _from_section(scene, name, rest)
+    turn = np.kron(np.eye(2 * len(rest)), own_axes(scene, name))
+    stiffness = turn @ np.asarray(member.stiffness) @ turn.T
+    mass = None if member.mass is None else turn @ np.asarray(member.mass) @ turn.T
+    weight = None if mass is None else _lever_of_mass(mass, rest)
+    return BodyData(rest, 0.5 * (stiffness + stiffness.T), np.zeros((0, 6 * len(rest))), weight)
+
+
+def own_axes(scene: Scene, name: str) -> Array:
+    """Section axes of a member at its start as columns, (3, 3)."""
+    return np.asarray(quaternion.matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0])
+
+
+def _lever_of_mass(mass: Array, rest: Array) -> Lever:
+    """Weight of a condensed mass: its work on rigid motions and on deformations."""
+    along = rigid_motions(np.zeros_like(rest))[:, :3]
+    ends = along.T @ mass
+    about = ends @ rigid_motions(rest)[:, 3:]
+    # Moving along i while turning about j takes the mass times the component of (j x centre) along i.
+    first = 0.5 * np.array([about[2, 1] - about[1, 2], about[0, 2] - about[2, 0], about[1, 0] - about[0, 1]])
+    return Lever(float(np.trace(ends @ along)) / 3.0, -first, ends)
+
+
+def quadrature(scene: Scene, name: str) -> tuple[Array, Array]:
+    """Places (fractions of the length) and weights along a member, in panels without kinks."""
+    edges, (x, w) = _edges(scene, name), gauss(POINTS)
+    lengths = np.diff(edges)[:, None]
+    return (edges[:-1, None] + x * lengths).ravel(), (w * lengths).ravel()
+
+
+def _edges(scene: Scene, name: str) -> Array:
+    """Ends of the panels: equal ones, and wherever the shape, the section or a load profile has a kink."""
+    member = scene.members[name]
+    kinks = [*scene.center_lines[name].breaks]
+    kinks += [] if member.section is None else scene.sections[member.section].breaks
+    for load in scene.loads.values():
+        if load.member == name and load.profile is not None:
+            kinks += breaks(load.profile)
+    return np.unique(np.concatenate([np.linspace(0.0, 1.0, PANELS + 1), np.array(kinks, dtype=float)]))
+
+
+def _integrals(edges: Array, values: Array, x: Array) -> Array:
+    """Integrals from 0 to places x of what is given at the points of the quadrature, (len(x), ...)."""
+    points, w = gauss(POINTS)
+    panels = values.reshape(len(edges) - 1, POINTS, *values.shape[1:])
+    lengths = np.diff(edges)
+    whole = np.einsum("k,ek...->e...", w, panels) * lengths.reshape(-1, *[1] * (values.ndim - 1))
+    before = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(whole, axis=0)])
+    e = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(lengths) - 1)
+    rows = integration(points, (x - edges[e]) / lengths[e]) * lengths[e][:, None]
+    return np.asarray(before[e] + np.einsum("nk,nk...->n...", rows, panels[e]))
+
+
+def _moments_of_wrench(arm: Array) -> Array:
+    """Moment at places of a unit wrench at the end, (n, 3, 6); ``arm`` from the places to the end."""
+    b = np.zeros((len(arm), 3, 6))
+    b[:, :, :3] = np.cross(arm[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1)
+    b[:, :, 3:] = np.eye(3)
+    return b
+
+
+def compliance_along(scene: Scene, name: str, x: Array) -> Array:
+    """Inverse of the stiffness against bending and twist in the fixed axes, (n, 3, 3); zero about missing axes."""
+    member, line = scene.members[name], scene.center_lines[name]
+    values = scene.sections[str(member.section)].stiffness(x)
+    inverse = np.where(np.isnan(values), 0.0, 1.0 / values)
+    frames = quaternion.matrix(line.quaternions(x))
+    return np.einsum("nij,nj,nkj->nik", frames, inverse, frames)
+
+
+def _from_section(scene: Scene, name: str, rest: Array) -> BodyData:
+    line = scene.center_lines[name]
+    x, w = quadrature(scene, name)
+    flexible = compliance_along(scene, name, x) * (w * line.length)[:, None, None]
+    b = _moments_of_wrench(line.positions(np.array([1.0]))[0] - line.positions(x))
+    compliance = np.einsum("nji,njk,nkl->il", b, flexible, b)
+    size = float(np.abs(rest).max())
+    unit = np.array([size, size, size, 1.0, 1.0, 1.0])
+    # In the plane only its own three freedoms; seen as energies: forces times the size, rotations as they are.
+    own = np.arange(6) if scene.resolved_dimension == "space" else np.array([0, 1, 5])
+    values, vectors = np.linalg.eigh((compliance / unit[:, None] / unit[None, :])[np.ix_(own, own)])
+    vectors = np.eye(6)[:, own] @ vectors
+    moves = values > RIGID * values[-1]
+    at_end = (vectors[:, moves] / values[moves]) @ vectors[:, moves].T / unit[:, None] / unit[None, :]
+    # Deformations are those of the second end seen from the first: E takes all freedoms to them.
+    to_end = np.hstack([-_carried(rest[1]), np.eye(6)])
+    stiff = (vectors[:, ~moves].T / unit) @ to_end
+    density = scene.sections[str(scene.members[name].section)]
+    weight = None if density.missing(["rhoA"]) else lever_along(scene, name, density.mass(x), x, w)
+    return BodyData(rest, to_end.T @ at_end @ to_end, stiff, weight)
+
+
+def _carried(arm: Array) -> Array:
+    """Displacement and rotation of the end of an arm by those of its foot, (6, 6)."""
+    matrix = np.eye(6)
+    matrix[:3, 3:] = np.cross(np.eye(3), arm).T
+    return matrix
+
+
+def _cross_all(r: Array) -> Array:
+    """Columns ``r x e_i``, (n, 3, 3)."""
+    return np.asarray(np.cross(r[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1))
+
+
+def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> Lever:
+    """Lever of a profile at places x with weights w (fractions of the length) along a member with a section."""
+    line = scene.center_lines[name]
+    places, end = line.positions(x), line.positions(np.array([1.0]))[0]
+    share = profile * w * line.length
+    start = line.positions(np.array([0.0]))[0]
+    total, first = float(share.sum()), share @ (places - start)
+    q, qw = quadrature(scene, name)
+    here, edges = line.positions(q), _edges(scene, name)
+    softness = compliance_along(scene, name, q) * line.length
+    b = _moments_of_wrench(end - here)
+    compliance = np.einsum("nji,njk,nkl,n->il", b, softness, b, qw)
+    # A unit force at x bends what is before it by (r(x) - r(s)) x e_i; its work on that is linear in r(x).
+    bent = np.einsum("nji,njk->nik", b, softness)
+    by_place, by_origin = _integrals(edges, bent, x), _integrals(edges, bent @ _cross_all(here), x)
+    free = np.einsum("n,nia->ai", share, by_place @ _cross_all(places) - by_origin)
+    size = float(np.abs(end - start).max())
+    unit = np.array([size, size, size, 1.0, 1.0, 1.0])
+    second = free / unit @ np.linalg.pinv(compliance / unit[:, None] / unit[None, :], rcond=RIGID) / unit
+    # What the first end takes: the rest of the force, and moments about it in balance.
+    force, moment = total * np.eye(3) - second[:, :3], np.cross(first[None, :], np.eye(3))
+    moment = moment - second[:, 3:] - np.cross((end - start)[None, :], second[:, :3])
+    return Lever(total, first, np.hstack([force, moment, second]))

@@ -1,0 +1,430 @@
+"""The joints, springs and small members of a scene as groups of one kind each, dimensionless."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.obstacles import Obstacle, obstacle, rounded, takes_part
+from ..description.scene import Scene
+from ..description.structure import SLIDING
+from ..mathematics.arrays import Array, Index
+from .beams import Scales
+from .bodies import BodyData, body_of
+from .contact_joints import (
+    Along,
+    AlongRound,
+    Bent,
+    CushionedPlane,
+    CushionedRound,
+    OnEdge,
+    OnPlane,
+    OnRound,
+)
+from .elements import Element
+from .joints import (
+    Body,
+    Connection,
+    DrivenSlide,
+    DrivenTurn,
+    Hinge,
+    LineSpring,
+    LineStop,
+    Slide,
+    Spring,
+    TurnSpring,
+    TurnStop,
+    Universal,
+)
+from .mesh import Cushion, Mesh, Touch
+from .positions import normals
+from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
+from .segments import Segments, cushioned
+
+__all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
+
+GROUND = -1
+"""Number of a side that is the ground: it neither turns nor moves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """All connections of one kind.
+
+    Attributes
+    ----------
+    kind : Connection
+    turns, places : ndarray (n, rotations | places)
+        Numbers of the sides.
+    data : ndarray (n, data)
+    rows : tuple of str
+        Names of the rows, those of the first connection first.
+    names : tuple of str
+        What each connection is: a spring, a member, a motion, or a joint.
+    nodes : tuple of str
+        The node at which it is; of a small member its first.
+    """
+
+    kind: Connection
+    turns: Index
+    places: Index
+    data: Array
+    rows: tuple[str, ...]
+    names: tuple[str, ...]
+    nodes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _One:
+    """One connection before it is put to its group."""
+
+    kind: Connection
+    name: str
+    node: str
+    data: Array
+    turns: tuple[int, ...] = ()
+    places: tuple[int, ...] = ()
+    row: str = ""
+
+
+def connect(
+    scene: Scene, mesh: Mesh, segments: Segments, rotations: Rotations, element: Element, scales: Scales
+) -> tuple[Group, ...]:
+    """The groups of a scene; those of a kind in the order of the scene."""
+    maker = _Maker(scene, segments, rotations, element.space, scales)
+    by_kind: dict[Connection, list[_One]] = {}
+    ones = [*maker.all(), *maker.stops(mesh), *_Toucher(scene, mesh, segments, rotations, element, scales).all()]
+    for one in ones:
+        by_kind.setdefault(one.kind, []).append(one)
+    return tuple(_grouped(kind, ones) for kind, ones in by_kind.items())
+
+
+def _grouped(kind: Connection, ones: list[_One]) -> Group:
+    turns, places, rows, data, _ = kind.sizes
+    n = len(ones)
+    return Group(
+        kind=kind,
+        turns=np.array([one.turns for one in ones], dtype=np.intp).reshape(n, turns),
+        places=np.array([one.places for one in ones], dtype=np.intp).reshape(n, places),
+        data=np.array([one.data for one in ones], dtype=float).reshape(n, data),
+        rows=tuple(
+            f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
+        ),
+        names=tuple(one.name for one in ones),
+        nodes=tuple(one.node for one in ones),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Maker:
+    scene: Scene
+    segments: Segments
+    rotations: Rotations
+    space: bool
+    scales: Scales
+
+    @property
+    def axes(self) -> int:
+        return 3 if self.space else 2
+
+    def all(self) -> Iterator[_One]:
+        """Every connection of the scene."""
+        for pin in self.rotations.pins:
+            yield from self._pin(pin)
+        for name, member in self.scene.members.items():
+            for i, (node, joint) in enumerate(end_joints(self.scene, member)):
+                if joint in SLIDING:
+                    yield self._slide(name, i, node)
+        yield from self._motions()
+        for name in self.scene.springs:
+            yield self._spring(name)
+        for name, member in self.scene.members.items():
+            if member.type == "small":
+                yield self._body(name)
+
+    def _pin(self, pin: Pin) -> Iterator[_One]:
+        node = self.scene.nodes[pin.node]
+        sides = (GROUND if pin.base is None else pin.base, pin.turn)
+        name = f"{pin.joint} of {pin.name} at {pin.node}" if pin.name != pin.node else f"{pin.joint} at {pin.node}"
+        if not self.space:
+            return
+        if pin.joint in ("hinge", "cylindrical"):
+            axis = node.axis if pin.joint == "hinge" else node.direction
+            yield _One(Hinge(True), name, pin.node, normals(np.asarray(axis), 3).ravel(), sides, row=name)
+        elif pin.joint == "universal":
+            axes = [_unit(a) for a in (node.axis, node.axis2)]
+            yield _One(Universal(True), name, pin.node, np.concatenate(axes), sides, row=name)
+
+    def _slide(self, member: str, i: int, node: str) -> _One:
+        direction = np.asarray(self.scene.nodes[node].direction, dtype=float)
+        places = self.segments.place(node), self.segments.place(self.segments.ends[member, i])
+        name = f"slide of {member} at {node}"
+        return _One(
+            Slide(self.space), name, node, normals(direction, self.axes).ravel(), (self._base(node),), places, name
+        )
+
+    def _base(self, node: str) -> int:
+        """Rotation that carries the lines of a node."""
+        number = self.rotations.node_turn[node]
+        return GROUND if number is None else number
+
+    def _end(self, member: str, node: str) -> int:
+        i = self.scene.members[member].nodes.index(node)
+        return self.rotations.ends[member][i]
+
+    def _motions(self) -> Iterator[_One]:
+        for name, motion in self.scene.motions.items():
+            if motion.between is None:
+                continue
+            node, row = self.scene.nodes[motion.node], f"motions.{name}"
+            first, second = motion.between
+            if motion.rotation is not None:
+                released = node.joint != "rigid" or "hinge" in self.scene.members[second].release
+                axis = node.axis if released or node.direction is None else node.direction
+                sides = self._end(first, motion.node), self._end(second, motion.node)
+                yield _One(DrivenTurn(self.space), name, motion.node, _unit(axis), sides, row=row)
+            if motion.displacement is not None:
+                i = self.scene.members[second].nodes.index(motion.node)
+                places = self.segments.place(motion.node), self.segments.place(self.segments.ends[second, i])
+                along = _unit(node.direction)[: self.axes]
+                yield _One(DrivenSlide(self.space), name, motion.node, along, (self._base(motion.node),), places, row)
+
+    def _spring(self, name: str) -> _One:
+        spring, scales = self.scene.springs[name], self.scales
+        if spring.type == "rotational":
+            crossed, sides, head = self._measured(name)
+            data = np.array([*head, spring.stiffness / scales.moment, spring.rest, *self._near])
+            return _One(TurnSpring(self.space, crossed), name, spring.node, data, sides)
+        other, places = spring.to, self._ends_of(name)
+        stiffness = spring.stiffness * scales.length**2 / scales.moment
+        if spring.direction is not None:
+            data = np.array([*_unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
+            return _One(LineSpring(self.space), name, spring.node, data, (), places)
+        start = self.scene.nodes[spring.node].position
+        anchor = self.scene.nodes[other].position if other is not None else spring.anchor or start
+        gap = np.asarray(start, dtype=float) - np.asarray(anchor, dtype=float)
+        length = float(np.linalg.norm(gap)) if spring.length is None else spring.length
+        data = np.array([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
+        return _One(Spring(self.space), name, spring.node, data, (), places)
+
+    def _ends_of(self, name: str) -> tuple[int, int]:
+        """Places between which a translational spring acts."""
+        spring = self.scene.springs[name]
+        first = GROUND if spring.to is None else self.segments.place(spring.to)
+        return first, self.segments.place(spring.node)
+
+    def stops(self, mesh: Mesh) -> Iterator[_One]:
+        """Springs that stand at a stop."""
+        for name, side in mesh.stops:
+            spring, row = self.scene.springs[name], f"springs.{name}.stop"
+            assert spring.stop is not None
+            at = spring.stop[0 if side == "low" else 1]
+            if spring.type == "rotational":
+                crossed, sides, head = self._measured(name)
+                data = np.array([*head, at, *self._near])
+                stop = TurnStop(self.space, crossed)
+                yield _One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
+                continue
+            data = np.array([*_unit(spring.direction)[: self.axes], at / self.scales.length])
+            yield _One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
+
+    @property
+    def _near(self) -> tuple[float, ...]:
+        """Value near which an angle in space is counted, in the undeformed scene."""
+        return (0.0,) if self.space else ()
+
+    def _measured(self, name: str) -> tuple[bool, tuple[int, int], list[float]]:
+        """Whether a rotational spring is at a universal joint, its sides, and the directions of its data.
+
+        At a universal joint a spring about one of the two axes is put on the side that carries this axis.
+        """
+        spring, (first, second) = self.scene.springs[name], self.parties(name)
+        axis, node = _unit(self.scene.spring_axis(name)), self.scene.nodes[spring.node]
+        for pin in self.rotations.pins:
+            base = GROUND if pin.base is None else pin.base
+            if not self.space or pin.joint != "universal" or {base, pin.turn} != {first, second}:
+                continue
+            one, two = _unit(node.axis), _unit(node.axis2)
+            for carrier, other, along, across in ((base, pin.turn, one, two), (pin.turn, base, two, one)):
+                if np.linalg.norm(np.cross(axis, along)) < PARALLEL:
+                    return True, (carrier, other), [*(axis if carrier == first else -axis), *across]
+        return False, (first, second), [*axis]
+
+    def parties(self, name: str) -> tuple[int, int]:
+        """Rotations of the two parties of a rotational spring."""
+        spring = self.scene.springs[name]
+        found = []
+        for party in spring.between or ("ground", spring.node):
+            if party == "ground":
+                found.append(GROUND)
+            elif party == spring.node and party not in self.scene.members:
+                found.append(self._base(party))
+            else:
+                found.append(self._end(party, spring.node))
+        return found[0], found[1]
+
+    def _body(self, name: str) -> _One:
+        member, body = self.scene.members[name], body_of(self.scene, name)
+        data, stiff = body_numbers(body, self.space, self.scales)
+        places = tuple(self.segments.place(self.segments.ends[name, i]) for i in range(len(member.nodes)))
+        kind = Body(self.space, len(member.nodes), stiff)
+        return _One(
+            kind, name, member.nodes[0], data, self.rotations.ends[name], places, f"member {name} does not stretch"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Toucher:
+    """What touches obstacles: a place on each, and along stretches the directions of the sections."""
+
+    scene: Scene
+    mesh: Mesh
+    segments: Segments
+    rotations: Rotations
+    element: Element
+    scales: Scales
+
+    def all(self) -> Iterator[_One]:
+        """Every touch of the mesh; what is held or lies there already needs no row."""
+        touched = {touch.contact for touch in self.mesh.touches}
+        obstacles = {name: obstacle(self.scene.contacts[name], self.element.space) for name in touched}
+        covered: set[tuple[str, int]] = set()
+        for touch in self.mesh.touches:
+            stop = obstacles[touch.contact]
+            if touch.to is None:
+                yield self._on(touch, stop)
+                yield from self._lying(touch, stop, covered) if touch.flat else ()
+                continue
+            ends = [(touch.contact, self.place(touch, at)) for at in touch.places if at in (0.0, 1.0)]
+            if anchored(self.scene, touch, stop) and not covered & set(ends):
+                yield self._on(touch, stop)
+            yield from self._lying(touch, stop, covered)
+            covered |= set(ends)
+        for cushion in self.mesh.cushions:
+            yield self._cushioned(cushion)
+
+    def place(self, touch: Touch, at: float) -> int:
+        """Number of the place of a touch."""
+        if at in (0.0, 1.0):
+            return self.segments.place(self.segments.ends[touch.member, int(at)])
+        return self.segments.place(touch.name)
+
+    def _on(self, touch: Touch, stop: Obstacle) -> _One:
+        axes, unit = self.element.axes, self.scales.length
+        start = self.scene.center_lines[touch.member].positions(np.array([touch.at]))[0] - stop.place
+        places = (self.place(touch, touch.at),)
+        if stop.kind == "flat":
+            data = self._flat(stop, start, touch.offset)
+            return _One(OnPlane(axes == 3), touch.name, "", data, (), places, touch.name)
+        if stop.kind == "round":
+            data = self._round(stop, start, touch.offset)
+            return _One(OnRound(axes == 3), touch.name, "", data, (), places, touch.name)
+        turns, _ = self._chain(touch)
+        tangent = self.scene.center_lines[touch.member].tangents(np.array([touch.at]))[0]
+        start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
+        data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
+        return _One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
+
+    def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
+        """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""
+        return np.append(stop.normal[: self.element.axes], (start @ stop.normal + offset) / self.scales.length)
+
+    def _round(self, stop: Obstacle, start: Array, offset: float) -> Array:
+        """Data of a place on something round."""
+        axes, unit = self.element.axes, self.scales.length
+        across = stop.across[:axes, :axes].T.ravel()
+        return np.concatenate([across, start[:axes] / unit, [(stop.radius - stop.sign * offset) / unit, stop.sign]])
+
+    def _cushioned(self, cushion: Cushion) -> _One:
+        """A place that is pushed softly; an edge is rounded for that."""
+        space, unit = self.element.space, self.scales.length
+        stop = rounded(obstacle(self.scene.contacts[cushion.contact], space), cushion.edge)
+        start = self.scene.center_lines[cushion.member].positions(np.array([cushion.at]))[0] - stop.place
+        stiffness = cushion.stiffness * unit / self.scales.force
+        data = self._flat(stop, start, 0.0) if stop.kind == "flat" else self._round(stop, start, 0.0)
+        if cushion.at in (0.0, 1.0):
+            place = self.segments.place(self.segments.ends[cushion.member, int(cushion.at)])
+        else:
+            place = self.segments.place(cushioned(cushion.member, cushion.at))
+        kind = CushionedPlane(space) if stop.kind == "flat" else CushionedRound(space)
+        return _One(
+            kind,
+            f"cushion of {cushion.contact}",
+            "",
+            np.append(data, [stiffness, cushion.thickness / unit]),
+            (),
+            (place,),
+        )
+
+    def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[_One]:
+        """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""
+        axes, name = self.element.axes, f"{touch.name} along"
+        turns, x = self._chain(touch)
+        line = self.scene.center_lines[touch.member]
+        tangents = line.tangents(x)[:, :axes]
+        if stop.kind == "flat":
+            for turn, tangent in zip(turns.tolist(), tangents, strict=True):
+                key = (touch.contact, -2 - turn)
+                if self.rotations.kind[turn] != Turn.HELD and key not in covered:
+                    covered.add(key)
+                    data = np.concatenate([stop.normal[:axes], tangent])
+                    yield _One(Along(axes == 3), name, "", data, (turn,), row=name)
+            return
+        start = (line.positions(x[:1])[0] - stop.place)[:axes] / self.scales.length
+        if self.rotations.kind[turns[0]] != Turn.HELD:
+            data = np.concatenate([start, tangents[0]])
+            yield _One(AlongRound(False), name, "", data, (int(turns[0]),), (self.place(touch, touch.at),), name)
+        rest = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0]))
+        radius = stop.radius - stop.sign * touch.offset
+        angles = touch.way / radius * (x - x[0]) * line.length - (rest - rest[0])
+        for turn, angle in zip(turns[1:].tolist(), angles[1:], strict=True):
+            yield _One(Bent(False), name, "", np.array([angle]), (int(turns[0]), turn), row=name)
+
+    def _chain(self, touch: Touch) -> tuple[Index, Array]:
+        """Rotations along a stretch, and the fractions at which they stand."""
+        first = 0
+        for name, cuts in ((name, self.mesh.cuts.get(name)) for name in self.scene.members):
+            if name == touch.member:
+                break
+            first += 0 if cuts is None else len(cuts) - 1
+        cuts = self.mesh.cuts[touch.member]
+        a, b = (self.mesh.cut_at(touch.member, at) for at in (touch.at, touch.places[-1]))
+        if a == b:
+            last = a == len(cuts) - 1
+            number = self.rotations.turns[first + a - last, -1 if last else 0]
+            return np.array([number], dtype=np.intp), cuts[a : a + 1]
+        inner = cuts[a:b, None] + np.diff(cuts[a : b + 1])[:, None] * self.element.nodes[:-1]
+        return self.rotations.chain(slice(first + a, first + b)), np.append(inner.ravel(), cuts[b])
+
+
+def anchored(scene: Scene, touch: Touch, stop: Obstacle) -> bool:
+    """Whether a place of a stretch has to be put on the obstacle: no support holds an end of it there."""
+    nodes = scene.members[touch.member].nodes
+    ends = [nodes[int(at)] for at in touch.places if at in (0.0, 1.0)]
+    return all(takes_part(end, scene.nodes[end], scene.motions.values(), stop) for end in ends)
+
+
+def _unit(direction: object) -> Array:
+    d = np.asarray(direction, dtype=float)
+    return np.asarray(d / np.linalg.norm(d))
+
+
+def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, int]:
+    """Data of :class:`~sfetcas.mechanics.joints.Body` and its number of rows."""
+    chosen = freedoms(len(body.rest), space)
+    unit = np.tile([scales.length] * 3 + [1.0] * 3, len(body.rest))
+    stiffness = (body.stiffness * unit[:, None] * unit[None, :] / scales.moment)[np.ix_(chosen, chosen)]
+    stiff = (body.stiff * unit)[:, chosen]
+    norms = np.linalg.norm(stiff, axis=1, keepdims=True)
+    axes = 3 if space else 2
+    upper = stiffness.T[np.tril_indices(len(chosen))]
+    rest = (body.rest[:, :axes] / scales.length).ravel()
+    return np.concatenate([rest, upper, (stiff / norms).T.ravel()]), len(stiff)
+
+
+def freedoms(nodes: int, space: bool) -> Index:
+    """Of six freedoms a node those that a model has: all, or x, y and about z."""
+    each = np.arange(6) if space else np.array([0, 1, 5])
+    return (6 * np.arange(nodes)[:, None] + each).ravel()

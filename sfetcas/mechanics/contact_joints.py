@@ -1,0 +1,174 @@
+"""What touching an obstacle asks of places and sections: rows that keep them on it, and the energy of soft cushions.
+
+Connections as joints are, see :mod:`~sfetcas.mechanics.joints`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from .joints import Connection, Side
+
+__all__ = [
+    "Along",
+    "AlongRound",
+    "Bent",
+    "CushionedPlane",
+    "CushionedRound",
+    "OnEdge",
+    "OnPlane",
+    "OnRound",
+]
+
+
+@final
+@dataclass(frozen=True)
+class OnPlane(Connection):
+    """A place on a plane; data: its normal, the gap in the undeformed scene."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 0, 1, 1, self.axes + 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The gap."""
+        return [_gap_of_plane(u[0], data)]
+
+
+@final
+@dataclass(frozen=True)
+class OnRound(Connection):
+    """A place on a circle, cylinder or sphere; data: projection across the axis, centre to place, radius, sign."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 0, 1, 1, self.axes * self.axes + self.axes + 2, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The gap."""
+        return [_gap_of_round(u[0], data)]
+
+
+@final
+@dataclass(frozen=True)
+class CushionedPlane(Connection):
+    """A place that a cushion keeps off a plane; data: as of a place on it, stiffness, thickness."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 0, 1, 0, self.axes + 3, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """That of the cushion."""
+        return _cushion(_gap_of_plane(u[0], data), data[self.axes + 1 :])
+
+
+@final
+@dataclass(frozen=True)
+class CushionedRound(Connection):
+    """A place that a cushion keeps off something round; data: as of a place on it, stiffness, thickness."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 0, 1, 0, self.axes * self.axes + self.axes + 4, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """That of the cushion."""
+        return _cushion(_gap_of_round(u[0], data), data[self.axes * self.axes + self.axes + 2 :])
+
+
+def _gap_of_plane(u: Side, data: ca.SX) -> ca.SX:
+    return ca.dot(data[: len(u)], ca.vertcat(*u)) + data[len(u)]
+
+
+def _gap_of_round(u: Side, data: ca.SX) -> ca.SX:
+    n = len(u)
+    out = ca.mtimes(ca.reshape(data[: n * n], n, n), ca.vertcat(*u) + data[n * n : n * n + n])
+    return data[n * n + n + 1] * (ca.norm_2(out) - data[n * n + n])
+
+
+def _cushion(gap: ca.SX, data: ca.SX) -> ca.SX:
+    """Half the stiffness times the square of the depth, which begins smoothly within the thickness."""
+    stiffness, thickness = data[0], data[1]
+    root = ca.sqrt(gap**2 + thickness**2)
+    # Outside, the difference of two near numbers is written as a quotient.
+    depth = 0.5 * ca.if_else(gap > 0.0, thickness**2 / (root + ca.fmax(gap, 0.0)), root - gap)
+    return 0.5 * stiffness * depth**2
+
+
+@final
+@dataclass(frozen=True)
+class OnEdge(Connection):
+    """A place whose section passes an edge at no distance; data: edge, undeformed tangent, edge to place, side.
+
+    The distance counts across the edge and the tangent of the section.  It is the gap where the place is the one
+    nearest to the edge, and then the force goes through the place.
+    """
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 1, 1, 6 + self.axes + 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The gap."""
+        tangent = ca.vertcat(*self.forth(q[0], ca.vertsplit(data[3 : 3 + self.axes])))
+        tangent = tangent if self.space else ca.vertcat(tangent, 0.0)
+        across = ca.cross(data[:3], tangent)
+        across = data[6 + self.axes] * across / ca.norm_2(across)
+        return [ca.dot(across[: self.axes], ca.vertcat(*u[0]) + data[6 : 6 + self.axes])]
+
+
+@final
+@dataclass(frozen=True)
+class Along(Connection):
+    """A section whose tangent lies in a plane; data: the normal of the plane, the tangent in the undeformed scene."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 0, 1, 2 * self.axes, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Sine of the angle to the plane."""
+        n = self.axes
+        return [ca.dot(data[:n], ca.vertcat(*self.forth(q[0], ca.vertsplit(data[n:]))))]
+
+
+@final
+@dataclass(frozen=True)
+class AlongRound(Connection):
+    """A section tangential to a circle about its centre; data: centre to place, tangent.  Plane only."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 1, 1, 2 * self.axes, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Sine of the angle to the tangent of the circle."""
+        n = self.axes
+        out = ca.vertcat(*u[0]) + data[:n]
+        return [ca.dot(out, ca.vertcat(*self.forth(q[0], ca.vertsplit(data[n:])))) / ca.norm_2(out)]
+
+
+@final
+@dataclass(frozen=True)
+class Bent(Connection):
+    """Two rotations whose difference is prescribed by a circle between them; data: the angle.  Plane only."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 2, 0, 1, 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The difference less what it shall be."""
+        return [q[1][0] - q[0][0] - data]

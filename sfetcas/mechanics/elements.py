@@ -1,0 +1,226 @@
+"""The special finite elements SFET2 to SFET9: energy of one element as a function of its nodal rotations.
+
+The unknowns of an element with p + 1 nodes are rotations *since the undeformed state*: one angle a node in
+the plane, one quaternion a node in space, interpolated by Lagrange polynomials on the Gauss-Lobatto points.
+With ``q`` this rotation, ``kappa_0`` and ``t_0`` curvature and tangent of the unloaded centre line and
+``R_0`` its section axes,
+
+    kappa - kappa_0 = R_0^T 2 G(q) q',      u' = (R(q) - I) t_0,
+
+so that an undeformed element of any shape has exactly no strain and no displacement.  For a straight member
+this is the interpolation of the source; for a curved one it interpolates the smaller of the two rotations.
+
+Of each integration point an element is told the stiffness (times weight over length, in the fixed axes of the
+undeformed scene), the tangent (unit tangent of the unloaded centre line times weight times length) and the
+pull (minus the internal force): its energy is the strain energy plus ``sum pull.R(q) tangent``.
+
+Two ways to integrate: *at the nodes* (Lobatto), where ``q`` is exactly unit and everything is polynomial, and
+*Gauss*, with the interpolated quaternion divided by its norm.  Both are of order 2p at the element ends.
+
+Source: Barraco and Munteanu, Part 1, sections 3 and 4 (SFET2, SFET3); the higher orders are ours.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics import interpolation
+from ..mathematics.arrays import Array
+from ..mathematics.quaternion import Components, product, turned
+
+__all__ = ["ELEMENTS", "Element", "element_by_name"]
+
+
+@dataclass(frozen=True)
+class Element(Components):
+    """One element type: order, integration and dimension; everything else follows and is made once.
+
+    Attributes
+    ----------
+    order : int
+        Polynomial order p of the interpolation; the element has p + 1 nodes.
+    space : bool
+        Quaternions (4 numbers a node) or, in the plane, one angle a node.
+    gauss : bool
+        Integration on p + 1 Gauss points with the norm divided out instead of at the nodes.
+    """
+
+    order: int
+    space: bool
+    gauss: bool = False
+
+    @property
+    def name(self) -> str:
+        """The name of scene files: SFET2, SFET3, ..."""
+        return f"SFET{self.order + 1}"
+
+    @property
+    def stiffnesses(self) -> int:
+        """Numbers of a stiffness a point: the upper triangle of a symmetric 3 x 3 matrix, or one number."""
+        return 6 if self.space else 1
+
+    @functools.cached_property
+    def nodes(self) -> Array:
+        """Places of the nodes in [0, 1], shape (p + 1,)."""
+        return interpolation.lobatto(self.order + 1)[0]
+
+    @functools.cached_property
+    def points(self) -> Array:
+        """Places of the integration points in [0, 1], shape (p + 1,)."""
+        return self._rule[0]
+
+    @functools.cached_property
+    def weights(self) -> Array:
+        """Weights of the integration points, sum 1, shape (p + 1,)."""
+        return self._rule[1]
+
+    @property
+    def _rule(self) -> tuple[Array, Array]:
+        return (interpolation.gauss if self.gauss else interpolation.lobatto)(self.order + 1)
+
+    @functools.cached_property
+    def to_points(self) -> Array:
+        """Integrals from 0 to each integration point of what is given at them, shape (p + 1, p + 1)."""
+        return interpolation.integration(self.points, self.points)
+
+    def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        n = self.order + 1
+        return (
+            ca.SX.sym("q", self.components, n),
+            ca.SX.sym("stiffness", self.stiffnesses, n),
+            ca.SX.sym("tangent", self.axes, n),
+            ca.SX.sym("pull", self.axes, n),
+        )
+
+    def _at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Rotation and its derivative by xi at the integration points."""
+        slope = ca.mtimes(q, ca.DM(interpolation.differentiation(self.nodes, self.points).T))
+        here = ca.mtimes(q, ca.DM(interpolation.evaluation(self.nodes, self.points).T)) if self.gauss else q
+        return here, slope
+
+    def _strain_energy(self, here: ca.SX, slope: ca.SX, stiffness: ca.SX) -> ca.SX:
+        """1/2 c k.k of one point, c the stiffness times weight over length, k the curvature times length."""
+        if not self.space:
+            return 0.5 * stiffness[0] * slope[0] ** 2
+        q = ca.vertsplit(here)
+        k = product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(slope))[1:]
+        c = ca.vertsplit(stiffness)
+        # 2 G(q) q' are twice the vector part of conj(q) q'; the factor 4 is 2^2.
+        scale = 2.0 / ca.dot(here, here) ** 2 if self.gauss else 2.0
+        square = c[0] * k[0] * k[0] + c[3] * k[1] * k[1] + c[5] * k[2] * k[2]
+        cross = c[1] * k[0] * k[1] + c[2] * k[0] * k[2] + c[4] * k[1] * k[2]
+        return scale * (square + 2.0 * cross)
+
+    def _tangent(self, here: ca.SX, tangent: ca.SX) -> ca.SX:
+        """The turned tangent ``R(q) t_0`` of one point."""
+        t = ca.vertsplit(tangent)
+        if not self.space:
+            c, s = ca.cos(here[0]), ca.sin(here[0])
+            return ca.vertcat(c * t[0] - s * t[1], s * t[0] + c * t[1])
+        v = ca.vertcat(*turned(ca.vertsplit(here), t))
+        return v / ca.dot(here, here) if self.gauss else v
+
+    def _energy(self, q: ca.SX, stiffness: ca.SX, tangent: ca.SX, pull: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Energy, and the vector from the first to the last node."""
+        here, slope = self._at_points(q)
+        energy: ca.SX = ca.SX(0)
+        reach: ca.SX = ca.SX(self.axes, 1)
+        for k in range(self.order + 1):
+            turned_tangent = self._tangent(here[:, k], tangent[:, k])
+            energy += self._strain_energy(here[:, k], slope[:, k], stiffness[:, k])
+            energy += ca.dot(pull[:, k], turned_tangent)
+            reach += turned_tangent
+        return energy, ca.densify(reach)
+
+    def _spin(self, q: ca.SX) -> ca.SX:
+        """Derivative of the nodal unknowns by rotations about the fixed axes: ``dq = 1/2 (0, phi) q``."""
+        if not self.space:
+            return ca.SX.eye(self.order + 1)
+        blocks = []
+        for k in range(self.order + 1):
+            node = ca.vertsplit(q[:, k])
+            columns = [product([0.0, *axis], node) for axis in np.eye(3).tolist()]
+            blocks.append(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))
+        return ca.diagcat(*blocks)
+
+    def _function(self, name: str, arguments: list[ca.SX], results: dict[str, ca.SX]) -> ca.Function:
+        tag = f"{name}_{'space' if self.space else 'plane'}_{self.order + 1}{'_gauss' if self.gauss else ''}"
+        names = list(ARGUMENTS) if len(arguments) == 4 else ["q", "tangent"]
+        return ca.Function(tag, arguments, list(results.values()), names, list(results))
+
+    @functools.cached_property
+    def energy(self) -> ca.Function:
+        """(q, stiffness, tangent, pull) -> energy: strain energy plus ``sum pull.R(q) t`` over the points."""
+        symbols = self._symbols()
+        return self._function("energy", list(symbols), {"energy": self._energy(*symbols)[0]})
+
+    @functools.cached_property
+    def gradient(self) -> ca.Function:
+        """(q, stiffness, tangent, pull) -> energy and its gradient by ``vec(q)``."""
+        q, *data = self._symbols()
+        energy = self._energy(q, *data)[0]
+        gradient = ca.vec(ca.gradient(energy, q))
+        return self._function("gradient", [q, *data], {"energy": energy, "gradient": gradient})
+
+    @functools.cached_property
+    def hessian(self) -> ca.Function:
+        """(q, stiffness, tangent, pull) -> dense Hessian of the energy by ``vec(q)``."""
+        q, *data = self._symbols()
+        hessian = ca.densify(ca.hessian(self._energy(q, *data)[0], q)[0])
+        return self._function("hessian", [q, *data], {"hessian": hessian})
+
+    @functools.cached_property
+    def reach(self) -> ca.Function:
+        """(q, tangent) -> the vector from the first to the last node, shape (axes, 1)."""
+        q, stiffness, tangent, pull = self._symbols()
+        return self._function("reach", [q, tangent], {"reach": self._energy(q, stiffness, tangent, pull)[1]})
+
+    @functools.cached_property
+    def reach_jacobian(self) -> ca.Function:
+        """(q, tangent) -> the reach and its dense derivative by ``vec(q)``."""
+        q, stiffness, tangent, pull = self._symbols()
+        reach = self._energy(q, stiffness, tangent, pull)[1]
+        jacobian = ca.densify(ca.jacobian(reach, q))
+        return self._function("reach_jacobian", [q, tangent], {"reach": reach, "jacobian": jacobian})
+
+    @functools.cached_property
+    def turning(self) -> ca.Function:
+        """(q, stiffness, tangent, pull) -> strain energy, work, moments, turning stiffness, reach and its spin.
+
+        Derivatives by rotations ``phi`` about the fixed axes at the nodes, on unit quaternions: with ``E`` from
+        ``dq = 1/2 (0, phi) q`` the gradient is ``E^T g`` and the Hessian ``E^T H E - 1/4 (q.g) I`` (the second
+        term keeps the quaternion on the unit sphere; it is what the multiplier of the norm does).
+        """
+        q, *data = self._symbols()
+        energy, reach = self._energy(q, *data)
+        strain = ca.substitute(energy, data[2], ca.SX.zeros(data[2].shape))
+        hessian, gradient = ca.hessian(energy, q)
+        spin = self._spin(q)
+        stiffness = ca.mtimes(spin.T, ca.mtimes(hessian, spin))
+        if self.space:
+            radial = [ca.dot(q[:, k], gradient[4 * k : 4 * k + 4]) for k in range(self.order + 1)]
+            stiffness -= 0.25 * ca.diag(ca.vertcat(*[r for r in radial for _ in range(3)]))
+        results = {
+            "strain": strain,
+            "work": energy - strain,
+            "moments": ca.densify(ca.mtimes(spin.T, ca.vec(gradient))),
+            "stiffness_turning": ca.densify(stiffness),
+            "reach": reach,
+            "reach_spin": ca.densify(ca.mtimes(ca.jacobian(reach, q), spin)),
+        }
+        return self._function("turning", [q, *data], results)
+
+
+ARGUMENTS = ("q", "stiffness", "tangent", "pull")
+ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))
+"""Names of the elements, by their number of nodes."""
+
+
+@functools.cache
+def element_by_name(name: str, space: bool, gauss: bool = False) -> Element:
+    """The element type of a name, made once a process so that its functions are, too."""
+    return Element(ELEMENTS.index(name) + 1, space, gauss)

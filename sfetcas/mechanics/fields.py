@@ -1,0 +1,501 @@
+"""What a state means along the members: positions, rotations, section forces and moments at any place.
+
+Section forces and moments come from equilibrium, not from the derivative of the rotations: the moment at the
+first node of a member is minus the gradient of its energy there, and the rest follows by integrating
+``m' = -r' x n``.  They are therefore as accurate as the positions, of order 2p at the element ends.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from ..description.obstacles import obstacle
+from ..mathematics import interpolation, quaternion
+from ..mathematics.arrays import Array
+from .balance import Balance, SpringState
+from .balance import three as _three
+from .contact_joints import OnPlane, OnRound
+from .equations import Equations, State
+from .loading import Loading
+from .mesh import Touch
+
+__all__ = ["Fields", "rotations_along", "transferred"]
+
+
+class Fields:
+    """Fields of one state of a model.  All results are in SI units and fixed axes, with three components."""
+
+    def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
+        self.model, self.state, self._applied = equations.model, state, loading
+        self._loading = loading = equations.effective(state, loading)
+        self._equations = equations
+        self.q = state.q
+        model = self.model
+        self.turned = _turned_tangents(equations, state)
+        reach = self.turned.sum(axis=1)
+        nodal, _ = equations.displacements(state, loading, reach)
+        self._nodal = nodal.reshape(len(model.segments.places), -1)
+        self._pull = loading.pull + equations.segment_pulls(state.lam, loading)[model.segments.owner][:, None, :]
+
+    @functools.cached_property
+    def balance(self) -> Balance:
+        """The balance of the nodes."""
+        parts, loading = self.model.segments.parts, self._loading
+        starts = [self._start_forces(part.elements) for part in parts]
+        last = [loading.spread[part.elements][-1].sum(axis=0) for part in parts]
+        ends = [force[-1] - spread for force, spread in zip(starts, last, strict=True)]
+        starts = [force[0] for force in starts]
+        return Balance(self._equations, self.state, self._applied, starts, ends, self._nodal)
+
+    # -- nodes ----------------------------------------------------------------------------------
+
+    def position(self, node: str) -> Array:
+        """Position of a node, m."""
+        moved = _three(self._nodal[self.model.nodes.index(node)]) * self.model.scales.length
+        return np.asarray(self.model.scene.nodes[node].position, dtype=float) + moved
+
+    def rotation(self, node: str) -> Array | None:
+        """Quaternion (4,) or, in the plane, angle (1,) of a node since the undeformed scene; None if it has none."""
+        number = self.model.rotations.node_turn[node]
+        return None if number is None else self.state.q[number]
+
+    def reaction(self, node: str) -> tuple[Array, Array]:
+        """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
+        force, moment = self.balance.reaction(node)
+        more_force, more_moment = self._pressed_at(node)
+        force, moment = force + more_force, moment + more_moment
+        return force * self.model.scales.force, moment * self.model.scales.moment
+
+    def _pressed_at(self, node: str) -> tuple[Array, Array]:
+        """What an obstacle along a member takes over from a support at its end, dimensionless."""
+        force, moment = np.zeros(3), np.zeros(3)
+        place = self.model.segments.place(node)
+        # Where the obstacle has a row of its own for the node its share is told apart already.
+        if any(place in group.places for group in self.model.connections if isinstance(group.kind, (OnPlane, OnRound))):
+            return force, moment
+        for touch in self.model.mesh.touches:
+            nodes = self.model.scene.members[touch.member].nodes
+            for i, at in enumerate((0.0, 1.0)):
+                if touch.to is None or nodes[i] != node or at not in touch.places:
+                    continue
+                raw, laid = (self._along(touch.member, np.array([at]), pressed=pressed) for pressed in (False, True))
+                sign = 2.0 * i - 1.0
+                force = force + sign * (laid["force"][0] - raw["force"][0])
+                moment = moment + sign * (laid["moment"][0] - raw["moment"][0])
+        return force, moment
+
+    def spring(self, name: str) -> SpringState:
+        """A spring of the scene."""
+        return self.balance.spring(name)
+
+    def drive(self, name: str) -> dict[str, Any]:
+        """What makes a motion: ``moment`` (N m) with a rotation, ``force`` (N) with a displacement.
+
+        At a driven joint they are numbers, on the second member about the axis or along the line of the joint.  At a
+        support they are what the ground does: (3,), or a number about its axis where the rotation is a number.
+        """
+        motion = self.model.scene.motions[name]
+        if motion.between is not None:
+            return dict(self.balance.drive(name))
+        found: dict[str, Any] = {}
+        force, moment = self.reaction(motion.node)
+        if motion.rotation is not None:
+            axis = np.asarray(self.model.scene.nodes[motion.node].turn_axis, dtype=float)
+            number = isinstance(motion.rotation, float)
+            found["moment"] = float(moment @ axis / np.linalg.norm(axis)) if number else moment
+        if motion.displacement is not None:
+            found["force"] = force
+        return found
+
+    # -- members --------------------------------------------------------------------------------
+
+    def along(self, member: str, x: Array, *, dimensionless: bool = False) -> dict[str, Array]:
+        """Fields at fractions x of a member's length.
+
+        Returns
+        -------
+        dict
+            ``position`` (n, 3) m, ``rotation`` (n, 4) or (n, 1) since the undeformed scene, ``force`` (n, 3) N
+            and ``moment`` (n, 3) N m of what is beyond on what is before, ``curvature`` (n, 3) 1/m about the
+            section's axes b1, b2, b3.
+        """
+        model, x = self.model, np.asarray(x, dtype=float)
+        record, line = model.scene.members[member], model.scene.center_lines[member]
+        if record.type == "small":
+            return self._along_body(member, x)
+        result = self._along(member, x)
+        if dimensionless:
+            return result
+        frames = self._frames(member, x, result["rotation"])
+        result["force"] = result["force"] * model.scales.force
+        result["moment"] = result["moment"] * model.scales.moment
+        strain = np.einsum("nij,ni->nj", frames, result["moment"])
+        if record.type == "rigid":
+            return {**result, "curvature": line.curvatures(x)}
+        stiffness = model.scene.sections[str(record.section)].stiffness(x)
+        with np.errstate(invalid="ignore"):
+            strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
+        result["curvature"] = line.curvatures(x) + strain
+        return result
+
+    def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
+        """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
+        model = self.model
+        part = model.elements_of(member)
+        e, to_x = self._located(member, x)
+        turned, spread = self.turned[part], self._loading.spread[part]
+        position, moments = self.positions(member, x), self._element_moments(member)
+        force = _three(self._start_forces(part)[e] - np.einsum("nk,nka->na", to_x, spread[e]))
+        # m' = -r' x n; the pull at the points is minus the force there.
+        couple = _cross(turned, self._pull[part])
+        moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
+        rotation = rotations_along(model, self.state.q, member, x)
+        for touch in model.mesh.touches if pressed else ():
+            if touch.member == member and touch.to is not None:
+                self._lay(touch, x, rotation, force, moment)
+        return {"position": position, "rotation": rotation, "force": force, "moment": moment}
+
+    def _lay(self, touch: Touch, x: Array, rotation: Array, force: Array, moment: Array) -> None:
+        """Force and moment along a stretch that lies on an obstacle, in place, dimensionless.
+
+        Its shape across the obstacle is known, so that the moment about the axis across is, and the derivative of
+        that is the force towards the obstacle.  The force along changes with what acts along, and on a circle with
+        the force across.
+        """
+        inside = (x >= touch.at) & (x <= float(touch.to or 0.0))
+        if not inside.any():
+            return
+        model, here = self.model, x[inside]
+        tangents = self._tangents(touch.member, here, rotation[inside])
+        pressed, axes = self.pressed_moments(touch, here)
+        across = np.cross(axes, tangents)
+        step = 1e-5
+        low, high = np.clip(here - step, touch.at, None), np.clip(here + step, None, touch.to)
+        (before, first), (after, last) = self.pressed_moments(touch, low), self.pressed_moments(touch, high)
+        length = model.scales.length / model.scene.center_lines[touch.member].length
+        spans = np.maximum(high - low, 1e-300)
+        moment[inside] += (pressed - np.einsum("ni,ni->n", moment[inside], axes))[:, None] * axes
+        # m' = -t x n, and the axis turns with the member on the obstacle.
+        turning = np.einsum("ni,ni->n", moment[inside], (last - first) / spans[:, None])
+        shear = -((after - before) / spans - turning) * length
+        if self._curvature(touch):
+            along = self._along_round(touch, here, pressed)
+            force[inside] = along[:, None] * tangents + shear[:, None] * across
+        else:
+            force[inside] += (shear - np.einsum("ni,ni->n", force[inside], across))[:, None] * across
+
+    def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
+        """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""
+        model = self.model
+        part = model.elements_of(touch.member)
+        first = model.mesh.cut_at(touch.member, touch.at)
+        spread, turned = self._loading.spread[part], self.turned[part]
+        pushed = np.einsum("eka,eka->ek", spread, turned) / np.linalg.norm(turned, axis=2)
+        sums = np.concatenate([[0.0], np.cumsum(pushed.sum(axis=1))])
+        e, to_x = self._located(touch.member, x)
+        gained = sums[e] - sums[first] + np.einsum("nk,nk->n", to_x, pushed[e])
+        if first == 0:
+            begin = float(_three(self._start_forces(part)[0]) @ self._tangent_at(touch.member, 0.0))
+        else:
+            start = self.along(touch.member, np.array([np.nextafter(touch.at, 0.0)]), dimensionless=True)
+            begin = float(start["force"][0] @ self._tangent_at(touch.member, touch.at))
+        bent = self._curvature(touch) * (pressed - self.pressed_moments(touch, np.array([touch.at]))[0][0])
+        return np.asarray(begin - bent * model.scales.length - gained)
+
+    @property
+    def largest_load(self) -> float:
+        """Largest force or moment on a place or a rotation, dimensionless."""
+        return max(float(np.abs(part).max(initial=0.0)) for part in (self._loading.force, self._loading.moment))
+
+    @property
+    def total_load(self) -> Array:
+        """Sum of all forces that act as loads, (3,) N."""
+        return _three(self._loading.force.sum(axis=0)) * self.model.scales.force
+
+    def moment_on(self, turn: int) -> float:
+        """Moment that acts on a rotation from outside, dimensionless."""
+        return float(np.linalg.norm(self._loading.moment[turn]))
+
+    def obstacle_normal(self, touch: Touch, at: float) -> Array:
+        """Unit vector (3,) from an obstacle to the member that lies on it."""
+        place = np.array([at])
+        position, tangent = self.positions(touch.member, place), self.tangents(touch.member, place)
+        stop = obstacle(self.model.scene.contacts[touch.contact], self.model.space)
+        return np.asarray(stop.normals(position, tangent, touch.way)[0])
+
+    def own_force(self, node: str) -> Array:
+        """Load (3,) on a node itself, N."""
+        return _three(self._loading.own[self.model.segments.place(node)]) * self.model.scales.force
+
+    def own_moment(self, node: str) -> Array:
+        """Moment (3,) on a node itself about the fixed axes, dimensionless."""
+        return np.asarray(self._loading.couple[self.model.segments.place(node)])
+
+    def load_before(self, member: str, x: Array) -> Array:
+        """Load (n, 3) within a member from its start to fractions of its length, dimensionless."""
+        model, element = self.model, self.model.element
+        part, cuts = model.elements_of(member), model.mesh.cuts[member]
+        spread, starts = self._loading.spread[part], self._start_forces(part)
+        # What the force loses from element to element is a load there, but where an obstacle has a place.
+        lost = starts[:-1] - spread[:-1].sum(axis=1) - starts[1:]
+        lost[np.isin(cuts[1:-1], [at for t in model.mesh.touches if t.member == member for at in t.places])] = 0.0
+        points = np.where(x[:, None] >= cuts[None, 1:-1], 1.0, 0.0) @ lost
+        sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
+        e, to_x = self._located(member, x)
+        return _three(sums[e] + points + np.einsum("nk,nka->na", to_x, spread[e]))
+
+    def stiffness(self, member: str, x: float) -> float:
+        """Smallest bending stiffness of the section at a place, dimensionless."""
+        values = self.model.scene.sections[str(self.model.scene.members[member].section)].stiffness(np.array([x]))
+        return float(np.nanmin(values[0, 1:])) / (self.model.scales.moment * self.model.scales.length)
+
+    def bend(self, member: str, x: Array, found: dict[str, Array]) -> Array:
+        """Derivative (n, 3) of the tangent along the member, 1/m, of what :meth:`along` found."""
+        frames = self._frames(member, x, found["rotation"])
+        return np.cross(np.einsum("nij,nj->ni", frames, found["curvature"]), frames[:, :, 0])
+
+    def _tangent_at(self, member: str, x: float) -> Array:
+        place = np.array([x])
+        return np.asarray(self._tangents(member, place, rotations_along(self.model, self.state.q, member, place))[0])
+
+    def _tangents(self, member: str, x: Array, rotation: Array) -> Array:
+        """Tangents (n, 3) at fractions of the length."""
+        return self._frames(member, x, rotation)[:, :, 0]
+
+    def tangents(self, member: str, x: Array) -> Array:
+        """Tangents (n, 3) at fractions of the length."""
+        return self._tangents(member, x, rotations_along(self.model, self.state.q, member, x))
+
+    def positions(self, member: str, x: Array) -> Array:
+        """Positions (n, 3) at fractions of the length, m."""
+        model = self.model
+        part = model.elements_of(member)
+        e, to_x = self._located(member, x)
+        moved = np.einsum("nk,nka->na", to_x, (self.turned[part] - model.beams.tangent[part])[e])
+        start = self._element_starts(member)
+        return model.scene.center_lines[member].positions(x) + _three(start[e] + moved) * model.scales.length
+
+    def _located(self, member: str, x: Array) -> tuple[Any, Array]:
+        """Element of each fraction of a member's length, and weights that integrate in it up to there."""
+        element = self.model.element
+        e, xi = _located(self.model.mesh.cuts[member], x)
+        rows = _per_place(xi, lambda places: interpolation.integration(element.points, places))
+        return e, rows / element.weights
+
+    def _curvature(self, touch: Touch) -> float:
+        """Signed curvature that an obstacle gives to a stretch, 1/m."""
+        contact = self.model.scene.contacts[touch.contact]
+        if contact.radius is None:
+            return 0.0
+        return touch.way / (contact.radius - (-1.0 if contact.side == "inside" else 1.0) * touch.offset)
+
+    def pressed_moments(self, touch: Touch, x: Array) -> tuple[Array, Array]:
+        """Moments (n,) that bend a member to the shape of an obstacle, dimensionless, and their axes (n, 3)."""
+        if self.model.space:
+            return self._pressed_in_space(touch, x)
+        scene = self.model.scene
+        line = scene.center_lines[touch.member]
+        stiffness = scene.sections[str(scene.members[touch.member].section)].stiffness(x)
+        column = 1 if line.bending_axis == 2 else 2
+        sign = np.rint(quaternion.matrix(line.quaternions(x))[:, 2, column])
+        bent = self._curvature(touch) - sign * line.curvatures(x)[:, column]
+        axes = np.broadcast_to([0.0, 0.0, 1.0], (len(x), 3))
+        return np.asarray(stiffness[:, column] * bent / self.model.scales.moment), axes
+
+    def _pressed_in_space(self, touch: Touch, x: Array) -> tuple[Array, Array]:
+        """The same on a plane in space: what bends about the axis in the plane across the member."""
+        model, element = self.model, self.model.element
+        normal = np.asarray(model.scene.contacts[touch.contact].normal, dtype=float)
+        cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
+        # At the border of the stretch its own element says how it is bent.
+        middle = np.clip(x, np.nextafter(touch.at, 1.0), np.nextafter(float(touch.to or 1.0), 0.0))
+        e, xi = _located(cuts, middle)
+        nodal = self.q[model.rotations.turns[part]][e]
+        rows = _per_place(xi, lambda places: interpolation.differentiation(element.nodes, places))
+        rotation = rotations_along(model, self.state.q, touch.member, middle)
+        lengths = model.beams.weight[part].sum(axis=1)[e] * model.scales.length
+        slope = np.einsum("nj,njc->nc", rows, nodal) / lengths[:, None]
+        spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
+        line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
+        strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
+        stiffness = model.scene.sections[str(record.section)].stiffness(middle)
+        frames = self._frames(touch.member, middle, rotation)
+        moments = np.einsum("nij,nj->ni", frames, stiffness * strain) / model.scales.moment
+        axes = np.cross(normal / np.linalg.norm(normal), frames[:, :, 0])
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        return np.einsum("ni,ni->n", moments, axes), axes
+
+    def _frames(self, member: str, x: Array, rotation: Array) -> Array:
+        """Section axes as columns, (n, 3, 3)."""
+        line = self.model.scene.center_lines[member]
+        if not self.model.space:
+            zero = np.zeros(len(x))
+            vectors = np.stack([zero, zero, rotation[:, 0]], axis=-1)
+            rotation = quaternion.from_rotation_vector(vectors)
+        return quaternion.matrix(quaternion.multiply(rotation, line.quaternions(x)))
+
+    def _along_body(self, member: str, x: Array) -> dict[str, Array]:
+        """Fields of a small member: its ends, and between them the shape of a beam that carries no load."""
+        model = self.model
+        line, ends = model.scene.center_lines[member], model.rotations.ends[member]
+        numbers = [ends[0], ends[-1]]
+        places = [model.segments.place(model.segments.ends[member, i]) for i in (0, len(ends) - 1)]
+        moved = _three(self._nodal[places]) * model.scales.length
+        turned = self.state.q[numbers]
+        if not model.space:
+            turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
+        signed = turned[1] * (1.0 if turned[0] @ turned[1] >= 0.0 else -1.0)
+        # Rotations go linearly from end to end; the rigid motion with them is corrected to meet the second end.
+        mixed = (1.0 - x)[:, None] * turned[0] + x[:, None] * signed
+        mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
+        mean = turned[0] + signed
+        mean /= np.linalg.norm(mean)
+        rest = line.positions(np.concatenate([[0.0], x, [1.0]]))
+        rigid = rest[0] + moved[0] + quaternion.rotate(mean, rest - rest[0])
+        miss = rest[-1] + moved[1] - rigid[-1]
+        bent = x**2 * (3.0 - 2.0 * x)
+        chord = quaternion.rotate(mean, line.tangents(x)) * line.length
+        spins = [2.0 * quaternion.multiply(q, quaternion.conjugate(mean))[1:] for q in (turned[0], signed)]
+        hermite = (x * (1.0 - x) ** 2)[:, None] * np.cross(spins[0], chord) - (x**2 * (1.0 - x))[:, None] * np.cross(
+            spins[1], chord
+        )
+        position = rigid[1:-1] + bent[:, None] * miss + hermite
+        wrenches = self.balance.body_ends(member)
+        force, moment = ((1.0 - x)[:, None] * -wrenches[0][k] + x[:, None] * wrenches[-1][k] for k in range(2))
+        if model.space:
+            rotation = mixed
+        else:
+            rotation = ((1.0 - x) * self.state.q[ends[0], 0] + x * self.state.q[ends[-1], 0])[:, None]
+        scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
+        return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
+
+    def bent(self, member: str) -> float:
+        """Largest displacement, over the size, and rotation of the nodes of a small member, seen from its frame."""
+        model = self.model
+        names, turns = model.scene.members[member].nodes, list(model.rotations.ends[member])
+        rest = np.array([model.scene.nodes[name].position for name in names])
+        places = [model.segments.place(model.segments.ends[member, i]) for i in range(len(names))]
+        now = rest + _three(self._nodal[places]) * model.scales.length
+        turned = self.state.q[turns]
+        if not model.space:
+            # From the mean angle: quaternions of angles that differ by turns would not tell their mean.
+            mean = quaternion.from_rotation_vector(np.array([0.0, 0.0, turned.mean()]))
+            turned = quaternion.from_rotation_vector(np.pad(turned, ((0, 0), (2, 0))))
+        else:
+            turned = turned * np.where(turned @ turned[0] < 0.0, -1.0, 1.0)[:, None]
+            mean = turned.sum(axis=0) / np.linalg.norm(turned.sum(axis=0))
+        moved = now - now[0] - quaternion.rotate(mean, rest - rest[0])
+        spins = 2.0 * quaternion.multiply(turned, quaternion.conjugate(mean))[:, 1:]
+        size = np.linalg.norm(rest - rest[0], axis=1).max()
+        return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
+
+    def _start_forces(self, part: slice) -> Array:
+        """Internal force at the start of each of consecutive elements, (elements, axes)."""
+        element = self.model.element
+        spread = self._loading.spread[part]
+        # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
+        beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
+        return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)
+
+    @functools.cache  # noqa: B019 - lives as long as the fields
+    def _element_starts(self, member: str) -> Array:
+        """Displacement at the start of each element of a member (and its end)."""
+        model = self.model
+        part = model.elements_of(member)
+        first = self._nodal[model.segments.place(model.segments.ends[member, 0])]
+        steps = (self.turned[part] - model.beams.tangent[part]).sum(axis=1)
+        return np.asarray(first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)]))
+
+    @functools.cache  # noqa: B019 - lives as long as the fields
+    def _element_moments(self, member: str) -> Array:
+        """Moment at the start of each element of a member (and its end)."""
+        model = self.model
+        part = model.elements_of(member)
+        gains = _cross(self.turned[part], self._pull[part]).sum(axis=1)
+        chain = model.rotations.turns[part]
+        # A couple at a cut is a jump of the moment.
+        if model.scene.members[member].type == "rigid":
+            gains[:-1] -= self._loading.jump[part][1:]
+        else:
+            gains[:-1] -= self._loading.moment[chain[1:, 0]]
+        moments = -self.balance.start_moment(member) + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
+        if any(touch.to is not None for touch in model.mesh.touches):
+            # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
+            moments[:-1] = -self.balance.starting_moments(part)
+        return np.asarray(moments)
+
+
+def _located(cuts: Array, x: Array) -> tuple[Any, Array]:
+    """Element of each fraction, and the place in it."""
+    e = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
+    return e, (x - cuts[e]) / (cuts[e + 1] - cuts[e])
+
+
+def _per_place(xi: Array, rows: Any) -> Array:
+    """Rows of a matrix for places that often repeat."""
+    places, inverse = np.unique(xi, return_inverse=True)
+    return np.asarray(rows(places)[inverse])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors in the plane or in space, (..., 3)."""
+    return np.cross(_three(a), _three(b))
+
+
+def _turned_tangents(equations: Equations, state: State) -> Array:
+    """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
+    model, element = equations.model, equations.model.element
+    q = state.q[model.rotations.turns]
+    if element.gauss:
+        q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)
+    if model.space:
+        return quaternion.rotate(q / np.linalg.norm(q, axis=-1, keepdims=True), model.beams.tangent)
+    c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
+    t = model.beams.tangent
+    return np.stack([c * t[..., 0] - s * t[..., 1], s * t[..., 0] + c * t[..., 1]], axis=-1)
+
+
+def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
+    """Rotations at fractions x of a member, (n, 4) unit or (n, 1)."""
+    e, xi = _located(model.mesh.cuts[member], x)
+    nodal = q[model.rotations.turns[model.elements_of(member)]]
+    rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
+    values = np.einsum("nj,njc->nc", rows, nodal[e])
+    return values / np.linalg.norm(values, axis=-1, keepdims=True) if model.space else values
+
+
+def transferred(source: Any, state: State, target: Any) -> State:
+    """A state of one mesh on another mesh of the same scene.
+
+    Displacements and multipliers go by their names; those that the other mesh does not have are left zero.
+    """
+    q = np.zeros((len(target.rotations.kind), target.element.components))
+    for name, ends in target.rotations.ends.items():
+        q[list(ends)] = state.q[list(source.rotations.ends[name])]
+    for name in target.members:
+        q[target.chain(name)] = rotations_along(source, state.q, name, target.along(name))
+    for name, number in target.rotations.node_turn.items():
+        if number is not None and source.rotations.node_turn[name] is not None:
+            q[number] = state.q[source.rotations.node_turn[name]]
+    y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
+    lam = _by_name(source.row_names, state.lam, target.row_names)
+    return State(q, y, lam, state.wound)
+
+
+def _by_name(names: tuple[str, ...], values: Array, wanted: tuple[str, ...]) -> Array:
+    """Values by their names; names that repeat go in their order."""
+    if names == wanted:
+        return values.copy()
+    known: dict[tuple[str, int], float] = {}
+    count: dict[str, int] = {}
+    for name, value in zip(names, values, strict=True):
+        count[name] = count.get(name, 0) + 1
+        known[name, count[name]] = float(value)
+    count, found = {}, []
+    for name in wanted:
+        count[name] = count.get(name, 0) + 1
+        found.append(known.get((name, count[name]), 0.0))
+    return np.array(found)

@@ -1,0 +1,485 @@
+"""What joints, springs and small bodies ask of the rotations and displacements that they connect.
+
+A connection sees the world only through its *sides*: rotations ``q`` since the undeformed scene (an angle in the
+plane, a quaternion in space) and displacements ``u`` of places.  It states an energy, or rows that have to be
+zero, or both; every derivative comes from CasADi, once a process and kind.  To add a joint, write one class here
+and one row in ``tests/test_joints.py``; what touches obstacles stands in :mod:`~sfetcas.mechanics.contact_joints`.
+
+A ball asks nothing, a rigid joint lets both sides share one rotation, and in the plane a hinge asks nothing.
+"""
+
+from __future__ import annotations
+
+import abc
+import functools
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.quaternion import Components, product, turned
+
+__all__ = [
+    "Body",
+    "Connection",
+    "DrivenSlide",
+    "DrivenTurn",
+    "Hinge",
+    "LineSpring",
+    "LineStop",
+    "Side",
+    "Slide",
+    "Spring",
+    "TurnSpring",
+    "TurnStop",
+    "Turning",
+    "Universal",
+    "by_components",
+    "by_turning",
+]
+
+Side = list[ca.SX]
+"""Components of a rotation or of a vector."""
+
+
+@dataclass(frozen=True)
+class Connection(Components, abc.ABC):
+    """A kind of connection; what it says stands in the methods that a new kind gives.
+
+    Attributes
+    ----------
+    space : bool
+        Quaternions and three axes, or angles and two.
+    """
+
+    space: bool
+
+    @property
+    @abc.abstractmethod
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Rotations, places, rows, data and loads (data that grow with the load factor)."""
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Potential energy, dimensionless."""
+        return ca.SX(0)
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """What has to be zero: angles (rad) and displacements, dimensionless."""
+        return []
+
+    # -- what the sides say to each other --------------------------------------------------------
+
+    def back(self, q: Side, v: Side) -> Side:
+        """The vector seen from the turned side, ``R(q)^T v``."""
+        if self.space:
+            return turned([q[0], -q[1], -q[2], -q[3]], v)
+        c, s = ca.cos(q[0]), ca.sin(q[0])
+        return [c * v[0] + s * v[1], c * v[1] - s * v[0]]
+
+    def turned_back(self, q: Side, v: Side) -> Side:
+        """What turning back changes, ``R(q)^T v - v``, also of small rotations to full precision."""
+        if self.space:
+            spin = [-a for a in q[1:]]
+            once = ca.cross(ca.vertcat(*spin), ca.vertcat(*v))
+            return ca.vertsplit(2.0 * (q[0] * once + ca.cross(ca.vertcat(*spin), once)))
+        s, versine = ca.sin(q[0]), 2.0 * ca.sin(0.5 * q[0]) ** 2
+        return [s * v[1] - versine * v[0], -s * v[0] - versine * v[1]]
+
+    def forth(self, q: Side, v: Side) -> Side:
+        """The vector turned with the side, ``R(q) v``."""
+        return self.back([-q[0]] if not self.space else [q[0], -q[1], -q[2], -q[3]], v)
+
+    def relative(self, a: Side, b: Side) -> Side:
+        """Rotation of side b against side a, seen from the undeformed scene."""
+        return product([a[0], -a[1], -a[2], -a[3]], b) if self.space else [b[0] - a[0]]
+
+
+def _dot(a: Side, b: Side) -> ca.SX:
+    return ca.dot(ca.vertcat(*a), ca.vertcat(*b))
+
+
+@final
+@dataclass(frozen=True)
+class Hinge(Connection):
+    """Two rotations that differ about one axis only; data: two directions normal to it.  Space only."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Two rows."""
+        return 2, 0, 2, 6, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Twice the components of ``conj(qa) qb`` across the axis."""
+        across = ca.vertcat(*self.relative(*q)[1:])
+        return [2.0 * ca.dot(data[3 * i : 3 * i + 3], across) for i in range(2)]
+
+
+@final
+@dataclass(frozen=True)
+class Universal(Connection):
+    """An axis of either side that stay normal to each other; data: both, undeformed.  Space only."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 2, 0, 1, 6, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Cosine of the angle between the two axes."""
+        a, b = ca.vertsplit(data[:3]), ca.vertsplit(data[3:])
+        return [_dot(self.forth(q[0], a), self.forth(q[1], b))]
+
+
+@final
+@dataclass(frozen=True)
+class DrivenTurn(Connection):
+    """The angle between two rotations about an axis is prescribed; data: axis, load: angle."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 2, 0, 1, 3, 1
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The angle less what it shall be; in space by its half sine, which is smooth at any angle."""
+        if not self.space:
+            return [data[2] * (q[1][0] - q[0][0]) - load]
+        r = self.relative(*q)
+        about, half = ca.dot(data, ca.vertcat(*r[1:])), 0.5 * load
+        return [2.0 * (ca.cos(half) * about - ca.sin(half) * r[0])]
+
+
+@final
+@dataclass(frozen=True)
+class Slide(Connection):
+    """A place that slides along a line carried by a rotation at another one; data: directions across the line."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row in the plane, two in space."""
+        return 1, 2, self.axes - 1, self.axes * (self.axes - 1), 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Components of the distance across the line, seen from the turned side."""
+        gap = ca.vertcat(*self.back(q[0], [b - a for a, b in zip(*u, strict=True)]))
+        n = self.axes
+        return [ca.dot(data[n * i : n * i + n], gap) for i in range(n - 1)]
+
+
+@final
+@dataclass(frozen=True)
+class DrivenSlide(Connection):
+    """The travel of a slide is prescribed; data: direction of the line, load: travel."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 1, 2, 1, self.axes, 1
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Travel along the line less what it shall be."""
+        gap = ca.vertcat(*self.back(q[0], [b - a for a, b in zip(*u, strict=True)]))
+        return [ca.dot(data, gap) - load]
+
+
+@dataclass(frozen=True)
+class Turning(Connection):
+    """What acts on the angle of the second side against the first about an axis of the first; it has no places.
+
+    Angles count turns: in the plane by themselves, in space near a value that the state carries.  With ``r`` the
+    rotation of one side against the other the angle is twice ``atan2(axis.r, r_0)``, and does what it shall for a
+    hinge.  At a universal joint the axis of the one side is normal to a direction ``c`` that the other carries, and
+    the angle of ``c`` about the axis is taken: then the moment is along the axis and leaves the joint what is normal
+    to both axes.
+
+    Data: axis, of a universal joint ``c`` in the undeformed scene, then what :attr:`own` counts, in space the near
+    value.
+
+    Attributes
+    ----------
+    crossed : bool
+        At a universal joint.
+    """
+
+    crossed: bool = False
+
+    @property
+    @abc.abstractmethod
+    def own(self) -> int:
+        """Data of the kind itself."""
+
+    @property
+    def first(self) -> int:
+        """Where these begin."""
+        return 6 if self.crossed else 3
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 2, 0, 0, self.first + self.own + self.space, 0
+
+    def angle(self, q: list[Side], data: ca.SX) -> ca.SX:
+        """The angle, rad."""
+        axis = data[:3]
+        r = self.relative(*q)
+        if not self.space:
+            return axis[2] * r[0]
+        sine, cosine, share = ca.dot(axis, ca.vertcat(*r[1:])), r[0], 2.0
+        if self.crossed:
+            other = data[3:6]
+            seen = ca.vertcat(*self.forth(r, ca.vertsplit(other)))
+            sine, cosine, share = ca.dot(ca.cross(axis, other), seen), ca.dot(other, seen), 1.0
+        near = data[self.first + self.own]
+        c, s = ca.cos(near / share), ca.sin(near / share)
+        return near + share * ca.atan2(sine * c - cosine * s, cosine * c + sine * s)
+
+
+@final
+@dataclass(frozen=True)
+class TurnSpring(Turning):
+    """A rotational spring about an axis of the first side; its own data: stiffness, rest angle."""
+
+    @property
+    def own(self) -> int:
+        """Two."""
+        return 2
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
+        angle = self.angle(q, data)
+        return 0.5 * data[self.first] * angle * (angle - 2.0 * data[self.first + 1])
+
+
+@final
+@dataclass(frozen=True)
+class TurnStop(Turning):
+    """A rotational spring that stands at a stop; its own data: angle of the stop."""
+
+    @property
+    def own(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        turns, places, _, data, load = super().sizes
+        return turns, places, 1, data, load
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The angle less that of the stop."""
+        return [self.angle(q, data) - data[self.first]]
+
+
+@final
+@dataclass(frozen=True)
+class LineStop(Connection):
+    """A spring along a direction that stands at a stop; data: direction, travel of the stop."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """One row."""
+        return 0, 2, 1, self.axes + 1, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The travel less that of the stop."""
+        n = self.axes
+        return [ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n]]
+
+
+@final
+@dataclass(frozen=True)
+class Spring(Connection):
+    """A spring between two places with a free length; data: their distance (vector), stiffness, free length."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 0, 2, 0, self.axes + 2, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Half the stiffness times the square of the elongation, less that of the undeformed scene."""
+        n = self.axes
+        gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
+        return 0.5 * data[n] * (self._square(gap, data[n + 1]) - self._square(data[:n], data[n + 1]))
+
+    @staticmethod
+    def _square(gap: ca.SX, free: ca.SX) -> ca.SX:
+        """Square of the elongation; with a free length of zero it has no kink where the places meet."""
+        square = ca.dot(gap, gap)
+        return square - 2.0 * free * ca.sqrt(ca.if_else(free == 0.0, 1.0, square)) + free**2
+
+
+@final
+@dataclass(frozen=True)
+class LineSpring(Connection):
+    """A spring that acts along a direction fixed in space; data: direction, stiffness, rest travel."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """No row."""
+        return 0, 2, 0, self.axes + 2, 0
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Half the stiffness times the square of the travel from rest, zero in the undeformed scene."""
+        n = self.axes
+        travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
+        return 0.5 * data[n] * travel * (travel - 2.0 * data[n + 1])
+
+
+@final
+@dataclass(frozen=True)
+class Body(Connection):
+    """A body with linear elasticity in a frame that it carries, on macro-nodes with six (three) freedoms each.
+
+    The frame turns with the mean of the rotations; of each node the displacement since the undeformed body,
+    relative to the first node, and the rotation relative to the frame are seen from it.  With ``e`` these
+    numbers the energy is ``1/2 e.K e``, and the rows ``N e`` say which deformations do not exist.  Loads along
+    the body work on the rigid motion and on ``e``: ``-P.u_1 - tr(Q^T (R - I)) - tr(R^T T e)``.
+
+    Data: rest vectors (nodes x axes), K (upper triangle by columns), N (rows x freedoms); load: P, Q, T.
+
+    Attributes
+    ----------
+    nodes, stiff : int
+        Number of macro-nodes and of rows.
+    """
+
+    nodes: int
+    stiff: int
+
+    @property
+    def freedoms(self) -> int:
+        """Numbers of ``e``: 6 a node in space, 3 in the plane."""
+        return (self.axes + self.turns) * self.nodes
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """As many rows as deformations that do not exist."""
+        n, axes = self.freedoms, self.axes
+        data = self.nodes * axes + n * (n + 1) // 2 + self.stiff * n
+        return self.nodes, self.nodes, self.stiff, data, axes + axes * axes + axes * axes * n
+
+    def frame(self, q: list[Side]) -> Side:
+        """Mean rotation of the nodes."""
+        if not self.space:
+            return [sum((side[0] for side in q), ca.SX(0)) / self.nodes]
+        total = ca.vertcat(*q[0])
+        for side in q[1:]:
+            other = ca.vertcat(*side)
+            total += ca.if_else(ca.dot(other, ca.vertcat(*q[0])) < 0.0, -1.0, 1.0) * other
+        return ca.vertsplit(total / ca.norm_2(total))
+
+    def deformation(self, q: list[Side], u: list[Side], rest: ca.SX) -> ca.SX:
+        """The numbers ``e``: displacements and twice the sines of half the rotations, seen from the frame."""
+        frame, e = self.frame(q), []
+        for i in range(self.nodes):
+            d = ca.vertsplit(rest[self.axes * i : self.axes * (i + 1)])
+            moved = self.back(frame, [u[i][k] - u[0][k] for k in range(self.axes)])
+            e += [a + b for a, b in zip(moved, self.turned_back(frame, d), strict=True)]
+            r = self.relative(frame, q[i])
+            if self.space:
+                sign = ca.if_else(r[0] < 0.0, -2.0, 2.0)
+                e += [sign * component for component in r[1:]]
+            else:
+                e.append(2.0 * ca.sin(0.5 * r[0]))
+        return ca.vertcat(*e)
+
+    def _split(self, data: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        n, first = self.freedoms, self.nodes * self.axes
+        upper = ca.SX(ca.Sparsity.upper(n), data[first : first + n * (n + 1) // 2])
+        full = upper + upper.T - ca.diag(ca.diag(upper))
+        return data[:first], full, ca.reshape(data[first + n * (n + 1) // 2 :], self.stiff, n)
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Elastic energy and potential of the loads along the body."""
+        rest, stiffness, _ = self._split(data)
+        e, axes, frame = self.deformation(q, u, rest), self.axes, self.frame(q)
+        work = ca.dot(load[:axes], ca.vertcat(*u[0]))
+        lever = ca.reshape(load[axes : axes + axes * axes], axes, axes)
+        tensor = ca.reshape(load[axes + axes * axes :], axes * axes, self.freedoms)
+        lever_now = lever + ca.reshape(ca.mtimes(tensor, e), axes, axes)
+        for k in range(axes):
+            unit = [ca.SX(float(k == i)) for i in range(axes)]
+            work += ca.dot(lever_now[:, k], ca.vertcat(*self.forth(frame, unit))) - lever[k, k]
+        return 0.5 * ca.dot(e, ca.mtimes(stiffness, e)) - work
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Deformations that do not exist."""
+        rest, _, stiff = self._split(data)
+        return ca.vertsplit(ca.mtimes(stiff, self.deformation(q, u, rest))) if self.stiff else []
+
+
+# -- derivatives, the same for all kinds --------------------------------------------------------------
+
+
+def _symbols(kind: Connection) -> tuple[list[ca.SX], ca.SX, ca.SX]:
+    """Arguments q, u, data, load, lam; energy and rows."""
+    turns, places, rows, data, load = kind.sizes
+    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
+    arguments = [q, u, ca.SX.sym("data", data), ca.SX.sym("load", load), ca.SX.sym("lam", rows)]
+    sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
+    energy = kind.energy(*sides, arguments[2], arguments[3])
+    residual = ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, arguments[2], arguments[3]))
+    return arguments, energy, residual
+
+
+def _name(kind: Connection) -> str:
+    extra = f"_{kind.nodes}_{kind.stiff}" if isinstance(kind, Body) else ""
+    extra += "_crossed" if isinstance(kind, Turning) and kind.crossed else ""
+    return f"{type(kind).__name__.lower()}_{'space' if kind.space else 'plane'}{extra}"
+
+
+@functools.cache
+def by_turning(kind: Connection) -> ca.Function:
+    """(q, u, data, load, lam) -> energy, its share without loads, rows, gradient, stiffness, and the rows' derivative.
+
+    Derivatives of the Lagrangian ``energy + lam.rows`` by rotations about the fixed axes of all sides, then by all
+    displacements, on unit quaternions (see :attr:`sfetcas.mechanics.elements.Element.turning`).
+    """
+    arguments, energy, rows = _symbols(kind)
+    q, u = arguments[0], arguments[1]
+    x = ca.vertcat(ca.vec(q), ca.vec(u))
+    hessian, gradient = ca.hessian(energy + ca.dot(arguments[4], rows), x)
+    spin, radial = [ca.SX.eye(q.numel())], ca.SX.zeros(u.numel(), 1)
+    if kind.space:
+        sides = [ca.vertsplit(q[:, i]) for i in range(q.shape[1])]
+        columns = [[ca.vertcat(*product([0.0, *a], side)) for a in np.eye(3).tolist()] for side in sides]
+        spin = [0.5 * ca.horzcat(*c) for c in columns]
+        parts = [ca.dot(q[:, i], gradient[4 * i : 4 * i + 4]) for i in range(q.shape[1])]
+        radial = ca.vertcat(*[part for part in parts for _ in range(3)], radial)
+    else:
+        radial = ca.SX.zeros(x.numel(), 1)
+    basis = ca.diagcat(*spin, ca.SX.eye(u.numel()))
+    stiffness = ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * ca.diag(radial)
+    results = [
+        energy,
+        ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape)),
+        ca.densify(rows),
+        ca.densify(ca.mtimes(basis.T, gradient)),
+        ca.densify(stiffness),
+        ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
+    ]
+    names = ["energy", "stored", "rows", "gradient", "stiffness", "spin"]
+    return ca.Function(f"turning_{_name(kind)}", arguments, results, ["q", "u", "data", "load", "lam"], names)
+
+
+@functools.cache
+def by_components(kind: Connection) -> ca.Function:
+    """(q, u, data, load, lam, weight) -> energy, rows, gradient, jacobian, hessian of ``weight energy + lam.rows``.
+
+    Derivatives by the components of all rotations, then of all displacements.
+    """
+    arguments, energy, rows = _symbols(kind)
+    x, weight = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1])), ca.SX.sym("weight")
+    results = [
+        energy,
+        ca.densify(rows),
+        ca.densify(ca.gradient(energy, x)),
+        ca.densify(ca.jacobian(rows, x)),
+        ca.densify(ca.hessian(weight * energy + ca.dot(arguments[4], rows), x)[0]),
+    ]
+    given = ["q", "u", "data", "load", "lam", "weight"]
+    names = ["energy", "rows", "gradient", "jacobian", "hessian"]
+    return ca.Function(f"components_{_name(kind)}", [*arguments, weight], results, given, names)

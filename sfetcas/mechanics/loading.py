@@ -1,0 +1,464 @@
+"""Loads and motions of a scene on a mesh, in the units of the model.
+
+Every load is a share of a :class:`Loading`; loads and motions with the same history are one of them, times a
+factor.  What acts along a member is put to its first node, and the internal force that it causes on the way
+there is the pull of the elements before it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..description.scene import Load, Motion, Scene
+from ..description.sections import evaluate
+from ..errors import SceneError
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array, Index
+from ..mathematics.interpolation import lobatto
+from .beams import Beams, Scales
+from .bodies import Lever, body_of, lever_along, quadrature
+from .connections import Group, freedoms
+from .elements import Element
+from .joints import Body, DrivenSlide, DrivenTurn
+from .mesh import Mesh
+from .rotations import Rotations
+from .segments import Segments
+
+__all__ = ["Followers", "Loading", "carried", "find_followers", "unit_loadings"]
+
+
+@dataclass(frozen=True)
+class Loading:
+    """Loads and motions of one load factor, dimensionless.
+
+    Attributes
+    ----------
+    force : ndarray (places, axes)
+        Dead forces on places, and the resultants of the loads along segments, put to their first places.
+    own : ndarray (places, axes)
+        The share of ``force`` that acts on the places themselves.
+    moment : ndarray (rotations, 3)
+        Moments on rotations, about the fixed axes.
+    twist : ndarray (rotations, 3)
+        Moments on rotations that turn with them.
+    jump : ndarray (elements, 3)
+        The share of ``moment`` that acts at the start of an element, within a member.
+    couple, couple_twist : ndarray (places, 3)
+        The shares of ``moment`` and ``twist`` that act on nodes themselves.
+    following : ndarray (n, axes)
+        Forces that turn with a rotation, on the pairs of :attr:`Followers`.
+    tangential : ndarray (elements, points, axes)
+        Distributed force times weight times length that turns with the section.
+    pull : ndarray (elements, points, axes)
+        Minus the internal force at the integration points that the loads along the member cause.
+    spread : ndarray (elements, points, axes)
+        Distributed force times weight times length; what ``pull`` was made of, for section forces.
+    shift : ndarray (places * axes,)
+        Prescribed displacements, zero for places that are free.
+    turn : ndarray (rotations, 3)
+        Prescribed rotation vectors of held rotations.
+    loads : tuple of ndarray (n, loads)
+        What grows with the load factor in each group of connections.
+    """
+
+    force: Array
+    own: Array
+    moment: Array
+    twist: Array
+    jump: Array
+    couple: Array
+    couple_twist: Array
+    following: Array
+    tangential: Array
+    pull: Array
+    spread: Array
+    shift: Array
+    turn: Array
+    loads: tuple[Array, ...]
+
+    def scaled(self, factor: float) -> Loading:
+        """All loads and motions times a factor."""
+        parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS)}
+        return Loading(**parts, loads=tuple(factor * load for load in self.loads))
+
+    def unloaded(self) -> Loading:
+        """The motions alone; the driven joints among them."""
+        zero: dict[str, Any] = {name: np.zeros_like(getattr(self, name)) for name in LOADS}
+        loads = tuple(load if load.shape[1] == 1 else np.zeros_like(load) for load in self.loads)
+        return replace(self, **zero, loads=loads)
+
+    def plus(self, other: Loading) -> Loading:
+        """The sum of two loadings."""
+        parts = {name: getattr(self, name) + getattr(other, name) for name in (*LOADS, *MOTIONS)}
+        return Loading(**parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
+
+    @property
+    def nodal(self) -> bool:
+        """Whether it is forces and moments on places, and displacements of them, only."""
+        loaded = any(load.any() for load in self.loads)
+        return not (self.follows or self.pull.any() or loaded)
+
+    @property
+    def driven(self) -> float:
+        """Largest angle or travel of a driven joint."""
+        return max((float(np.abs(load).max()) for load in self.loads if load.shape[1] == 1), default=0.0)
+
+    @property
+    def follows(self) -> bool:
+        """Whether forces or moments turn with what they act on."""
+        return bool(self.following.any() or self.tangential.any() or self.twist.any())
+
+
+LOADS = (
+    "force",
+    "own",
+    "moment",
+    "twist",
+    "jump",
+    "couple",
+    "couple_twist",
+    "following",
+    "tangential",
+    "pull",
+    "spread",
+)
+MOTIONS = ("shift", "turn")
+
+
+@dataclass(frozen=True)
+class Followers:
+    """Where forces that turn with a rotation act.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the loads.
+    turns, places : ndarray (n,)
+        Numbers of the rotation that each turns with and of the place it acts on.
+    elements : ndarray
+        Elements along which distributed ones act; each is a segment.
+    """
+
+    names: tuple[str, ...]
+    turns: Index
+    places: Index
+    elements: Index
+
+
+def find_followers(scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations) -> Followers:
+    """The followers of a scene.
+
+    Raises
+    ------
+    SceneError
+        Nothing turns with the node that a load shall follow.
+    """
+    names, turns, places, along = [], [], [], []
+    for name, load in scene.loads.items():
+        if not load.follows:
+            continue
+        if load.type == "distributed":
+            along += [part.elements.start for part in segments.parts if part.member == load.member]
+            continue
+        names.append(name)
+        if load.node is not None:
+            turns.append(turning(rotations, name, load.node))
+            places.append(segments.place(load.node))
+            continue
+        member = str(load.member)
+        cut = int(np.argmin(np.abs(mesh.cuts[member] - (load.at or 0.0))))
+        parts = [part for part in segments.parts if part.member == member]
+        chain = rotations.chain(slice(parts[0].elements.start, parts[-1].elements.stop))
+        turns.append(int(chain[cut * element.order]))
+        start = next((part.start for part in parts if part.elements.start == parts[0].elements.start + cut), None)
+        places.append(segments.place(parts[-1].end if start is None else start))
+    index = [np.array(part, dtype=np.intp) for part in (turns, places, sorted(set(along)))]
+    return Followers(tuple(names), *index)
+
+
+def turning(rotations: Rotations, name: str, node: str) -> int:
+    """Rotation of a node that a load acts on.
+
+    Raises
+    ------
+    SceneError
+        There is none.
+    """
+    number = rotations.node_turn[node]
+    if number is None:
+        raise SceneError(f"nothing turns with node {node!r}, so no moment or follower can act on it", ("loads", name))
+    return number
+
+
+def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array, Array]:
+    """Pull (elements, points, axes) and forces on places (places, axes) of forces along the elements.
+
+    The pull at a point is minus the load beyond it up to the end of its segment; within an element "beyond" is
+    the transpose of the matrix that integrates the turned tangents, so that the discrete potential has exactly
+    this gradient.
+    """
+    on_element = forces.sum(axis=1)
+    pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
+    on_places = np.zeros((len(segments.places), element.axes))
+    for part in segments.parts:
+        here = part.elements
+        if not forces[here].any():
+            continue
+        beyond = np.cumsum(on_element[here][::-1], axis=0)[::-1]
+        pull[here] -= (beyond - on_element[here])[:, None, :]
+        on_places[segments.place(part.start)] += beyond[0]
+    return pull, on_places
+
+
+@dataclass(frozen=True, eq=False)
+class _Writer:
+    """Everything that it takes to turn a load into shares of a loading."""
+
+    scene: Scene
+    mesh: Mesh
+    element: Element
+    scales: Scales
+    segments: Segments
+    rotations: Rotations
+    beams: Beams
+    connections: tuple[Group, ...]
+    followers: Followers
+
+    def empty(self) -> Loading:
+        """No load and no motion."""
+        places, turns = len(self.segments.places), len(self.rotations.kind)
+        along = (*self.beams.weight.shape, self.element.axes)
+        return Loading(
+            force=np.zeros((places, self.element.axes)),
+            own=np.zeros((places, self.element.axes)),
+            moment=np.zeros((turns, 3)),
+            twist=np.zeros((turns, 3)),
+            jump=np.zeros((len(self.beams.weight), 3)),
+            couple=np.zeros((places, 3)),
+            couple_twist=np.zeros((places, 3)),
+            following=np.zeros((len(self.followers.names), self.element.axes)),
+            tangential=np.zeros(along),
+            pull=np.zeros(along),
+            spread=np.zeros(along),
+            shift=np.zeros(places * self.element.axes),
+            turn=np.zeros((turns, 3)),
+            loads=tuple(np.zeros((len(group.names), group.kind.sizes[4])) for group in self.connections),
+        )
+
+    def elements_of(self, member: str) -> slice:
+        start = self.beams.first[member]
+        return slice(start, start + len(self.mesh.cuts[member]) - 1)
+
+    def places(self, member: str) -> Array:
+        """Fractions of the length of the integration points of a member, (elements, points)."""
+        cuts = self.mesh.cuts[member]
+        return np.asarray(cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.points)
+
+    def cut(self, load: Load) -> int:
+        """Number of the cut of the member at which a load acts."""
+        return int(np.argmin(np.abs(self.mesh.cuts[str(load.member)] - (load.at or 0.0))))
+
+    def vector(self, vector: Any) -> Array:
+        return np.asarray(vector, dtype=float)[: self.element.axes]
+
+    def segments_of(self, member: str) -> list[tuple[int, slice]]:
+        """Number of the first place and elements of each segment of a member."""
+        parts = (part for part in self.segments.parts if part.member == member)
+        return [(self.segments.place(part.start), part.elements) for part in parts]
+
+    def push(self, group: Loading, place: int, force: Array) -> None:
+        """Add a force on a place itself, N."""
+        group.force[place] += force / self.scales.force
+        group.own[place] += force / self.scales.force
+
+    # -- loads ----------------------------------------------------------------------------------
+
+    def add_load(self, group: Loading, name: str, load: Load) -> None:
+        if load.type == "moment":
+            self._add_moment(group, name, load)
+        elif load.follows and load.type == "force":
+            number = self.followers.names.index(name)
+            group.following[number] += self.vector(load.vector) / self.scales.force
+        elif load.node is not None:
+            self.push(group, self.segments.place(load.node), self.vector(load.vector))
+        elif self.scene.members[str(load.member)].type == "small":
+            self._add_on_body(group, load)
+        elif load.type == "force":
+            self._add_point_force(group, load)
+        else:
+            x = self.places(str(load.member))
+            profile = np.ones(x.shape) if load.profile is None else evaluate(load.profile, x.ravel()).reshape(x.shape)
+            density = profile[..., None] * self._along(load, x)
+            self.spread(group, str(load.member), density, follows=load.follows)
+
+    def _along(self, load: Load, x: Array) -> Array:
+        """Value of a distributed load at places of its member, fixed axes of the undeformed scene."""
+        if load.frame != "section":
+            return self.vector(load.vector)
+        turned = self.scene.center_lines[str(load.member)].quaternions(x.ravel())
+        return quaternion.rotate(turned, np.asarray(load.vector))[:, : self.element.axes].reshape(*x.shape, -1)
+
+    def _add_moment(self, group: Loading, name: str, load: Load) -> None:
+        value = np.asarray(load.vector) / self.scales.moment
+        # In the plane a moment that follows is one that does not.
+        follows = load.frame == "follower" and self.element.space
+        if load.node is not None:
+            number = turning(self.rotations, name, load.node)
+            (group.couple_twist if follows else group.couple)[self.segments.place(load.node)] += value
+        else:
+            chain = self.rotations.chain(self.elements_of(str(load.member)))
+            cut = self.cut(load)
+            number = int(chain[cut * self.element.order])
+            if 0 < cut < len(self.mesh.cuts[str(load.member)]) - 1:
+                group.jump[self.beams.first[str(load.member)] + cut] += value
+        (group.twist if follows else group.moment)[number] += value
+
+    def _add_point_force(self, group: Loading, load: Load) -> None:
+        member = str(load.member)
+        value = self.vector(load.vector) / self.scales.force
+        cut = self.beams.first[member] + self.cut(load)
+        for place, part in self.segments_of(member):
+            if part.start <= cut < part.stop:
+                group.pull[part.start : cut] -= value
+                group.force[place] += value
+                return
+        self.push(group, self.segments.place(self.segments.ends[member, 1]), self.vector(load.vector))
+
+    def add_weight(self, group: Loading, member: str) -> None:
+        if self.scene.members[member].type == "small":
+            weight = body_of(self.scene, member).weight
+            assert weight is not None
+            self._add_lever(group, member, weight, np.asarray(self.scene.gravity))
+            return
+        section = self.scene.members[member].section
+        if section is None:
+            return
+        x = self.places(member)
+        mass = self.scene.sections[section].mass(x.ravel()).reshape(x.shape)
+        line = self.scene.center_lines[member]
+        if self.scene.members[member].type == "rigid" and line.turning > 0.0:
+            self._add_weight_of_chord(group, member)
+            return
+        self.spread(group, member, mass[..., None] * self.vector(self.scene.gravity))
+
+    def _add_weight_of_chord(self, group: Loading, member: str) -> None:
+        """The mass of a rigid member is spread over the straight line between its nodes, whatever its shape."""
+        x, w = lobatto(9)
+        start, end = (np.asarray(self.scene.nodes[n].position) for n in self.scene.members[member].nodes)
+        share = self.scene.sections[str(self.scene.members[member].section)].mass(x) * w * np.linalg.norm(end - start)
+        weight = self.vector(self.scene.gravity)
+        self.push(group, self.segments.place(self.segments.ends[member, 0]), (share @ (1.0 - x)) * weight)
+        self.push(group, self.segments.place(self.segments.ends[member, 1]), (share @ x) * weight)
+
+    def add_mass(self, group: Loading, node: str) -> None:
+        """Weight of a lumped mass."""
+        weight = self.scene.nodes[node].mass * self.vector(self.scene.gravity)
+        self.push(group, self.segments.place(node), weight)
+
+    def spread(self, group: Loading, member: str, density: Array, *, follows: bool = False) -> None:
+        """Add a force per length (elements, points, axes), N/m."""
+        part, forces = self.elements_of(member), np.zeros_like(group.spread)
+        forces[part] = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
+        if follows:
+            group.tangential[part] += forces[part]
+            return
+        pull, on_places = carried(forces, self.segments, self.element)
+        group.spread[part] += forces[part]
+        group.pull[part] += pull[part]
+        group.force[:] += on_places
+
+    # -- small members ----------------------------------------------------------------------------
+
+    def _add_on_body(self, group: Loading, load: Load) -> None:
+        member = str(load.member)
+        if load.type == "force":
+            length = self.scene.center_lines[member].length
+            lever = lever_along(self.scene, member, np.ones(1) / length, np.array([load.at or 0.0]), np.ones(1))
+        else:
+            x, w = quadrature(self.scene, member)
+            profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+            lever = lever_along(self.scene, member, profile, x, w)
+        self._add_lever(group, member, lever, np.asarray(load.vector))
+
+    def _add_lever(self, group: Loading, member: str, lever: Lever, vector: Array) -> None:
+        """A profile times a vector: force, first moment and consistent forces as the body's kernel takes them."""
+        i = next(i for i, g in enumerate(self.connections) if isinstance(g.kind, Body) and member in g.names)
+        kind, axes = self.connections[i].kind, self.element.axes
+        assert isinstance(kind, Body)
+        value = vector[:axes] / self.scales.force
+        chosen = freedoms(kind.nodes, kind.space)
+        unit = np.tile([self.scales.length] * 3 + [1.0] * 3, kind.nodes)
+        ends = (lever.ends * unit / self.scales.length)[:axes, chosen]
+        first = np.outer(value, lever.first[:axes] / self.scales.length)
+        tensor = np.einsum("a,bj->abj", value, ends)
+        parts = [lever.total * value, first.T.ravel(), tensor.transpose(2, 1, 0).ravel()]
+        group.loads[i][self.connections[i].names.index(member)] += np.concatenate(parts)
+
+    # -- motions --------------------------------------------------------------------------------
+
+    def add_motion(self, group: Loading, name: str, motion: Motion) -> None:
+        number, axes = self.segments.place(motion.node), self.element.axes
+        if motion.between is not None:
+            self._add_drive(group, name, motion)
+            return
+        if motion.displacement is not None:
+            shift = self.vector(motion.displacement) / self.scales.length
+            group.shift[number * axes : (number + 1) * axes] += shift
+        if motion.rotation is not None:
+            turn = self.rotations.node_turn[motion.node]
+            assert turn is not None
+            group.turn[turn] += self._rotation_vector(motion)
+
+    def _add_drive(self, group: Loading, name: str, motion: Motion) -> None:
+        """Angle or travel of a driven joint."""
+        for load, connections in zip(group.loads, self.connections, strict=True):
+            if name not in connections.names:
+                continue
+            number = connections.names.index(name)
+            if isinstance(connections.kind, DrivenTurn):
+                load[number] += motion.rotation
+            elif isinstance(connections.kind, DrivenSlide):
+                along = np.asarray(self.scene.nodes[motion.node].direction, dtype=float)
+                load[number] += np.dot(motion.displacement or (), along / np.linalg.norm(along)) / self.scales.length
+
+    def _rotation_vector(self, motion: Motion) -> Array:
+        if isinstance(motion.rotation, tuple):
+            return np.asarray(motion.rotation, dtype=float)
+        assert motion.rotation is not None
+        axis = np.asarray(self.scene.nodes[motion.node].turn_axis, dtype=float)
+        return np.asarray(motion.rotation * axis / np.linalg.norm(axis))
+
+
+def unit_loadings(
+    scene: Scene,
+    mesh: Mesh,
+    element: Element,
+    scales: Scales,
+    segments: Segments,
+    rotations: Rotations,
+    beams: Beams,
+    connections: tuple[Group, ...],
+    followers: Followers,
+) -> dict[str | None, Loading]:
+    """Loadings of factor 1, by the history that multiplies them; None is the load factor itself.
+
+    Raises
+    ------
+    SceneError
+        A moment on a node that nothing turns with.
+    """
+    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams, connections, followers)
+    groups: dict[str | None, Loading] = {None: writer.empty()}
+    for name, load in scene.loads.items():
+        writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)
+    if scene.gravity is not None and np.any(scene.gravity):
+        for member in scene.members:
+            writer.add_weight(groups[None], member)
+        for node in scene.nodes:
+            writer.add_mass(groups[None], node)
+    for name, motion in scene.motions.items():
+        writer.add_motion(groups.setdefault(motion.history, writer.empty()), name, motion)
+    return groups

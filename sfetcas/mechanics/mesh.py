@@ -1,0 +1,229 @@
+"""Meshes: where the members of a scene are cut into elements, as fractions of their lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..description.sections import breaks as kinks
+from ..mathematics.arrays import Array
+from .carried import carried
+
+__all__ = ["SAME", "Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
+
+SAME = 1e-12
+"""Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Where a member touches an obstacle: at one place, or from one place to another.
+
+    Attributes
+    ----------
+    contact, member : str
+    at, to : float, float or None
+        Fractions of the length; an element ends at each that is not an end of the member.
+    number : int
+        Tells apart touches of the same two.
+    offset : float
+        How far the obstacle has stepped back on the way to its place, m.
+    way : float
+        1 or -1: on which side of the member an edge is (1: the member's normal is the edge times the tangent), or
+        to which side a circle bends the member.
+    flat : bool
+        The section at a single place keeps lying on the obstacle: the end of a stretch without pressure, for the
+        test of stability.
+    """
+
+    contact: str
+    member: str
+    at: float
+    to: float | None = None
+    number: int = 0
+    offset: float = 0.0
+    way: float = 1.0
+    flat: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of its rows, and of its place where that is no end of the member."""
+        return f"{self.contact} on {self.member}" + (f" ({self.number + 1})" if self.number else "")
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """The fractions."""
+        return (self.at,) if self.to is None else (self.at, self.to)
+
+
+@dataclass(frozen=True)
+class Cushion:
+    """A place of a member that an obstacle pushes as a cushion would, on the way to a state in contact.
+
+    Attributes
+    ----------
+    contact, member : str
+    at : float
+        Fraction of the length; an element ends there.
+    stiffness : float
+        N/m.
+    thickness : float
+        m: within it the force begins.
+    edge : float
+        Radius of the thin rod that stands for an edge, m.
+    """
+
+    contact: str
+    member: str
+    at: float
+    stiffness: float
+    thickness: float
+    edge: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Element type and cuts.
+
+    Attributes
+    ----------
+    order : int
+        Polynomial order p of all elements.
+    cuts : mapping of str to ndarray (n + 1,)
+        Fractions of the member's length from 0 to 1, rising, n elements.
+    gauss : bool
+        Gauss integration instead of integration at the nodes.
+    rigid : frozenset of str
+        Members whose elements are never halved.
+    touches : tuple of Touch
+        Where members touch obstacles; elements end there.
+    stops : tuple of (str, str)
+        Springs that stand at a stop: name, and ``low`` or ``high``.
+    cushions : tuple of Cushion
+        Places at which obstacles push softly, in the order of their members and fractions.
+    """
+
+    order: int
+    cuts: Mapping[str, Array]
+    gauss: bool = False
+    rigid: frozenset[str] = frozenset()
+    touches: tuple[Touch, ...] = ()
+    stops: tuple[tuple[str, str], ...] = ()
+    cushions: tuple[Cushion, ...] = ()
+
+    @property
+    def elements(self) -> int:
+        """Number of elements of all members."""
+        return sum(len(cuts) - 1 for cuts in self.cuts.values())
+
+    def refined(self, marked: Mapping[str, Array] | None = None) -> Mesh:
+        """The mesh with the marked elements halved (boolean array a member); without marks, all of them."""
+        cuts = {}
+        for name, old in self.cuts.items():
+            chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
+            chosen = chosen & (name not in self.rigid)
+            middles = 0.5 * (old[1:] + old[:-1])
+            cuts[name] = np.sort(np.concatenate([old, middles[chosen]]))
+        return replace(self, cuts=cuts)
+
+    def same(self, other: Mesh) -> bool:
+        """Whether another mesh of the same scene has the same elements and all else as well."""
+        alike = replace(self, cuts={}) == replace(other, cuts={})
+        return alike and all(np.array_equal(cuts, other.cuts[name]) for name, cuts in self.cuts.items())
+
+    def cut_at(self, member: str, place: float) -> int:
+        """Number of the cut of a member that is nearest to a fraction of its length."""
+        return int(np.argmin(np.abs(self.cuts[member] - place)))
+
+
+def breaks_of(scene: Scene, member: str) -> Array:
+    """Fractions at which the solution along a member has a kink and an element has to end."""
+    section = scene.members[member].section
+    places = [0.0, 1.0, *scene.center_lines[member].breaks]
+    if section is not None and scene.members[member].type == "flexible":
+        places += scene.sections[section].breaks
+    for load in scene.loads.values():
+        if load.member == member:
+            places += [] if load.at is None else [load.at]
+            places += [] if load.profile is None else list(kinks(load.profile))
+    places = sorted(places)
+    keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > SAME]
+    return np.array([*keep, 1.0])
+
+
+def _divided(breaks: Array, elements: int) -> Array:
+    """About ``elements`` equal elements with a cut at each break, at least one a stretch."""
+    lengths = np.diff(breaks)
+    counts = np.maximum(1, np.floor(lengths * elements + 0.5).astype(int))
+    while counts.sum() > elements and (counts > 1).any():
+        counts[np.argmin(np.where(counts > 1, lengths / counts, np.inf))] -= 1
+    while counts.sum() < elements:
+        counts[np.argmax(lengths / counts)] += 1
+    stretches = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks, breaks[1:], counts, strict=False)]
+    return np.concatenate([*stretches, [1.0]])
+
+
+def uniform_mesh(scene: Scene, order: int, elements: int | Mapping[str, int], gauss: bool = False) -> Mesh:
+    """Equal elements on each member; one more wherever a load or a kink of the section needs a cut."""
+    counts = elements if isinstance(elements, Mapping) else dict.fromkeys(scene.members, elements)
+    cuts = {name: _divided(breaks_of(scene, name), counts.get(name, 1)) for name in cut(scene)}
+    cuts |= {name: rigid_cuts(scene, name) for name in rigid(scene)}
+    return Mesh(order, cuts, gauss, rigid(scene))
+
+
+def cut(scene: Scene) -> list[str]:
+    """Names of the members that are made of elements: all but small ones."""
+    return [name for name, member in scene.members.items() if member.type != "small"]
+
+
+def rigid(scene: Scene) -> frozenset[str]:
+    """Names of the rigid members."""
+    return frozenset(name for name, member in scene.members.items() if member.type == "rigid")
+
+
+def rigid_cuts(scene: Scene, member: str) -> Array:
+    """Elements of a rigid member: they share one rotation, and integrate what acts along its shape."""
+    turning = scene.center_lines[member].turning
+    return _divided(breaks_of(scene, member), max(1, int(np.ceil(4.0 * turning))))
+
+
+def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
+    """A coarse mesh to begin with.
+
+    No element is expected to turn by more than ``turning`` rad by the unloaded shape, prescribed rotations and
+    end moments.  Under forces far above EI/L^2 a member is straight but for layers as thin as
+    ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
+    """
+    rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
+    reaching, follows = carried(scene), any(load.follows for load in scene.loads.values())
+    cuts = {}
+    for name in cut(scene):
+        line, section = scene.center_lines[name], scene.sections.get(str(scene.members[name].section))
+        if scene.members[name].type == "rigid" or section is None:
+            cuts[name] = rigid_cuts(scene, name)
+            continue
+        most = reaching[name].force
+        softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
+        expected = line.turning + max(rotations, default=0.0) + reaching[name].moment * line.length / softest
+        # What turns with its load may bend to and fro all along; waves are as long as the layers are thick.
+        waves = line.length * np.sqrt(most / softest) if follows else 0.0
+        count = int(min(max(2.0, np.ceil((expected + waves) / turning)), 2000.0))
+        layer = np.sqrt(softest / most) / line.length if most > 0.0 else np.inf
+        cuts[name] = _graded(_divided(breaks_of(scene, name), count), breaks_of(scene, name), layer)
+    return Mesh(order, cuts, rigid=rigid(scene))
+
+
+def _graded(cuts: Array, breaks: Array, layer: float) -> Array:
+    """The cuts, and further ones at twice, four times, ... the layer from each break."""
+    places = [cuts]
+    for left, right in zip(breaks, breaks[1:], strict=False):
+        steps = int(np.floor(np.log2(max(0.25 * (right - left) / layer, 0.5)))) + 1
+        distances = np.maximum(layer, 1e-13) * 2.0 ** np.arange(min(steps, 40))
+        places += [left + distances, right - distances]
+    merged = np.unique(np.concatenate(places))
+    # Cuts that nearly meet others would make slivers; breaks stay.
+    sliver = np.diff(merged, prepend=-1.0) < (0.3 * layer if np.isfinite(layer) else SAME)
+    return merged[~sliver | np.isin(merged, breaks)]

@@ -1,0 +1,289 @@
+"""The model of a scene on a mesh: element data, rotations, positions and loads as arrays.
+
+Everything here is dimensionless: lengths by the longest member, energies by the largest bending stiffness over
+that length, so that micrometres and kilometres are the same problem.  All displacements are from the undeformed
+scene.  A model holds only what its scene requires; :attr:`Model.blocks` says what, how much and why.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..description.records import counted
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array, Index
+from .beams import Beams, Scales, beams_of, scales_of
+from .connections import Group, connect
+from .elements import Element, element_by_name
+from .loading import Followers, Loading, find_followers, unit_loadings
+from .mesh import Mesh
+from .positions import Positions, entries, place_nodes
+from .pressure import is_pressure
+from .rotations import Rotations, Turn, number_rotations
+from .segments import Segments, cut_members
+from .winding import Winding, winding_of
+
+__all__ = ["Block", "Model", "assemble"]
+
+
+@dataclass(frozen=True)
+class Block:
+    """One kind of unknowns or rows of a model: its number and why it is there."""
+
+    name: str
+    size: int
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A scene on a mesh, ready to be solved any number of times; made by :func:`assemble`.
+
+    Attributes
+    ----------
+    scene, mesh, element, scales, assembly
+        What it was made of.
+    beams : Beams
+        Stiffness, tangents and weights of the elements.
+    segments : Segments
+        Members cut between places.
+    rotations : Rotations
+        Numbers and freedoms of the rotations.
+    positions : Positions
+        Displacements of nodes, closing equations.
+    connections : tuple of Group
+        Joints, springs and small members.
+    followers : Followers
+        Where forces act that turn with what they act on.
+    groups : mapping
+        Loadings of factor 1, by history.
+    """
+
+    scene: Scene
+    mesh: Mesh
+    element: Element
+    scales: Scales
+    assembly: str
+    beams: Beams
+    segments: Segments
+    rotations: Rotations
+    positions: Positions
+    connections: tuple[Group, ...]
+    followers: Followers
+    groups: Mapping[str | None, Loading]
+
+    @property
+    def space(self) -> bool:
+        """Quaternions and three axes, or angles and two."""
+        return self.element.space
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of the minimisation: components of rotations, displacements kept; without multipliers."""
+        return int(self.widths.sum()) + len(self.positions.unknowns)
+
+    @property
+    def dimension(self) -> str:
+        """plane or space."""
+        return self.scene.resolved_dimension
+
+    @property
+    def reason(self) -> str:
+        """Why the model is in the plane or in space."""
+        return self.scene.dimension_reason
+
+    @functools.cached_property
+    def winding(self) -> Winding:
+        """The angles that count turns in space."""
+        return winding_of(self.connections, self.rotations, self.space)
+
+    @functools.cached_property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the closing rows, then of the rows of joints."""
+        return (*self.positions.rows, *(row for group in self.connections for row in group.rows))
+
+    @functools.cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """What the model consists of, and why."""
+        return _blocks(self)
+
+    @functools.cached_property
+    def widths(self) -> Index:
+        """Unknown numbers of each rotation in the minimisation: 4, 2 or 0 in space; 1 or 0 in the plane."""
+        table = np.array([0, 2, 4]) if self.space else np.array([0, 1, 1])
+        return table[self.rotations.kind]
+
+    @functools.cached_property
+    def has_potential(self) -> bool:
+        """Whether all loads have a potential: none follows, and in space no moment turns what is free to turn."""
+        free = self.rotations.kind == Turn.FREE
+        turning = self.space and any(group.moment[free].any() for group in self.groups.values())
+        return not turning and not any(group.follows for group in self.groups.values())
+
+    @functools.cached_property
+    def conservative(self) -> bool:
+        """Whether there is an energy: the loads have a potential, or what follows is pressure, which has one too."""
+        return self.has_potential or is_pressure(self.scene)
+
+    @functools.cached_property
+    def minimisable(self) -> bool:
+        """Whether the energy of the nonlinear program is complete: moments in space are not in it."""
+        turning = self.space and any(group.moment.any() for group in self.groups.values())
+        return self.has_potential and not turning
+
+    def check_complete(self) -> None:
+        """Refuse to be solved by itself where the scene says more than the model holds.
+
+        Raises
+        ------
+        SceneError
+            Contacts, or stops of springs: which of them act is found by :func:`sfetcas.solve` only.
+        """
+        scene = self.scene
+        if scene.contacts and not self.mesh.touches:
+            message = "a model by itself knows no contact, accepted: the scene without contacts, or solve(scene)"
+            raise SceneError(message, ("contacts",))
+        stopped = [name for name, spring in scene.springs.items() if spring.stop is not None]
+        if stopped and not self.mesh.stops:
+            message = "a model by itself knows no stops, accepted: the spring without stop, or solve(scene)"
+            raise SceneError(message, ("springs", stopped[0], "stop"))
+
+    @functools.cached_property
+    def members(self) -> tuple[str, ...]:
+        """Names of the members that are made of elements, in the order of these."""
+        return tuple(self.beams.first)
+
+    @functools.cached_property
+    def nodes(self) -> tuple[str, ...]:
+        """Names of the nodes: the first places, in the order of the displacements."""
+        return tuple(self.scene.nodes)
+
+    def elements_of(self, member: str) -> slice:
+        """The elements of a member, first to last."""
+        start = self.beams.first[member]
+        return slice(start, start + len(self.mesh.cuts[member]) - 1)
+
+    def chain(self, member: str) -> Index:
+        """Numbers of the rotations along a member, both ends included."""
+        return self.rotations.chain(self.elements_of(member))
+
+    def along(self, member: str) -> Array:
+        """Fractions of the length at which the rotations of :meth:`chain` stand; of a small member its ends."""
+        if member not in self.mesh.cuts:
+            return np.array([0.0, 1.0])
+        cuts = self.mesh.cuts[member]
+        inner = cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.nodes[:-1]
+        return np.append(inner.ravel(), 1.0)
+
+    def factors(self, factor: float) -> dict[str | None, float]:
+        """Multiplier of each group of loads: the factor, or that of the history at the factor."""
+        histories = self.scene.histories
+        return {name: factor if name is None else histories[name].factor(factor) for name in self.groups}
+
+    def loading(self, factor: float, share: float = 1.0) -> Loading:
+        """Loads and motions at a load factor, all of them times ``share``."""
+        parts = [self.groups[name].scaled(share * value) for name, value in self.factors(factor).items()]
+        total = parts[0]
+        for part in parts[1:]:
+            total = total.plus(part)
+        return total
+
+    def motion(self, name: str) -> Loading:
+        """What one motion prescribes, without its factor."""
+        motions = {name: self.scene.motions[name]}
+        scene = self.scene.model_copy(update={"motions": motions, "loads": {}, "gravity": None})
+        parts = self.mesh, self.element, self.scales, self.segments, self.rotations, self.beams
+        return unit_loadings(scene, *parts, self.connections, self.followers)[motions[name].history]
+
+    def held(self, loading: Loading) -> Array:
+        """Rotations with the held ones at their prescribed values and all others at rest, (rotations, comps)."""
+        if not self.space:
+            return loading.turn[:, 2:3].copy()
+        return quaternion.from_rotation_vector(loading.turn)
+
+
+def assemble(
+    scene: Scene,
+    mesh: Mesh,
+    *,
+    assembly: Literal["auto", "closing", "nodal"] = "auto",
+) -> Model:
+    """The model of a scene on a mesh.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : Mesh
+        Element order, integration and cuts of each member.
+    assembly : str
+        ``closing`` (unknowns are rotations only), ``nodal`` (and displacements of macro-nodes), or ``auto``: the
+        one whose stationarity equations have fewer entries.
+
+    Raises
+    ------
+    SceneError
+        A moment on a node that nothing turns with.
+    """
+    element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
+    scales, rotations = scales_of(scene), number_rotations(scene, mesh, element)
+    beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
+    names = ("closing", "nodal") if assembly == "auto" else (assembly,)
+    bodies = {name: ends[0] for name, ends in rotations.ends.items() if scene.members[name].type == "rigid"}
+    both = {name: place_nodes(scene, segments, element.axes, name == "closing", bodies) for name in names}
+    if assembly == "auto":
+        closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
+        assembly = "closing" if closing <= nodal else "nodal"
+    connections = connect(scene, mesh, segments, rotations, element, scales)
+    followers = find_followers(scene, mesh, element, segments, rotations)
+    return Model(
+        scene=scene,
+        mesh=mesh,
+        element=element,
+        scales=scales,
+        assembly=assembly,
+        beams=beams,
+        segments=segments,
+        rotations=rotations,
+        positions=both[assembly],
+        connections=connections,
+        followers=followers,
+        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections, followers),
+    )
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+
+
+def _blocks(model: Model) -> tuple[Block, ...]:
+    """What the model consists of, and why."""
+    kind = model.rotations.kind
+    free, about = int((kind == Turn.FREE).sum()), int((kind == Turn.AXIS).sum())
+    blocks = []
+    if model.space:
+        blocks.append(Block("quaternions", 4 * free, f"4 for each of {counted(free, 'free rotation')}: {model.reason}"))
+        if about:
+            blocks.append(Block("hinge rotations", 2 * about, "2 for each rotation held but for its hinge axis"))
+        blocks.append(Block("norms", free + about, "a quaternion of a free rotation is unit; held ones need no row"))
+    else:
+        blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
+    if model.positions.unknowns:
+        why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
+        if model.assembly != "nodal" and model.segments.kept:
+            why = "springs, small members, slides or followers act upon places"
+        blocks.append(Block("displacements", len(model.positions.unknowns), f"{why}: positions are unknowns"))
+    if model.positions.rows:
+        why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"
+        blocks.append(Block("closings", len(model.positions.rows), f"{why}; the multipliers are forces"))
+    for group in model.connections:
+        if group.rows:
+            name = type(group.kind).__name__.lower()
+            blocks.append(Block(f"{name} rows", len(group.rows), f"{_listed(group.names)}"))
+    return tuple(blocks)

@@ -1,0 +1,263 @@
+"""Displacements of places and closing equations as linear maps of what the segments of members reach.
+
+Two assemblies.  *closing*: the displacement of a place is the sum of the reaches of the segments on a way from
+the ground, and what is left are closing equations, one for each loop and each further held direction.  *nodal*:
+displacements of free places are unknowns and each segment has its closing equation.  Both are the same linear
+maps with other entries: with ``Delta`` the reaches of the segments less those of the undeformed scene, ``y`` the
+displacements kept as unknowns and ``b`` the prescribed ones,
+
+    u = E Delta + Y y + B b,      0 = Z Delta + W y + B_Z b.
+
+A place that is *kept* has its displacement among ``y``, component by component, in either assembly.
+
+Source: Barraco and Munteanu, Part 1, section 1 (the two ways of assembling).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..description.supports import drives
+from ..mathematics.arrays import Array, Index
+from ..mathematics.linear import SparseMap
+from .mesh import Mesh
+from .segments import Segments
+
+__all__ = ["Positions", "entries", "normals", "place_nodes"]
+
+
+@dataclass(frozen=True)
+class Positions:
+    """The linear maps of the module's docstring.
+
+    Attributes
+    ----------
+    E, Y, B : SparseMap (places * axes, segments * axes | unknowns | places * axes)
+        Displacements of the places.
+    Z, W, BZ : SparseMap (rows, segments * axes | unknowns | places * axes)
+        Closing equations.
+    rows, unknowns : tuple of str
+        Names.
+    kept : ndarray (places, axes)
+        Unknown that a component of a kept place is, -1 where it is prescribed or the place is not kept.
+    """
+
+    E: SparseMap
+    Y: SparseMap
+    B: SparseMap
+    Z: SparseMap
+    W: SparseMap
+    BZ: SparseMap
+    rows: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    kept: Index
+
+
+def normals(direction: Array, axes: int) -> Array:
+    """Unit vectors that complete a direction to an orthonormal basis, (axes - 1, axes)."""
+    d = direction[:axes] / np.linalg.norm(direction[:axes])
+    basis = np.linalg.svd(d[None, :])[2][1:]
+    return np.asarray(basis)
+
+
+def _slides(scene: Scene, name: str) -> bool:
+    """A slider whose travel is not prescribed."""
+    node = scene.nodes[name]
+    moved = [motion.displacement for motion in scene.motions.values() if motion.node == name]
+    return node.slides and not any(drives(node, displacement) for displacement in moved)
+
+
+Source = tuple[str, int]
+"""What a displacement depends on: the reach (E), unknowns (Y) or prescribed displacement (B) of a number."""
+
+
+@dataclass
+class _Place:
+    """A displacement as a sum of matrices times sources: (axes, axes), or (axes, 1) for a single unknown."""
+
+    terms: dict[Source, Array] = field(default_factory=dict)
+
+    def plus(self, other: _Place, sign: float = 1.0) -> _Place:
+        # What is not added to is shared, not copied: far places of a chain have many terms.
+        terms = dict(self.terms)
+        for source, matrix in other.terms.items():
+            signed = matrix if sign == 1.0 else sign * matrix
+            total = terms[source] + signed if source in terms else signed
+            terms[source] = total
+            if not total.any():
+                del terms[source]
+        return _Place(terms)
+
+    def times(self, matrix: Array) -> _Place:
+        return _Place({source: matrix @ term for source, term in self.terms.items()})
+
+
+class _Placing:
+    """The places while they are found one after the other."""
+
+    def __init__(self, scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> None:
+        self.scene, self.segments, self.axes, self.bodies = scene, segments, axes, bodies
+        self.eye = np.eye(axes)
+        self.labels: list[str] = []
+        self.rows: list[tuple[str, _Place]] = []
+        self.places: dict[str, _Place] = {}
+        self.kept = np.full((len(segments.places), axes), -1, dtype=np.intp)
+        self.number = {name: i for i, name in enumerate(segments.places)}
+        self.free = {n for n in segments.places if n not in scene.nodes or scene.nodes[n].support == "free"}
+        self.sliding = {n for n in scene.nodes if _slides(scene, n)}
+        self._touching: dict[str, list[int]] = {n: [] for n in segments.places}
+        for i, part in enumerate(segments.parts):
+            self._touching[part.start].append(i)
+            self._touching[part.end].append(i)
+        self._used: set[int] = set()
+        self._find(closing)
+
+    def _find(self, closing: bool) -> None:
+        loose = [n for n in self.segments.places if n in self.free or n in self.sliding]
+        for name in self.segments.places:
+            if name not in self.free and name not in self.sliding:
+                self.places[name] = self._prescribed(name)
+        for name in loose:
+            if name in self.segments.kept:
+                self._keep(name)
+            elif not closing:
+                self.places[name] = self._unknown(name)
+        self._spread(list(self.places))
+        for root in (*(n for n in loose if n in self.sliding), *(n for n in loose if n in self.free)):
+            if root not in self.places:
+                self.places[root] = self._unknown(root)
+                self._spread([root])
+        within = self._loops_within_bodies()
+        for i, part in enumerate(self.segments.parts):
+            if i not in self._used | within:
+                gap = self.places[part.start].plus(self._reach(i)).plus(self.places[part.end], -1.0)
+                self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye)
+
+    def _loops_within_bodies(self) -> set[int]:
+        """Segments that close a loop of rigid members that share one rotation: it stays closed by itself."""
+        parent: dict[Source, Source] = {}
+
+        def root(place: Source) -> Source:
+            while place in parent:
+                place = parent[place]
+            return place
+
+        found = set()
+        for i in sorted(range(len(self.segments.parts)), key=lambda i: i not in self._used):
+            part = self.segments.parts[i]
+            if part.member not in self.bodies:
+                continue
+            start, end = (root((place, self.bodies[part.member])) for place in (part.start, part.end))
+            if start != end:
+                parent[start] = end
+            elif i not in self._used:
+                found.add(i)
+        return found
+
+    def _guide(self, name: str) -> Array:
+        d = np.asarray(self.scene.nodes[name].direction)[: self.axes]
+        return np.asarray(d / np.linalg.norm(d))
+
+    def _prescribed(self, name: str) -> _Place:
+        return _Place({("B", self.number[name]): self.eye})
+
+    def _reach(self, number: int) -> _Place:
+        return _Place({("E", number): self.eye})
+
+    def _unknown(self, name: str) -> _Place:
+        """A free place, or a slider by its travel."""
+        first = len(self.labels)
+        if name in self.sliding:
+            self.labels.append(f"travel of {name}")
+            return self._prescribed(name).plus(_Place({("Y", first): self._guide(name)[:, None]}))
+        self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
+        return _Place({("Y", first): self.eye})
+
+    def _keep(self, name: str) -> None:
+        """A place by its components; on a guide with the equations that keep it there."""
+        first = len(self.labels)
+        self.kept[self.number[name]] = first + np.arange(self.axes)
+        self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
+        self.places[name] = _Place({("Y", first): self.eye})
+        if name in self.sliding:
+            self._across(name, self.places[name])
+
+    def _across(self, name: str, found: _Place) -> _Place:
+        """Rows that keep a place on its guide; its displacement along it."""
+        gap = found.plus(self._prescribed(name), -1.0)
+        across = normals(self._guide(name), self.axes)
+        self._close(gap, [f"{name} across its guide"] * len(across), across)
+        along = self._guide(name)[:, None] @ self._guide(name)[None, :]
+        return self._prescribed(name).plus(gap.times(along))
+
+    def _close(self, gap: _Place, names: list[str], directions: Array) -> None:
+        for name, direction in zip(names, directions, strict=True):
+            self.rows.append((name, gap.times(direction[None, :])))
+
+    def _spread(self, front: list[str]) -> None:
+        """Find places segment by segment, breadth first, so that ways are short."""
+        for here in front:
+            for i in self._touching[here]:
+                part = self.segments.parts[i]
+                there = part.end if here == part.start else part.start
+                if i in self._used or there in self.places:
+                    continue
+                self._used.add(i)
+                found = self.places[here].plus(self._reach(i), 1.0 if here == part.start else -1.0)
+                self.places[there] = self._across(there, found) if there in self.sliding else found
+                front.append(there)
+
+    def matrix(self, parts: list[_Place], height: int, kind: str, columns: int) -> SparseMap:
+        """The terms of one kind of all parts below each other, each of some height."""
+        shared: dict[int, tuple[Array, list[int], list[int]]] = {}
+        for i, part in enumerate(parts):
+            for (source, number), matrix in part.terms.items():
+                if source == kind:
+                    _, rows, columns_of = shared.setdefault(id(matrix), (matrix, [], []))
+                    rows.append(i * height)
+                    columns_of.append(number if kind == "Y" else number * self.axes)
+        row, column, value = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros(0)]
+        for matrix, rows, columns_of in shared.values():
+            r, c = np.nonzero(matrix)
+            row.append((np.array(rows)[:, None] + r).ravel())
+            column.append((np.array(columns_of)[:, None] + c).ravel())
+            value.append(np.tile(matrix[r, c], len(rows)))
+        shape = (len(parts) * height, columns)
+        return SparseMap(np.concatenate(row), np.concatenate(column), np.concatenate(value), shape)
+
+
+def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> Positions:
+    """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly.
+
+    ``bodies``: the rotation of each rigid member.  A loop within one rigid body has no equation: of the forces
+    around it there are many, and the last member carries none.
+    """
+    placing = _Placing(scene, segments, axes, closing, bodies)
+    sizes = {"E": len(segments.parts) * axes, "Y": len(placing.labels), "B": len(segments.places) * axes}
+    in_order = [placing.places[n] for n in segments.places]
+    closings = [place for _, place in placing.rows]
+    up = {kind: placing.matrix(in_order, axes, kind, size) for kind, size in sizes.items()}
+    low = {kind: placing.matrix(closings, 1, kind, size) for kind, size in sizes.items()}
+    return Positions(
+        E=up["E"],
+        Y=up["Y"],
+        B=up["B"],
+        Z=low["E"],
+        W=low["Y"],
+        BZ=low["B"],
+        rows=tuple(label for label, _ in placing.rows),
+        unknowns=tuple(placing.labels),
+        kept=placing.kept,
+    )
+
+
+def entries(positions: Positions, segments: Segments, mesh: Mesh) -> float:
+    """Entries of the closing rows and unknowns: what the stationarity equations grow by."""
+    counts = np.array([part.elements.stop - part.elements.start for part in segments.parts])
+    axes = positions.Z.shape[1] // max(len(counts), 1)
+    touched = np.unique(positions.Z.row * len(counts) + positions.Z.column // max(axes, 1))
+    return float(counts[touched % len(counts)].sum() * mesh.order + 4 * positions.Y.shape[1]) if len(counts) else 0.0

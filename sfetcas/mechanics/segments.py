@@ -1,0 +1,138 @@
+"""Members cut into segments between places, and which displacements have to be unknowns of their own.
+
+A *place* is a node of the scene, a cut of a member whose displacement is asked for by itself (a load there turns
+with the section), or the end of a member that slides along its node.  A *segment* is a run of elements of one
+member between two places; most members are one segment.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..description.structure import SLIDING
+from ..mathematics.arrays import Array, Index
+from .mesh import Mesh
+from .rotations import end_joints
+
+__all__ = ["Segment", "Segments", "cushioned", "cut_members"]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A run of elements of a member, numbered in the model, between two places."""
+
+    member: str
+    elements: slice
+    start: str
+    end: str
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """All segments and places of a model.
+
+    Attributes
+    ----------
+    places : tuple of str
+        The nodes of the scene, then cuts and sliding ends.
+    kept : frozenset of str
+        Places whose displacement is prescribed or an unknown in either assembly.
+    parts : tuple of Segment
+        In the order of their elements.
+    owner : ndarray (elements,)
+        Number of the segment of an element.
+    ends : mapping of (str, int) to str
+        Place of the first (0) and the second end (1) of a member.
+    """
+
+    places: tuple[str, ...]
+    kept: frozenset[str]
+    parts: tuple[Segment, ...]
+    owner: Index
+    ends: Mapping[tuple[str, int], str]
+
+    @property
+    def first(self) -> Index:
+        """Number of the first element of each segment."""
+        return np.array([part.elements.start for part in self.parts], dtype=np.intp)
+
+    def place(self, name: str) -> int:
+        """Number of a place."""
+        return self._number[name]
+
+    @functools.cached_property
+    def _number(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.places)}
+
+
+def _touched(mesh: Mesh, member: str) -> dict[int, str]:
+    """Cuts of a member where obstacles push it, with the names of these places; its ends among them."""
+    soft = {mesh.cut_at(member, c.at): cushioned(member, c.at) for c in mesh.cushions if c.member == member}
+    return soft | {mesh.cut_at(member, touch.at): touch.name for touch in mesh.touches if touch.member == member}
+
+
+def cushioned(member: str, at: float) -> str:
+    """Name of a place of a member, within it, where obstacles push softly."""
+    return f"{member} cushioned at {at:.17g}"
+
+
+def _kept_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
+    """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
+    inner = range(1, len(cuts) - 1)
+    following = [load for load in scene.loads.values() if load.member == member and load.follows]
+    if any(load.type == "distributed" for load in following):
+        return list(inner)
+    wanted = {int(np.argmin(np.abs(cuts - (load.at or 0.0)))) for load in following}
+    return [cut for cut in inner if cut in wanted]
+
+
+def _sprung(scene: Scene) -> Iterator[str]:
+    """Nodes whose displacement springs and small members act upon, and first nodes of what follows its section."""
+    for spring in scene.springs.values():
+        if spring.type == "translational":
+            yield from (node for node in (spring.node, spring.to) if node is not None)
+    for member in scene.members.values():
+        if member.type == "small":
+            yield from member.nodes
+    for load in scene.loads.values():
+        if load.follows and load.member is not None:
+            yield from scene.members[load.member].nodes
+
+
+def cut_members(scene: Scene, mesh: Mesh) -> Segments:
+    """The segments of a scene on a mesh."""
+    places, ends = list(scene.nodes), {}
+    kept: set[str] = set()
+    parts: list[Segment] = []
+    begin = 0
+    for name, member in scene.members.items():
+        for i, (node, joint) in enumerate(end_joints(scene, member)):
+            ends[name, i] = node
+            if joint in SLIDING:
+                ends[name, i] = f"{node} at {name}"
+                places.append(ends[name, i])
+                kept |= {node, ends[name, i]}
+        if name not in mesh.cuts:
+            continue
+        cuts = mesh.cuts[name]
+        touched, last = _touched(mesh, name), len(cuts) - 1
+        kept |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
+        stops = [0, *sorted({*_kept_cuts(scene, name, cuts), *touched} - {0, last}), last]
+        here = ends[name, 0]
+        for a, b in zip(stops, stops[1:], strict=False):
+            there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, f"{name} at {cuts[b]:.12g}")
+            if b < len(cuts) - 1:
+                places.append(there)
+                kept.add(there)
+            parts.append(Segment(name, slice(begin + a, begin + b), here, there))
+            here = there
+        begin += len(cuts) - 1
+    kept |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
+    sizes = [part.elements.stop - part.elements.start for part in parts]
+    owner = np.repeat(np.arange(len(parts)), sizes)
+    return Segments(tuple(places), frozenset(kept), tuple(parts), owner, ends)

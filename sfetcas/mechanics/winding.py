@@ -1,0 +1,205 @@
+"""Angles about axes in space that count turns.
+
+A quaternion knows the angle of a hinge up to two turns, the direction of an axis up to one.  What is missing is
+carried beside the rotations of a state: for each angle a value near which it is counted, brought forward with every
+step.  Energies of springs and the work of moments about held hinges are smooth then at any number of turns.  In the
+plane rotations are angles, which count turns by themselves.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array, Index
+from .connections import GROUND, Group
+from .joints import DrivenTurn, Turning
+from .loading import Loading
+from .rotations import PARALLEL, Rotations, Turn
+
+__all__ = ["Winding", "winding_of"]
+
+SAME = 1e-6
+"""Angle, rad, by which a counted angle may miss the one that a motion prescribes: they differ by turns or not."""
+
+
+SWUNG = 1e-3
+"""Cosine of half the swing of an axis below which the angle about it is not defined."""
+
+
+@dataclass(frozen=True, eq=False)
+class Winding:
+    """The angles of a model that count turns: of springs and stops by groups, then of rotations about held axes.
+
+    Attributes
+    ----------
+    sides : ndarray (n, 2)
+        Numbers of the rotations, -1 the ground; the angle is that of the second against the first.
+    axis : ndarray (n, 3)
+        Unit axis, carried by the first side.
+    across : ndarray (n, 3)
+        Direction carried by the second side whose angle about the axis it is, see
+        :class:`~sfetcas.mechanics.joints.Turning`; zero for the angle of the rotation itself.
+    parts : tuple of slice or None
+        Of each group of connections its angles.
+    about : mapping of int to int
+        The angle of each rotation about a held axis.
+    driven : tuple of (int, int, int, float)
+        Angles that a driven joint prescribes: which, by which group and connection, and the sign.
+    names : tuple of str
+        What has each angle, for sentences.
+    """
+
+    sides: Index
+    axis: Array
+    across: Array
+    parts: tuple[slice | None, ...]
+    about: dict[int, int]
+    driven: tuple[tuple[int, int, int, float], ...]
+    names: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of angles."""
+        return len(self.sides)
+
+    def angles(self, q: Array, near: Array) -> Array:
+        """The angles (n,), rad, at rotations (rotations, 4): of all that look the same those nearest to ``near``."""
+        if not self.count:
+            return near
+        sine, cosine, share = self._parts(q)
+        raw = share * np.arctan2(sine, cosine)
+        period = 2.0 * np.pi * share
+        return np.asarray(raw + period * np.round((near - raw) / period))
+
+    def _parts(self, q: Array) -> tuple[Array, Array, Array]:
+        """Sine and cosine of the angles over the share, and the share, as :class:`~sfetcas.mechanics.joints.Turning`."""
+        relative = q[self.sides[:, 1]]
+        if not self._on_ground:
+            q = np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
+            relative = quaternion.multiply(quaternion.conjugate(q[self.sides[:, 0]]), q[self.sides[:, 1]])
+        sine, cosine = _dot(self.axis, relative[:, 1:]), relative[:, 0]
+        if self._crossed.any():
+            seen = quaternion.rotate(relative, self.across)
+            sine = np.where(self._crossed, _dot(np.cross(self.axis, self.across), seen), sine)
+            cosine = np.where(self._crossed, _dot(self.across, seen), cosine)
+        return sine, cosine, self._share
+
+    # Of a few angles in most scenes, and asked for at every step: what never changes is found once.
+
+    @functools.cached_property
+    def _on_ground(self) -> bool:
+        """Whether the first sides are all the ground."""
+        return bool((self.sides[:, 0] == GROUND).all() and (self.sides[:, 1] != GROUND).all())
+
+    @functools.cached_property
+    def _crossed(self) -> Array:
+        return np.asarray(self.across.any(axis=1))
+
+    @functools.cached_property
+    def _share(self) -> Array:
+        return np.where(self._crossed, 1.0, 2.0)
+
+    def moved(self, q: Array, near: Array, turn: Array, there: Array) -> Array:
+        """The angles after rotations ``q`` have turned by vectors (rotations, 3) about the fixed axes to ``there``."""
+        if not self.count:
+            return near
+        if self._on_ground:
+            gained = _dot(self.axis, turn[self.sides[:, 1]])
+        else:
+            turn, still = np.vstack([turn, np.zeros(3)]), np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
+            axis = quaternion.rotate(still[self.sides[:, 0]], self.axis)
+            gained = _dot(axis, turn[self.sides[:, 1]] - turn[self.sides[:, 0]])
+        return self.angles(there, self.angles(q, near) + gained)
+
+    def prescribed(self, kind: Index, loading: Loading) -> Array:
+        """(n,): the angles that motions prescribe, between held rotations and at driven joints; else nan."""
+        near = np.full(self.count, np.nan)
+        if not self.count:
+            return near
+        held = np.append(kind == Turn.HELD, True)[self.sides].all(axis=1)
+        near[held] = self.of_vectors(loading.turn)[held]
+        for angle, group, number, sign in self.driven:
+            near[angle] = sign * float(loading.loads[group][number, 0])
+        return near
+
+    def of_vectors(self, turn: Array) -> Array:
+        """The angles where all rotations turn about one axis each by vectors (rotations, 3)."""
+        turn = np.vstack([turn, np.zeros(3)])
+        apart = turn[self.sides[:, 1]] - turn[self.sides[:, 0]]
+        return np.asarray(np.sign(_dot(self.axis, apart)) * np.linalg.norm(apart, axis=1))
+
+    def doubt(self, q: Array, near: Array, loading: Loading) -> str | None:
+        """Why an angle cannot be told at a state, None where all can.
+
+        A driven joint is off by whole turns from what drives it, or the axis of a spring between sides that turn
+        freely has swung half round: then any angle about it leads to the same rotation.
+        """
+        if not self.count:
+            return None
+        found, (sine, cosine, _) = self.angles(q, near), self._parts(q)
+        for angle in np.flatnonzero(np.hypot(sine, cosine) < SWUNG).tolist():
+            return f"springs.{self.names[angle]}: its axis has swung half round, where its angle is not defined"
+        for angle, group, number, sign in self.driven:
+            wanted = sign * float(loading.loads[group][number, 0])
+            if abs(found[angle] - wanted) > SAME:
+                stands = f"springs.{self.names[angle]} stands at {found[angle]:g} rad"
+                return f"{stands} where its joint is driven to {wanted:g}"
+        return None
+
+
+def winding_of(connections: tuple[Group, ...], rotations: Rotations, space: bool) -> Winding:
+    """The angles of a model that count turns; none in the plane."""
+    sides: list[tuple[int, int]] = []
+    axis: list[Array] = []
+    across: list[Array] = []
+    parts: list[slice | None] = []
+    names: list[str] = []
+    for group in connections:
+        if not space or not isinstance(group.kind, Turning):
+            parts.append(None)
+            continue
+        parts.append(slice(len(sides), len(sides) + len(group.names)))
+        names += group.names
+        for pair, data in zip(group.turns.tolist(), group.data, strict=True):
+            sides.append((pair[0], pair[1]))
+            axis.append(data[:3])
+            across.append(data[3:6] if group.kind.crossed else np.zeros(3))
+    held = np.flatnonzero(rotations.kind == Turn.AXIS).tolist() if space else []
+    about = {number: len(sides) + i for i, number in enumerate(held)}
+    sides += [(GROUND, number) for number in held]
+    axis += [rotations.axis[number] for number in held]
+    across += [np.zeros(3) for _ in held]
+    pairs = np.array(sides, dtype=np.intp).reshape(-1, 2)
+    lines = np.array(axis).reshape(-1, 3)
+    return Winding(
+        sides=pairs,
+        axis=lines,
+        across=np.array(across).reshape(-1, 3),
+        parts=tuple(parts),
+        about=about,
+        driven=tuple(_driven(connections, pairs[: len(names)], lines)) if space else (),
+        names=(*names, *(f"rotation {number}" for number in held)),
+    )
+
+
+def _driven(connections: tuple[Group, ...], sides: Index, axis: Array) -> list[tuple[int, int, int, float]]:
+    """Angles between the sides of a driven joint about its axis."""
+    found = []
+    for number, group in enumerate(connections):
+        if not isinstance(group.kind, DrivenTurn):
+            continue
+        for i, (pair, about) in enumerate(zip(group.turns, group.data, strict=True)):
+            for angle, (own, line) in enumerate(zip(sides, axis, strict=False)):
+                if set(own) != set(pair) or np.linalg.norm(np.cross(line, about)) > PARALLEL:
+                    continue
+                sign = float(np.sign(line @ about)) * (1.0 if own[0] == pair[0] else -1.0)
+                found.append((angle, number, i, sign))
+    return found
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray((a * b).sum(axis=-1))

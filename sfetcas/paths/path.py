@@ -1,0 +1,214 @@
+"""Paths: equilibria over the load factor, with limit points, bifurcations and the branches that cross there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..equilibria.solution import Equilibrium
+from ..errors import Status
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from ..mechanics.fields import Fields
+from ..mechanics.loading import Loading
+from ..mechanics.model import Model
+from ..solvers.prepared import Prepared
+
+__all__ = ["NO_POTENTIAL", "Branch", "Path", "PathPoint"]
+
+NO_POTENTIAL = (
+    "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
+    "tangent is singular (divergence), and flutter would only show in dynamics"
+)
+"""A note."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """One equilibrium of a path.
+
+    Attributes
+    ----------
+    factor : float
+        Factor of the loads and motions.
+    negative : int
+        Negative eigenvalues of the energy on the closings.
+    stable : bool, "neutral", or "not defined" for loads without potential
+        What they say.
+    arc : float
+        Arc length from the start, see :class:`Path`.
+    kind : str
+        ``""``, ``"limit point"`` or ``"bifurcation"``.
+    prepared : Prepared, optional
+        Its own discretisation, where that is not the one of the whole path: in contact elements end where something
+        touches.
+    """
+
+    factor: float
+    state: State = field(repr=False)
+    loading: Loading = field(repr=False)
+    negative: int
+    stable: bool | str
+    arc: float
+    kind: str = ""
+    prepared: Prepared | None = field(repr=False, default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """The stretch of a path between its first and its last point.
+
+    Attributes
+    ----------
+    points : tuple of PathPoint
+        Limit and bifurcation points among them.
+    steps, limit_points, bifurcations : tuple of Equilibrium
+        Crossings of the factors asked for, and the points of these kinds, in the order in which they are met.
+    end : str
+        Why it ends, a sentence.
+    bifurcation, side : int
+        From which bifurcation of the path it starts (0: it is the path itself), and to which side, 1 or -1.
+    """
+
+    points: tuple[PathPoint, ...]
+    steps: tuple[Equilibrium, ...]
+    limit_points: tuple[Equilibrium, ...]
+    bifurcations: tuple[Equilibrium, ...]
+    end: str
+    bifurcation: int = 0
+    side: int = 0
+
+    @property
+    def factors(self) -> Array:
+        """Factors of the points, (points,)."""
+        return np.array([point.factor for point in self.points])
+
+    def stretches(self) -> list[tuple[bool | str, int, int]]:
+        """Stretches of one stability: what it is, numbers of the first and last point."""
+        found: list[tuple[bool | str, int, int]] = []
+        for i, point in enumerate(self.points):
+            if point.kind and i and found:
+                # What vanishes at the point itself says nothing of either side.
+                found[-1] = (found[-1][0], found[-1][1], i)
+            elif found and found[-1][0] == point.stable:
+                found[-1] = (point.stable, found[-1][1], i)
+            else:
+                found.append((point.stable, found[-1][2] if found else i, i))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The answer of a scene whose analysis is a path.
+
+    Attributes
+    ----------
+    status : Status
+        SOLVED, SHORT where an accuracy that was asked for is not reached, or CUT where Newton's method could not
+        follow the path to the end of its range.
+    branches : tuple of Branch
+        The path itself, then those that were followed from its bifurcations.
+    unit : float
+        Arc lengths are the root of the mean square of the rotations (rad) and of the factor over this unit.
+    error_estimate : float
+        Largest estimated error along the path: of positions over the size of the scene, of the factors of limit
+        points and bifurcations relative to themselves.
+    seconds : mapping
+        Time spent on models and on solving.
+    """
+
+    scene: Any
+    status: Status
+    prepared: Prepared = field(repr=False)
+    branches: tuple[Branch, ...]
+    unit: float
+    error_estimate: float | None
+    last: Equilibrium
+    notes: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+    @property
+    def model(self) -> Model:
+        """Discretisation that the points are on, or the last one in contact."""
+        return self.prepared.model
+
+    @property
+    def main(self) -> Branch:
+        """The path itself, without the branches."""
+        return self.branches[0]
+
+    @property
+    def points(self) -> tuple[PathPoint, ...]:
+        """The points of the path itself."""
+        return self.main.points
+
+    @property
+    def steps(self) -> tuple[Equilibrium, ...]:
+        """Crossings of the factors asked for: of the path, then of the branches."""
+        return tuple(entry for branch in self.branches for entry in branch.steps)
+
+    @property
+    def limit_points(self) -> tuple[Equilibrium, ...]:
+        """Limit points of the path, then of the branches."""
+        return tuple(entry for branch in self.branches for entry in branch.limit_points)
+
+    @property
+    def bifurcations(self) -> tuple[Equilibrium, ...]:
+        """Bifurcation points of the path, then of the branches."""
+        return tuple(entry for branch in self.branches for entry in branch.bifurcations)
+
+    def fields(self, point: PathPoint) -> Fields:
+        """Everything by name at a point."""
+        return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
+
+    def positions(self, node: str, branch: int = 0) -> Array:
+        """Positions of a node along the path or a branch, (points, 3) m."""
+        return np.array([self.fields(point).position(node) for point in self.branches[branch].points])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON answer."""
+        model = self.model
+        answer: dict[str, Any] = {
+            "status": self.status.value,
+            "title": self.scene.title,
+            "dimension": model.dimension,
+            "unknowns": model.unknowns,
+            "seconds": dict(self.seconds),
+            "path": self._arrays(self.main),
+        }
+        for kind in ("steps", "limit_points", "bifurcations"):
+            entries = [
+                {**entry.to_dict(), "branch": i}
+                for i, branch in enumerate(self.branches)
+                for entry in getattr(branch, kind)
+            ]
+            answer[kind] = entries
+        answer["branches"] = [
+            {"bifurcation": branch.bifurcation, "side": branch.side, "path": self._arrays(branch)}
+            for branch in self.branches[1:]
+        ]
+        return {**answer, "error_estimate": self.error_estimate, "notes": list(self.notes)}
+
+    def _arrays(self, branch: Branch) -> dict[str, Any]:
+        """Arrays over the points."""
+        model, points = self.model, branch.points
+        fields = [self.fields(point) for point in points]
+        nodes: dict[str, Any] = {}
+        for name in model.nodes:
+            nodes[name] = {"position": [here.position(name).tolist() for here in fields]}
+            if model.rotations.node_turn[name] is not None:
+                key = "quaternion" if model.space else "angle"
+                turned = [here.rotation(name) for here in fields]
+                nodes[name][key] = [t.tolist() if model.space else float(t[0]) for t in turned if t is not None]
+        return {
+            "factor": branch.factors.tolist(),
+            "nodes": nodes,
+            "stable": [point.stable for point in points],
+            "negative": [point.negative for point in points],
+            "arc": [float(point.arc) for point in points],
+            "kind": [point.kind for point in points],
+            "end": branch.end,
+        }

@@ -1,0 +1,418 @@
+"""Paths of equilibria of a scene, to the accuracy asked for.
+
+The path is followed on a first mesh and again on the mesh with all elements halved: what differs between their
+limit points, bifurcations, crossings and samples is the estimate of the error, the finer path the answer; where the
+error is too large, the elements are halved again.  All elements are halved alike: an unsymmetric mesh would tear the
+bifurcations of a symmetric structure apart.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..equilibria.solution import Equilibrium, equilibrium
+from ..equilibria.statics import Settings, pilot_of
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.threads import single_threaded
+from ..mechanics.accuracy import largest_difference
+from ..mechanics.fields import Fields, transferred
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import assemble
+from ..solvers.arclength import Curve, Standing, Tangent
+from ..solvers.beginning import begin_path, check_slack
+from ..solvers.critical import Event, at_factors, shapes_at
+from ..solvers.newton import Corrected, relative_residual
+from ..solvers.prepared import Prepared
+from ..solvers.tracing import Traced, switched, trace
+from .contact_path import follow_in_contact
+from .path import NO_POTENTIAL, Branch, Path, PathPoint
+
+__all__ = ["follow_path", "switch"]
+
+LEVELS = 10
+"""Most halvings of the first mesh."""
+
+MARGIN = 16.0
+"""A halving gains this many times less than its order promises, as far as estimates go."""
+
+HOPED = 4.0
+"""Times more than that is hoped for when meshes are skipped."""
+
+PATIENCE = 5
+"""After so many halvings one that does not halve the error is the last."""
+
+FEW_ELEMENTS = 16
+"""A first mesh of so many elements costs less than to look whether fewer would do."""
+
+MOST_ELEMENTS = 3000
+"""A mesh that the library chooses does not grow beyond this."""
+
+SAMPLES = 8
+"""Points of a stretch that are compared between two meshes, beside those that were asked for."""
+
+EVALUATIONS = 500.0
+"""About as often the equations are evaluated along a path."""
+
+TAUT = 1e3
+"""Multipliers above this many times the loads, in members without slack, are those of a taut string."""
+
+STEADY = 0.3
+"""Share of the factor in the tangent from which on a point may be compared at its factor."""
+
+LEAST_WAY = 1e-3
+"""A path that ends before this share of its range is none."""
+
+
+@single_threaded
+def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) -> Path:
+    """The path of equilibria of a scene whose analysis is a path.
+
+    Parameters
+    ----------
+    scene : Scene
+    settings : Settings, optional
+        Further keywords replace single settings.
+
+    Raises
+    ------
+    SceneError
+        The scene asks for what cannot be modelled, or for no path.
+    SolveError
+        There is no equilibrium to start from, or none beside it.
+    """
+    if scene.analysis.type != "path":
+        raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
+    if scene.contacts:
+        return follow_in_contact(scene, replace(settings or Settings(), **changes))
+    return _Run(scene, replace(settings or Settings(), **changes)).path()
+
+
+@single_threaded
+def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, points: int | None = None) -> Branch:
+    """The branch that crosses the path at one of its bifurcations, followed to one side on the mesh of the path.
+
+    Parameters
+    ----------
+    bifurcation : int
+        Which bifurcation of the path itself, 1 is the first.
+    side : int
+        1 or -1.
+    shape : int
+        Which of the shapes where several eigenvalues vanish at once.
+    points : int, optional
+        Most points; that of the scene by default.
+
+    Raises
+    ------
+    SceneError
+        There is no such bifurcation, side or shape.
+    SolveError
+        No branch was found there.
+    """
+    if not isinstance(path, Path):
+        accepted = "the answer of a scene whose analysis is a path, whole and not a branch of it"
+        raise SceneError(f"path: found a {type(path).__name__}, accepted: {accepted}")
+    count = len(path.main.bifurcations)
+    if count == 0:
+        raise SceneError("bifurcation: the path has none, accepted: a path with bifurcations")
+    if not 1 <= bifurcation <= count:
+        raise SceneError(f"bifurcation: found {bifurcation}, accepted: 1 to {count}, those of the path")
+    if side not in (1, -1):
+        raise SceneError(f"side: found {side}, accepted: 1 or -1")
+    run = _Run(path.scene, Settings())
+    curve = Curve(path.prepared, path.unit)
+    number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
+    event = _event_at(curve, path, number)
+    if not 1 <= shape <= event.multiplicity:
+        raise SceneError(f"shape: found {shape}, accepted: 1 to {event.multiplicity}, those that vanish there")
+    traced = run.branch(curve, event, side, shape, points or path.scene.analysis.points)
+    if traced is None:
+        raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
+    stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
+    return run.answered(curve, stretch, {})
+
+
+def _event_at(curve: Curve, path: Path, number: int) -> Event:
+    """The bifurcation at a point of a path, its tangent taken from both sides."""
+    points, along = path.points[number - 1 : number + 2], Tangent(np.zeros(curve.equations.total), 1.0)
+    before, at = (curve.standing(point.state, point.factor, along) for point in points[:2])
+    after = curve.standing(points[2].state, points[2].factor, before.tangent)
+    mean = Tangent(before.tangent.z + after.tangent.z, before.tangent.factor + after.tangent.factor)
+    return Event("bifurcation", replace(at, tangent=curve.normed(mean)), max(1, at.inertia.zero))
+
+
+@dataclass
+class _Stretch:
+    """A traced stretch, and the crossings of the factors asked for."""
+
+    traced: Traced
+    bifurcation: int = 0
+    side: int = 0
+    crossings: list[Standing] = field(default_factory=list)
+
+    def of_kind(self, kind: str) -> list[Standing]:
+        return [event.standing for event in self.traced.events if event.kind == kind]
+
+
+@dataclass
+class _Level:
+    """What was followed on one mesh."""
+
+    curve: Curve
+    stretches: list[_Stretch]
+    notes: tuple[str, ...]
+
+
+class _Run:
+    """One path with its branches, on finer and finer meshes."""
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        self.scene, self.settings, self.analysis = scene, settings, scene.analysis
+        self.span = scene.analysis.span
+        self.accuracy = settings.accuracy or scene.analysis.accuracy
+        members = scene.members.items()
+        self.fixed = {n for n, m in members if (settings.elements or m.elements) is not None}
+        self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set or not self.fixed
+        self.seconds = {"model": 0.0, "solve": 0.0}
+        self.assembly: Any = settings.assembly
+        knots = {t for h in scene.histories.values() for t in h.t if self.span[0] < t < self.span[1]}
+        self.knots = tuple(sorted(knots))
+
+    # -- meshes ---------------------------------------------------------------------------------
+
+    def path(self) -> Path:
+        """The answer."""
+        begin = time.perf_counter()
+        mesh, last = self._first_mesh(), np.inf
+        coarse = self._level(mesh)
+        if self.fixed == set(self.scene.members):
+            errors = self._errors(coarse, self._level(self._halved(mesh)))
+            return self._answer(coarse, errors, begin)
+        # The error falls by 4^p a halving; less is taken for granted.
+        gain = max(1.0, 4.0**mesh.order / MARGIN)
+        for count in range(LEVELS):
+            fine = self._level(self._halved(coarse.curve.model.mesh))
+            errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
+            largest = max(errors.values(), default=0.0)
+            hopeless = count >= PATIENCE and largest > 0.5 * last
+            if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
+                break
+            coarse, last = self._next(fine, gain * largest, gain), largest
+        return self._answer(fine, errors, begin)
+
+    def _next(self, fine: _Level, error: float, gain: float) -> _Level:
+        """The next level to compare with its half: the fine one, or one that is finer by as much as the error asks.
+
+        ``error`` is that of the level before the fine one.  That of the next may be so much above the accuracy as
+        a halving is sure to gain; where what is hoped for until then does not come, one more halving follows.
+        """
+        hoped = max(2.0, HOPED * gain)
+        wanted = np.log(max(error / (self.accuracy * gain), 1.0)) / np.log(hoped) if np.isfinite(error) else 0.0
+        mesh = fine.curve.model.mesh
+        for _ in range(min(int(np.ceil(wanted - 0.25)) - 1, 3)):
+            mesh = self._halved(mesh) if 4 * mesh.elements <= MOST_ELEMENTS else mesh
+        return fine if mesh is fine.curve.model.mesh else self._level(mesh)
+
+    def _first_mesh(self) -> Mesh:
+        """The mesh for the largest factor; where that needs many elements, for the largest that is met."""
+        plain, graded = self._mesh((1e-9 * self._widest,)), self._mesh(self.span)
+        if graded.elements <= max(2 * plain.elements, FEW_ELEMENTS):
+            return graded
+        curve, start, _ = begin_path(self._prepared(plain), self.span)
+        met = [point.factor for point in trace(curve, start, self.span, self.analysis.points, self.knots).points]
+        return self._mesh((max(1.5 * min(met), self.span[0]), min(1.5 * max(met), self.span[1])))
+
+    def _mesh(self, factors: tuple[float, ...]) -> Mesh:
+        """The mesh that statics begins with at the given factors."""
+        steps = tuple(factor for factor in factors if factor) or (self._widest,)
+        analysis = self.analysis.model_copy(update={"steps": steps})
+        return pilot_of(self.scene.model_copy(update={"analysis": analysis}), self.settings)
+
+    def _prepared(self, mesh: Mesh) -> Prepared:
+        begin = time.perf_counter()
+        model = assemble(self.scene, mesh, assembly=self.assembly)
+        prepared = Prepared(model, evaluations=EVALUATIONS)
+        self.assembly = model.assembly
+        _ = prepared.equations
+        self.seconds["model"] += time.perf_counter() - begin
+        return prepared
+
+    def _halved(self, mesh: Mesh) -> Mesh:
+        everything = self.fixed == set(self.scene.members)
+        marks = {n: np.full(len(c) - 1, everything or n not in self.fixed) for n, c in mesh.cuts.items()}
+        return mesh.refined(marks)
+
+    def _level(self, mesh: Mesh) -> _Level:
+        curve, start, notes = begin_path(self._prepared(mesh), self.span)
+        main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
+        way = max(abs(point.factor - start.factor) for point in main.traced.points)
+        if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
+            detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
+            raise SolveError(Status.FAILED, detail, start.state)
+        check_slack(curve, main.traced)
+        level = _Level(curve, [main], notes)
+        bends = [event for event in main.traced.events if event.kind == "bifurcation"]
+        for number, event in enumerate(bends[: self.analysis.branches], start=1):
+            for side in (1, -1):
+                traced = self.branch(curve, event, side, 1, self.analysis.points)
+                if traced is None:
+                    level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
+                else:
+                    level.stretches.append(_Stretch(traced, number, side))
+        level.stretches = [self.stretch(part, curve) for part in level.stretches]
+        return level
+
+    def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
+        """The branch at a bifurcation to one side; None where none is found."""
+        first = switched(curve, event, shapes_at(curve, event)[:, shape - 1], side)
+        return None if first is None else trace(curve, first, self.span, points, self.knots)
+
+    def stretch(self, part: _Stretch, curve: Curve) -> _Stretch:
+        """The same with the crossings of the factors asked for."""
+        return replace(part, crossings=at_factors(curve, part.traced.points, self.analysis.steps))
+
+    # -- errors ---------------------------------------------------------------------------------
+
+    def _errors(self, coarse: _Level, fine: _Level) -> dict[tuple[int, str, int], float]:
+        """Differences between two meshes, by stretch, kind and number; infinite where they do not correspond."""
+        errors: dict[tuple[int, str, int], float] = {}
+        if len(coarse.stretches) != len(fine.stretches):
+            errors[0, "branches", 0] = np.inf
+        for i, (a, b) in enumerate(zip(coarse.stretches, fine.stretches, strict=False)):
+            for kind in ("limit", "bifurcation", "step"):
+                ours, theirs = (s.crossings if kind == "step" else s.of_kind(kind) for s in (a, b))
+                if len(ours) != len(theirs):
+                    errors[i, kind, -1] = np.inf
+                for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
+                    factor = abs(one.factor - other.factor) / max(abs(other.factor), 1e-6 * self._widest)
+                    errors[i, kind, j] = max(_apart(coarse.curve, one, fine.curve, other), factor)
+            errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
+        return errors
+
+    @property
+    def _widest(self) -> float:
+        return max(map(abs, self.span))
+
+    def _sampled(self, coarse: _Level, traced: Traced, fine: _Level) -> float:
+        """Largest difference of points of a coarse stretch when they are corrected on the fine mesh."""
+        curve = coarse.curve
+        steady = [p for p in traced.points if abs(p.tangent.factor) >= STEADY * curve.unit and not p.inertia.zero]
+        chosen = np.unique(np.linspace(0, len(steady) - 1, SAMPLES).round().astype(int)).tolist() if steady else []
+        largest = 0.0
+        for i in chosen:
+            state = transferred(curve.model, steady[i].state, fine.curve.model)
+            flat = Tangent(np.zeros(fine.curve.equations.total), steady[i].tangent.factor)
+            here = replace(steady[i], state=state, tangent=flat)
+            found = fine.curve.at_factor(here, steady[i].factor)
+            if found is not None:
+                largest = max(largest, _apart(curve, steady[i], fine.curve, found))
+        return largest
+
+    # -- answers --------------------------------------------------------------------------------
+
+    def _answer(self, level: _Level, errors: dict[tuple[int, str, int], float], begin: float) -> Path:
+        curve, largest = level.curve, max(errors.values(), default=0.0)
+        branches = []
+        for i, stretch in enumerate(level.stretches):
+            own = {(kind, j): error for (k, kind, j), error in errors.items() if k == i}
+            branches.append(self.answered(curve, stretch, own))
+        status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
+        if level.stretches[0].traced.end == "lost":
+            status = Status.CUT
+        final = level.stretches[-1].traced.points[-1]
+        steps = [entry for branch in branches for entry in branch.steps]
+        last = steps[-1] if steps else self._entry(curve, final, None, ())
+        self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
+        return Path(
+            scene=self.scene,
+            status=status,
+            prepared=curve.prepared,
+            branches=tuple(branches),
+            unit=curve.unit,
+            error_estimate=largest if np.isfinite(largest) else None,
+            last=last,
+            notes=level.notes if curve.model.conservative else (*level.notes, NO_POTENTIAL),
+            seconds=self.seconds,
+        )
+
+    def answered(self, curve: Curve, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
+        """The answer of one stretch."""
+        traced = stretch.traced
+        kinds = {id(event.standing): event for event in traced.events}
+        energy = curve.model.conservative
+        points = tuple(_point(p, kinds.get(id(p)), energy) for p in traced.points)
+
+        def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
+            numbered = zip(standings, notes, strict=True)
+            return tuple(self._entry(curve, s, errors.get((kind, j)), n) for j, (s, n) in enumerate(numbered))
+
+        crossings = stretch.crossings
+        bends, limits = ([e for e in traced.events if e.kind == kind] for kind in ("bifurcation", "limit"))
+        return Branch(
+            points=points,
+            steps=entries("step", crossings, [()] * len(crossings)),
+            limit_points=entries("limit", [e.standing for e in limits], [_said(e, energy) for e in limits]),
+            bifurcations=entries("bifurcation", [e.standing for e in bends], [_said(e, energy) for e in bends]),
+            end=self._end(traced),
+            bifurcation=stretch.bifurcation,
+            side=stretch.side,
+        )
+
+    def _end(self, traced: Traced) -> str:
+        count, factor = len(traced.points) - len(traced.events), traced.points[-1].factor
+        return {
+            "range": f"the factor leaves the range at {factor:g}",
+            "points": f"{count} points",
+            "closed": "it closes on itself",
+            "lost": f"it could not be followed beyond factor {factor:.6g}",
+        }[traced.end]
+
+    def _entry(self, curve: Curve, at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
+        prepared = curve.prepared
+        residual = relative_residual(curve.equations, at.point)
+        stability = prepared.stability(Corrected(at.state, at.point, True, at.iterations, 0.0, 0.0, residual))
+        finite = error if error is not None and np.isfinite(error) else None
+        return equilibrium(
+            curve.equations,
+            at.state,
+            at.loading,
+            float(at.factor),
+            at.point,
+            residual,
+            stability,
+            error_estimate=finite,
+            notes=notes,
+        )
+
+
+def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:
+    return largest_difference(Fields(one.equations, a.state, a.loading), Fields(other.equations, b.state, b.loading))
+
+
+def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:
+    negative, zero = (standing.inertia.negative, standing.inertia.zero) if has_energy else (0, 0)
+    stable: bool | str = (False if negative else "neutral" if zero else True) if has_energy else "not defined"
+    kind = "" if event is None else {"limit": "limit point"}.get(event.kind, event.kind)
+    return PathPoint(float(standing.factor), standing.state, standing.loading, negative, stable, standing.arc, kind)
+
+
+def _said(event: Event, has_energy: bool) -> tuple[str, ...]:
+    """What has to be known of a point where the tangent is singular."""
+    notes: tuple[str, ...] = () if has_energy else (DIVERGENCE,)
+    if event.multiplicity > 1:
+        notes += (
+            f"{event.multiplicity} eigenvalues vanish at once: branches lead off along each combination of shapes, "
+            "those along the first shape alone are followed; switch(path, ..., shape=...) follows another",
+        )
+    return notes
+
+
+DIVERGENCE = (
+    "static divergence: the static tangent is singular, another equilibrium is adjacent; without a potential the "
+    "structure may have become unstable before by flutter, which only shows in dynamics"
+)

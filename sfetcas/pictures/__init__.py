@@ -1,0 +1,1 @@
+"""Pictures of scenes, equilibria and paths; the only place that knows matplotlib."""

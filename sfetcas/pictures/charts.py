@@ -1,0 +1,249 @@
+"""Charts of paths: the factor against what moves most, and deformed shapes along the way.
+
+Stable stretches are drawn solid, unstable ones dashed; limit points are circles, bifurcations squares, and dots in
+the colours of the shapes say where these are.  Where only motions are prescribed, the largest reaction at a moved
+node stands over the factor instead.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..paths.path import Branch, Path
+from .looks import dashes_of
+from .sheet import DOTTED
+from .sketch import REST
+
+__all__ = ["ENDINGS", "chart", "save_chart"]
+
+ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
+"""Endings of the files that :func:`save_chart` writes."""
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
+STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-.", "not defined": ":"}
+KINDS = ((True, "stable"), (False, "unstable"), ("neutral", "neutral"), ("not defined", "stability not defined"))
+MARKS = {"limit point": "o", "bifurcation": "s"}
+LOADED = 5.0
+"""A loaded node is told of unless another one moves by more than this many times as far."""
+
+SHAPES, ALIKE = 6, 2e-3
+"""Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
+SAMPLES = np.linspace(0.0, 1.0, 61)
+SHADES = ("#0B1F4B", "#134B86", "#2A7AB8", "#5DA5D6", "#9CC7E8")
+"""Of the shapes along the path, in this order."""
+
+
+def save_chart(path: Path, file: str | os.PathLike[str]) -> None:
+    """Write :func:`chart` of a path to a file, in the format of its ending.
+
+    Raises
+    ------
+    SceneError
+        The ending is none of :data:`ENDINGS`.
+    """
+    ending = File(file).suffix.lower()
+    if ending not in ENDINGS:
+        raise SceneError(f"found the ending {ending!r} of a picture, accepted: {', '.join(ENDINGS)}")
+    chart(path).savefig(file, dpi=150)
+
+
+def chart(path: Path) -> Figure:
+    """The chart of a path with its branches, and shapes at some of its points; a figure of 10 x 5 inch."""
+    figure = Figure(figsize=(10.0, 5.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    quantity = _telling(path)
+    shapes = _shapes(path)
+    _draw_course(left, path, quantity)
+    for shape in shapes:
+        _draw_dot(left, shape, quantity, path)
+    _draw_shapes(right, path, shapes)
+    figure.suptitle(path.scene.title, parse_math=False)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class _Quantity:
+    """What the factor is drawn against: its name, and its values over the points of each branch."""
+
+    name: str
+    values: list[Array]
+    node: str | None = None
+    axis: int = 0
+    upright: bool = False
+
+
+def _telling(path: Path) -> _Quantity:
+    """The component that changes most: of a reaction where only motions are prescribed, else of a displacement.
+
+    A loaded node comes before others that do not move by far more, and there the direction of the load.  What
+    tells the ends of branches apart comes before what does not, as mirrored branches lie on each other there.
+    """
+    scene = path.scene
+    driven = not scene.loads and scene.gravity is None
+    found = list(_reactions(path) if driven else _displacements(path))
+    loaded = {load.node: np.abs(load.vector) for load in scene.loads.values() if load.type == "force"}
+
+    def change(quantity: _Quantity) -> float:
+        change = float(np.ptp(np.concatenate(quantity.values)))
+        ends = np.sort([values[-1] for values in quantity.values])
+        if len(ends) > 1 and np.diff(ends).min() < 1e-3 * change:
+            change *= 0.01
+        if quantity.node is None or quantity.node not in loaded:
+            return change
+        along = loaded[quantity.node]
+        return LOADED * change * (0.2 + 0.8 * float(along[quantity.axis] / max(along.max(), 1e-300)))
+
+    return max(found, key=change)
+
+
+def _displacements(path: Path) -> Iterator[_Quantity]:
+    scene = path.scene
+    moved = {motion.node for motion in scene.motions.values()}
+    for name, node in scene.nodes.items():
+        if name not in moved:
+            rest = np.asarray(node.position)
+            tables = [path.positions(name, i) - rest for i in range(len(path.branches))]
+            yield from (replace(found, node=name) for found in _components(name, tables))
+    for name in scene.members:
+        rest = scene.center_lines[name].positions(np.array([0.5]))[0]
+        yield from _components(f"middle of {name}", [_middles(path, branch, name) - rest for branch in path.branches])
+
+
+def _middles(path: Path, branch: Branch, member: str) -> Array:
+    half = np.array([0.5])
+    return np.array([path.fields(point).along(member, half)["position"][0] for point in branch.points])
+
+
+def _components(name: str, tables: list[Array]) -> Iterator[_Quantity]:
+    for i, letter in enumerate("xyz"):
+        yield _Quantity(f"displacement of {name} in {letter}, m", [table[:, i] for table in tables], axis=i)
+
+
+def _reactions(path: Path) -> Iterator[_Quantity]:
+    for motion in path.scene.motions.values():
+        number, kind, unit = (0, "force", "N") if motion.rotation is None else (1, "moment", "N m")
+        tables = [
+            np.array([path.fields(point).reaction(motion.node)[number] for point in branch.points])
+            for branch in path.branches
+        ]
+        for i, letter in enumerate("xyz"):
+            name = f"{kind} at {motion.node} {'in' if number == 0 else 'about'} {letter}, {unit}"
+            yield _Quantity(name, [table[:, i] for table in tables], upright=True)
+
+
+def _draw_course(axes: Axes, path: Path, quantity: _Quantity) -> None:
+    for number, branch in enumerate(path.branches):
+        colour = _colour(number)
+        across, up = quantity.values[number], branch.factors
+        if quantity.upright:
+            across, up = up, across
+        for stable, first, last in branch.stretches():
+            part = slice(first, last + 1)
+            label = dict(KINDS)[stable]
+            axes.plot(across[part], up[part], linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
+        for kind, mark in MARKS.items():
+            here = [i for i, point in enumerate(branch.points) if point.kind == kind]
+            axes.plot(across[here], up[here], mark, color=colour, fillstyle="none", markersize=7, gid=kind)
+    _calm(axes, path, quantity)
+    names = ("factor", quantity.name) if quantity.upright else (quantity.name, "factor")
+    axes.set_xlabel(names[0], parse_math=False)
+    axes.set_ylabel(names[1], parse_math=False)
+    axes.grid(color="#EBEBEB", linewidth=0.6)
+    axes.legend(handles=list(_legend(path)), fontsize=8)
+
+
+def _calm(axes: Axes, path: Path, quantity: _Quantity) -> None:
+    """Where nothing moves by more than a ten-thousandth of the scene, rounding shall not fill the chart."""
+    points = np.vstack([line.positions(SAMPLES) for line in path.scene.center_lines.values()])
+    size, values = float(np.ptp(points, axis=0).max()), np.concatenate(quantity.values)
+    if not quantity.upright and np.ptp(values) < 1e-4 * size:
+        axes.set_xlim(float(values.mean()) - 0.01 * size, float(values.mean()) + 0.01 * size)
+
+
+def _legend(path: Path) -> Iterator[Line2D]:
+    seen = {stable for branch in path.branches for stable, _, _ in branch.stretches()}
+    for stable, name in KINDS:
+        if stable in seen:
+            yield Line2D([], [], color="#333333", linestyle=STYLES[str(stable)], label=name)
+    kinds = {point.kind for branch in path.branches for point in branch.points}
+    for kind, mark in MARKS.items():
+        if kind in kinds:
+            yield Line2D([], [], color="#333333", marker=mark, linestyle="", fillstyle="none", label=kind)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """A deformed shape: of which branch and point, its lines (n, 3) m, and how it looks."""
+
+    branch: int
+    index: int
+    lines: list[Array]
+    colour: str
+    label: str
+    dashes: Any
+
+
+def _shapes(path: Path) -> list[_Shape]:
+    """Shapes at the end and evenly along the path, and at the end of each branch; none that looks like another."""
+    count = len(path.points)
+    chosen = [(0, int(i)) for i in np.unique(np.linspace(0, count - 1, SHAPES).round().astype(int))[1:]]
+    chosen += [(number, len(branch.points) - 1) for number, branch in enumerate(path.branches)][1:]
+    rest = np.vstack([line.positions(SAMPLES) for line in path.scene.center_lines.values()])
+    seen, found = [rest], list[_Shape]()
+    for branch, index in chosen:
+        point = path.branches[branch].points[index]
+        lines = [path.fields(point).along(name, SAMPLES)["position"] for name in path.model.members]
+        size = float(np.ptp(np.vstack([*seen, *lines]), axis=0).max())
+        if min(float(np.abs(np.vstack(lines) - other).max()) for other in seen) > ALIKE * size:
+            seen.append(np.vstack(lines))
+            colour = SHADES[round(index * len(SHADES) / (count - 1)) - 1] if branch == 0 else _colour(branch)
+            state = "" if point.stable is True else f", {dict(KINDS)[point.stable]}"
+            where = f", branch {branch}" if branch else ""
+            label = f"factor {point.factor:.4g}{where}{state}"
+            found.append(_Shape(branch, index, lines, colour, label, dashes_of(point.stable)))
+    return found
+
+
+def _colour(branch: int) -> str:
+    return COLOURS[branch % len(COLOURS)]
+
+
+def _draw_dot(axes: Axes, shape: _Shape, quantity: _Quantity, path: Path) -> None:
+    """Where on the course a shape is."""
+    across, up = quantity.values[shape.branch][shape.index], path.branches[shape.branch].factors[shape.index]
+    place = (up, across) if quantity.upright else (across, up)
+    axes.plot(*place, "o", color=shape.colour, markersize=5, zorder=3, gid="shape")
+
+
+def _draw_shapes(axes: Axes, path: Path, shapes: list[_Shape]) -> None:
+    rest = [line.positions(SAMPLES) for line in path.scene.center_lines.values()]
+    used = _directions(np.vstack([*rest, *(line for shape in shapes for line in shape.lines)]))
+    for i, line in enumerate(rest):
+        label = ("undeformed" if shapes else "undeformed; all shapes look like it") if i == 0 else None
+        axes.plot(*line[:, used].T, color=REST, linewidth=1.2, linestyle=DOTTED, label=label, gid="undeformed")
+    for shape in shapes:
+        for i, line in enumerate(shape.lines):
+            style: dict[str, Any] = {"color": shape.colour, "linestyle": shape.dashes, "linewidth": 1.6, "gid": "shape"}
+            axes.plot(*line[:, used].T, label=shape.label if i == 0 else None, **style)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"{'xyz'[used[0]]}, m")
+    axes.set_ylabel(f"{'xyz'[used[1]]}, m")
+    columns = min(3, 1 + len(shapes) // 5)
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=columns, frameon=False)
+
+
+def _directions(points: Array) -> list[int]:
+    """The two fixed axes along which the shapes are seen best: the plane, or those of the largest extents."""
+    extents = np.ptp(points, axis=0)
+    return sorted(np.argsort(-extents, kind="stable")[:2].tolist()) if extents[2] > 0.0 else [0, 1]

@@ -1,0 +1,405 @@
+"""Symbols of supports, joints, springs, motions, loads and reactions, put to a sketch.
+
+What comes first has the free choice of place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..description.loads import Load, Motion
+from ..description.obstacles import obstacle
+from ..description.sections import evaluate
+from ..description.springs import Spring
+from ..description.structure import SLIDING, Node, unit
+from ..equilibria.solution import Equilibrium
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
+from .sketch import (
+    LOAD,
+    MOTION,
+    REACTION,
+    Ink,
+    Sketch,
+    amount,
+    broken,
+    dense,
+    flat_unit,
+    left_of,
+    norm,
+    tangents_of,
+)
+
+__all__ = ["sketch_all"]
+
+ARROW = 0.12
+"""Length of the longest arrow over the size of the picture; the other constants are meant like this."""
+SYMBOL = 0.03
+SPRING = "#5A5A5A"
+SPIRAL = 0.026
+"""Outer radius of the spiral of a rotational spring."""
+SHORT = 0.03
+"""Springs shorter than this are not seen."""
+SIDES = ((0, -1), (0, 1), (-1, 0), (1, 0))
+"""Where the ground is put, the first that is free: below, above, left, right."""
+TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
+"""Radii of circular arrows."""
+
+
+def sketch_all(sketch: Sketch) -> None:
+    """Sketch everything but the centre lines; what comes first has the free choice of place."""
+    scene, largest = sketch.scene, _largest_force(sketch)
+    for name, contact in scene.contacts.items():
+        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
+    for name, node in scene.nodes.items():
+        _sketch_support(sketch, name, node)
+        if node.joint != "rigid":
+            sketch.dot(sketch.at(name), f"joint-{name}")
+    _sketch_releases(sketch)
+    sketch_slots(sketch)
+    for name, spring in scene.springs.items():
+        (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
+        sketch_stops(sketch, name, spring)
+    for name, motion in scene.motions.items():
+        _sketch_motion(sketch, name, motion)
+    for name, load in scene.loads.items():
+        _sketch_load(sketch, name, load, largest)
+    for name, node in scene.nodes.items():
+        if node.support != "free":
+            _sketch_reaction(sketch, name, largest)
+    for name in scene.contacts:
+        _sketch_pushes(sketch, name, largest)
+
+
+def _factor(step: Equilibrium, history: str | None) -> float:
+    return step.factor if history is None else step.model.scene.histories[history].factor(step.factor)
+
+
+def _circle(radius: float, centre: tuple[float, float]) -> Array:
+    angle = np.linspace(0.0, 2.0 * math.pi, 33)
+    return np.stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)], axis=1)
+
+
+# Supports and joints
+
+
+@dataclass(frozen=True, eq=False)
+class _Symbol:
+    """Where a symbol is drawn, by which name: its own axes go along the ground and, from the place, towards it."""
+
+    sketch: Sketch
+    name: str
+    place: Array
+    down: Array
+
+    def put(self, shape: Any) -> Array:
+        """Points (n, 2) of the symbol, in units of the size of symbols, in fixed axes (n, 3)."""
+        flat = np.asarray(shape, float) @ np.stack([left_of(self.down), self.down])
+        return self.place + self.sketch.view.raised(SYMBOL * self.sketch.size * flat)
+
+    def line(self, shape: Any) -> None:
+        """Draw a polyline of the symbol."""
+        self.sketch.line(self.put(shape), self.name)
+
+    def area(self, shape: Any) -> None:
+        """Draw a polygon of the symbol."""
+        self.sketch.area(self.put(shape), self.name)
+
+    def ground(self, depth: float, half: float = 1.25, side: float = 1.0) -> None:
+        """Draw a hatched line."""
+        self.line([[-half, depth], [half, depth]])
+        strokes = np.linspace(-half, half, 7)[1:]
+        hatch = [np.array([[x, depth], [x - 0.4, depth + 0.4 * side]]) for x in strokes]
+        self.sketch.line(self.put(broken(*hatch)), self.name, width=0.8)
+
+    def triangle(self, half: float, height: float) -> None:
+        """Draw a triangle with a pin in the node."""
+        self.area([[0, 0], [-half, height], [half, height]])
+        self.sketch.dot(self.place, self.name)
+
+
+def _symbol(sketch: Sketch, node: str, down: Array) -> _Symbol:
+    """Where the symbol of a node's support is drawn."""
+    return _Symbol(sketch, f"support-{node}", sketch.at(node), down)
+
+
+def _sketch_support(sketch: Sketch, name: str, node: Node) -> None:
+    symbol = _symbol(sketch, name, _below(sketch, name, SIDES))
+    if node.support == "clamped":
+        _sketch_clamp(sketch, name)
+    elif node.support == "hinge":
+        if sketch.view.angles is not None:
+            _sketch_rod(sketch, name, node.axis, 1.8)
+        symbol.triangle(0.75, 1.2)
+        symbol.ground(1.2)
+    elif node.support == "ball":
+        symbol.area(_circle(0.5, (0.0, 0.5)))
+        symbol.ground(1.0)
+    elif node.support == "universal":
+        for axis in filter(None, (node.axis, node.axis2)):
+            _sketch_rod(sketch, name, axis, 1.4)
+        symbol.area(_circle(0.3, (0.0, 0.0)))
+        symbol.line([[0.0, 0.3], [0.0, 1.2]])
+        symbol.ground(1.2)
+    elif node.slides and node.direction is not None:
+        _sketch_slider(sketch, name, node, unit(node.direction))
+
+
+def _below(sketch: Sketch, node: str, directions: Sequence[Any]) -> Array:
+    """The first of the directions (2,) that no member takes, or the freest."""
+    leaving = sketch.view.flat(sketch.leaving(node))
+    blocked = [max(0.72, float((leaving @ np.array(direction)).max())) for direction in directions]
+    return np.array(directions[int(np.argmin(blocked))], float)
+
+
+def _sketch_clamp(sketch: Sketch, name: str) -> None:
+    """A hatched wall across the members; in space a plate."""
+    into = -sketch.leaving(name).sum(axis=0)
+    if sketch.view.angles is None:
+        _symbol(sketch, name, flat_unit(sketch.view.flat(into), (0.0, -1.0))).ground(0.0, half=1.4)
+        return
+    normal = into / norm(into) if norm(into) > 0.05 else np.array([0.0, 0.0, 1.0])
+    one, two = across(normal, np.array([0.0, 0.0, 1.0]))
+    corners = np.array([one + two, one - two, -one - two, two - one])
+    sketch.area(sketch.at(name) + SYMBOL * sketch.size * corners, f"support-{name}", "#BBBBBBB0", 2.0)
+
+
+def _sketch_rod(sketch: Sketch, name: str, direction: Iterable[float], half: float) -> None:
+    """A line through a node: the axis of a hinge or the guide of a slider in space."""
+    along = half * SYMBOL * sketch.size * np.array(unit(direction))
+    sketch.line(sketch.at(name) + np.array([-along, along]), f"support-{name}", width=1.6, level=4.0)
+
+
+def _sketch_slider(sketch: Sketch, name: str, node: Node, direction: tuple[float, float, float]) -> None:
+    along = flat_unit(sketch.view.flat(direction), (1.0, 0.0))
+    normal = left_of(along) * (1.0 if along[0] < 0.0 or (along[0] == 0.0 and along[1] < 0.0) else -1.0)
+    symbol = _symbol(sketch, name, _below(sketch, name, [normal, -normal]))
+    if sketch.view.angles is not None:
+        _sketch_rod(sketch, name, direction, 3.0)
+        symbol.area(
+            [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]] if node.rotation == "fixed" else _circle(0.5, (0, 0))
+        )
+    elif node.rotation == "fixed":
+        symbol.ground(0.6, half=1.6)
+        symbol.ground(-0.6, half=1.6, side=-1.0)
+    else:
+        symbol.triangle(0.65, 1.0)
+        for x in (-0.4, 0.4):
+            symbol.area(_circle(0.2, (x, 1.2)))
+        symbol.ground(1.4)
+
+
+def _sketch_releases(sketch: Sketch) -> None:
+    """A small circle in the member, just beside the node."""
+    for name, line in zip(sketch.course.members, sketch.course.last, strict=True):
+        for end, points in zip((0, 1), (line, line[::-1]), strict=True):
+            if sketch.scene.members[name].release[-end] not in ("rigid", *SLIDING):
+                beside = np.linalg.norm(points - points[0], axis=1) > 0.02 * sketch.size
+                sketch.dot(points[int(np.argmax(beside))], f"joint-{name}")
+
+
+# Springs
+
+
+def _sketch_spiral(sketch: Sketch, name: str, spring: Spring) -> None:
+    """A spiral about the axis of a rotational spring, as its first party carries it."""
+    carrier = (spring.between or ("ground",))[0]
+    axis = quaternion.rotate(turned_party(sketch, carrier, spring.node), np.array(unit(sketch.scene.spring_axis(name))))
+    one, two = across(axis, sketch.leaving(spring.node)[0])
+    angle = np.linspace(0.5 * math.pi, 5.0 * math.pi, 121)[:, None]
+    radius = SPIRAL * sketch.size * angle / angle[-1]
+    points = sketch.at(spring.node) + radius * (np.cos(angle) * one + np.sin(angle) * two)
+    sketch.line(points, f"spring-{name}", colour=SPRING, width=0.9, level=4.5)
+
+
+def _sketch_zigzag(sketch: Sketch, name: str, spring: Spring) -> None:
+    """A zigzag between the ends of a translational spring, the ground hatched.
+
+    A spring to the ground without a visible length, and one that acts along a direction only, is drawn as a short
+    one that the ground holds there.
+    """
+    end = sketch.at(spring.node)
+    start = sketch.at(spring.to) if spring.to is not None else _anchor(sketch, spring, end)
+    apart = start - end
+    if norm(apart) < SHORT * sketch.size:
+        return
+    along = apart / norm(apart)
+    across = sketch.view.raised(left_of(flat_unit(sketch.view.flat(along), (1.0, 0.0))))
+    teeth = int(np.clip(round(1.2 * norm(apart) / (SYMBOL * sketch.size)), 5, 60))
+    share = np.array([0.0, 0.15, *(0.15 + 0.7 * (np.arange(teeth) + 0.5) / teeth), 0.85, 1.0])
+    side = np.array([0.0, 0.0, *(1.0 - 2.0 * (np.arange(teeth) % 2)), 0.0, 0.0])
+    points = end + share[:, None] * apart + 0.5 * SYMBOL * sketch.size * side[:, None] * across
+    sketch.line(points, f"spring-{name}", colour=SPRING, width=0.9, level=4.5)
+    if spring.to is None:
+        down = flat_unit(sketch.view.flat(along), (0.0, -1.0))
+        _Symbol(sketch, f"spring-{name}", start, down).ground(0.0, half=0.8)
+
+
+def _anchor(sketch: Sketch, spring: Spring, end: Array) -> Array:
+    """Where a spring is seen to be held by the ground, (3,)."""
+    length = 3.5 * SYMBOL * sketch.size
+    if spring.direction is not None:
+        along = np.array(unit(spring.direction))
+        sides = [-along, along]
+        flat = [flat_unit(sketch.view.flat(side), (0.0, -1.0)) for side in sides]
+        chosen = _below(sketch, spring.node, flat)
+        side = next(side for side, seen in zip(sides, flat, strict=True) if np.array_equal(seen, chosen))
+        return np.asarray(end + length * side)
+    place = np.array(spring.anchor or sketch.scene.nodes[spring.node].position) / sketch.course.unit
+    if norm(place - end) >= SHORT * sketch.size:
+        return place
+    return np.asarray(end + length * sketch.view.raised(_below(sketch, spring.node, SIDES)))
+
+
+# Motions, loads and reactions
+
+
+def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
+    factor, node = _factor(sketch.step, motion.history), sketch.scene.nodes[motion.node]
+    old, new = np.array(node.position) / sketch.course.unit, sketch.at(motion.node)
+    ink = Ink(f"motion-{name}", MOTION, 1.4, dotted=True)
+    if motion.displacement is not None and motion.between is not None:
+        # How far one side slides along the other, not where both go.
+        sketch.label(amount(norm(factor * np.array(motion.displacement)), "m"), new, np.array([0.0, 1.0]), ink)
+    elif motion.displacement is not None and norm(new - old) > 0.02 * sketch.size:
+        sketch.arrow(np.array([old, new]), ink)
+        away = flat_unit(left_of(sketch.view.flat(new - old) / norm(new - old)), (0.0, 1.0))
+        text = amount(norm(new - old) * sketch.course.unit, "m")
+        sketch.label(text, 0.5 * (old + new), away, ink)
+    if motion.rotation is not None:
+        turn = motion.rotation
+        about = np.array(unit(node.axis)) if node.turn == "hinge" else np.array([0.0, 0.0, 1.0])
+        vector = factor * (turn * about if isinstance(turn, float) else np.array(turn))
+        ink = Ink(f"motion-{name}", MOTION, 1.2, dotted=True)
+        _sketch_turn(sketch, new, sketch.leaving(motion.node)[0], vector, "rad", ink)
+
+
+def _largest_force(sketch: Sketch) -> float:
+    """Largest force of the loads on points and of the reactions, N; above zero."""
+    step, scene = sketch.step, sketch.scene
+    loads = [
+        abs(_factor(step, load.history)) * norm(load.vector) for load in scene.loads.values() if load.type == "force"
+    ]
+    reactions = [norm(step.reaction(name)[0]) for name, node in scene.nodes.items() if node.support != "free"]
+    pushes = [norm(force) for entry in step.contacts.values() for force in np.atleast_2d(entry["force"])]
+    return max([*loads, *reactions, *pushes, 1e-10 * step.model.scales.force])
+
+
+def _sketch_load(sketch: Sketch, name: str, load: Load, largest: float) -> None:
+    value = _factor(sketch.step, load.history) * np.array(load.vector)
+    if not value.any():
+        return
+    if load.type == "distributed":
+        return _sketch_distributed(sketch, name, load, value)
+    ink = Ink(f"load-{name}", LOAD, 1.8)
+    if load.node is not None:
+        point, along, turned = sketch.at(load.node), sketch.leaving(load.node)[0], sketch.step.quaternion(load.node)
+    else:
+        assert load.member is not None
+        x = np.array([load.at])
+        point, along = sketch.along(load.member, x)[0], tangents_of(sketch.step, load.member, x)[0]
+        turned = sketch.step.along(load.member, x)["quaternion"][0]
+    if load.frame == "follower" and turned is not None:
+        value = quaternion.rotate(turned, value)
+    if load.type == "moment":
+        _sketch_turn(sketch, point, along, value, "N m", ink)
+    else:
+        _sketch_force(sketch, point, value, largest, ink)
+
+
+def _sketch_reaction(sketch: Sketch, name: str, largest: float) -> None:
+    force, moment = sketch.step.reaction(name)
+    point, arm = sketch.at(name), sketch.step.model.scales.length
+    moments = [largest * arm, norm(moment), *(float(np.abs(values).max()) for values in sketch.course.values)]
+    ink = Ink(f"reaction-{name}", REACTION, 1.1)
+    rounding = 1e-11 * sketch.step.model.scales.force
+    if norm(force) > max(1e-6 * max(largest, max(moments) / arm), rounding):
+        _sketch_force(sketch, point, force, largest, ink, pushing=True)
+    if norm(moment) > max(1e-6 * max(moments), rounding * arm):
+        _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
+
+
+def _sketch_pushes(sketch: Sketch, name: str, largest: float) -> None:
+    """What an obstacle pushes with."""
+    entry = sketch.step.contacts[name]
+    several = isinstance(entry["member"], list)
+    for member, at, force in zip(
+        *([entry[k]] if not several else entry[k] for k in ("member", "at", "force")), strict=True
+    ):
+        if at is not None and norm(force) > 1e-6 * largest:
+            point = sketch.along(member, np.array([np.mean(at)]))[0]
+            _sketch_force(sketch, point, force, largest, Ink(f"push-{name}", REACTION, 1.1), pushing=True)
+
+
+def _sketch_force(
+    sketch: Sketch, point: Array, value: Array, largest: float, ink: Ink, *, pushing: bool = False
+) -> None:
+    """An arrow that starts at the point or, ``pushing``, ends there; the other way round where that hides less."""
+    direction = value / norm(value)
+    length = ARROW * max(0.45, norm(value) / largest) * sketch.size
+    pulled = point + np.outer([0.012 * sketch.size, length], direction)
+    pushed = pulled - (length + 0.012 * sketch.size) * direction
+    ways = [(pushed, 0), (pulled, 1)] if pushing else [(pulled, 1), (pushed, 0)]
+    points, free = min(ways, key=lambda way: _hidden(sketch, way[0], point))
+    sketch.arrow(points, ink)
+    away = flat_unit(sketch.view.flat(points[free] - point) / length, (0.0, 1.0))
+    sketch.label(amount(norm(value), "N"), points[free], away, ink)
+
+
+def _hidden(sketch: Sketch, points: Array, point: Array) -> int:
+    """How much of an arrow (2, 3) is near what is sketched, besides what is at its point."""
+    flat, here, crowd = sketch.view.flat(points), sketch.view.flat(point), sketch.crowd
+    crowd = crowd[np.linalg.norm(crowd - here, axis=1) > 0.03 * sketch.size]
+    path = dense(flat, 0.005 * sketch.size)
+    apart = np.hypot(*(crowd[None, :, :] - path[:, None, :]).transpose(2, 0, 1))
+    return int((apart.min(axis=1, initial=np.inf) < 0.015 * sketch.size).sum())
+
+
+def _sketch_turn(sketch: Sketch, point: Array, along: Array, vector: Array, letters: str, ink: Ink) -> None:
+    """A circular arrow about a vector, open towards the member, whose tangent is ``along``."""
+    size = norm(vector)
+    if size == 0.0:
+        return
+    radius = TURNS[ink.colour]
+    one, two = across(vector / size, along)
+    angle = np.radians(np.linspace(50.0, 310.0, 60))[:, None]
+    sketch.arrow(point + radius * sketch.size * (np.cos(angle) * one + np.sin(angle) * two), ink)
+    away = flat_unit(-sketch.view.flat(one), (0.0, 1.0))
+    sketch.label(amount(size, letters), point, away, ink, gap=radius)
+
+
+def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> None:
+    """Small arrows onto the member with a line over their ends."""
+    assert load.member is not None
+    x = np.linspace(0.0, 1.0, 49)
+    profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+    peak = float(np.abs(profile).max())
+    if peak == 0.0:
+        return
+    places = sketch.along(load.member, x)
+    values = np.broadcast_to(value, places.shape)
+    if load.frame == "section":
+        values = quaternion.rotate(sketch.step.model.scene.center_lines[load.member].quaternions(x), values)
+    if load.frame != "fixed":
+        values = quaternion.rotate(sketch.step.along(load.member, x)["quaternion"], values)
+    ends = places - 0.6 * ARROW * sketch.size * (profile / peak)[:, None] * values / norm(value)
+    ink = Ink(f"load-{name}", LOAD, 1.0)
+    sketch.line(ends, ink.name, colour=LOAD, width=0.8)
+    for i in range(0, len(x), 6):
+        if abs(profile[i]) > 0.2 * peak:
+            sketch.arrow(np.array([ends[i], places[i]]), ink)
+    top = _label_place(np.abs(profile))
+    away = flat_unit(sketch.view.flat(ends[top] - places[top]) / (0.6 * ARROW * sketch.size), (0.0, 1.0))
+    sketch.label(amount(peak * norm(value), "N/m"), ends[top], away, ink)
+
+
+def _label_place(profile: Array) -> int:
+    """Index of the largest value; the middle one of several."""
+    largest = np.flatnonzero(profile >= profile.max() * (1.0 - 1e-9))
+    return int(largest[len(largest) // 2])

@@ -1,0 +1,101 @@
+"""Pictures of answers: the deformed structure over the undeformed one, with supports, loads and reactions.
+
+The order of the stages: centre lines are sampled, all else is sketched as marks and labels in fixed axes
+(:mod:`~sfetcas.pictures.sketch`, :mod:`~sfetcas.pictures.glyphs`); axes are made and filled, marks are drawn and
+labels put where they hide least (:mod:`~sfetcas.pictures.sheet`).  How lines tell steps or equilibria apart stands in
+:mod:`~sfetcas.pictures.looks`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..description.records import say
+from ..equilibria.solution import Solution
+from ..errors import SceneError
+from .glyphs import sketch_all
+from .looks import looks_of_equilibria, looks_of_steps, number_of
+from .sheet import DPI, Colour, sheet_of
+from .sketch import Sketch, course_of, view_of
+
+__all__ = ["ENDINGS", "picture", "save_picture"]
+
+ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
+"""Endings of the files that :func:`save_picture` writes."""
+
+COLOURS = ("moment", "magnitude", "none")
+MOST_STEPS = 40
+"""Steps drawn at most."""
+
+
+def save_picture(solution: Solution, path: str | os.PathLike[str]) -> None:
+    """Write :func:`picture` of an answer to a file, in the format of its ending.
+
+    Raises
+    ------
+    SceneError
+        The ending is none of :data:`ENDINGS`.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in ENDINGS:
+        found = f"found the ending {ending!r}" if ending else "found no ending"
+        raise SceneError(f"{found} of a picture, accepted: {', '.join(ENDINGS)}")
+    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    picture(solution).savefig(path, dpi=DPI, metadata=dates.get(ending))
+
+
+def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: Colour = "moment") -> Figure:
+    """The deformed structure over the undeformed one, ready for a report.
+
+    Parameters
+    ----------
+    solution : Solution
+    steps : sequence of int, optional
+        Numbers of the steps to draw, as indices of ``solution.steps``; the last one is drawn bold and in colour, with
+        its loads and reactions, the others thin.  Default: all; where all equilibria are asked for those of the last
+        factor, the first of them bold.
+    colour : str
+        ``moment``: bending moment, in the plane about z with its sign; ``magnitude``: its magnitude; ``none``.
+
+    Returns
+    -------
+    Figure
+        matplotlib figure without pyplot, 7 x 5 inch.
+
+    Raises
+    ------
+    SceneError
+        There is no such step or colour.
+    """
+    if colour not in COLOURS:
+        raise SceneError(f"found {say(colour)}, accepted: {', '.join(COLOURS)}", ("colour",))
+    numbers = _chosen(solution, steps)
+    chosen = [solution.steps[number] for number in numbers]
+    course = course_of(solution.scene, chosen, colour)
+    view = view_of(chosen[-1].model.space, [*course.rest, *course.last])
+    sketch = Sketch(solution.scene, chosen[-1], course, view)
+    sketch_all(sketch)
+    several = solution.scene.analysis.equilibria == "all"
+    looks = looks_of_equilibria(sketch, solution, numbers) if several else looks_of_steps(chosen)
+    sheet = sheet_of(sketch, looks, colour)
+    sheet.finish()
+    return sheet.figure
+
+
+def _chosen(solution: Solution, steps: Sequence[int] | None) -> list[int]:
+    """Indices of the steps to draw, the bold one last."""
+    count = len(solution.steps)
+    numbers = list(range(count)) if steps is None else list(steps)
+    if not numbers or any(not -count <= number < count for number in numbers):
+        accepted = f"numbers of steps from 0 to {count - 1}, or from the end: -1"
+        raise SceneError(f"found {say(numbers)}, accepted: {accepted}", ("steps",))
+    if steps is None and solution.scene.analysis.equilibria == "all":
+        first = count - number_of(solution, count - 1)
+        numbers = [*range(first + 1, count), first]
+    thinned = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_STEPS)).round().astype(int))
+    return [numbers[i] % count for i in thinned]

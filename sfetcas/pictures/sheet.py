@@ -1,0 +1,503 @@
+"""The sheet of a picture: axes, what is drawn on them, layout, and the places where labels hide least."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch, Patch, Polygon
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
+
+from ..description.structure import unit
+from ..mathematics.arrays import Array
+from .sketch import (
+    BEHIND,
+    LOAD,
+    MOTION,
+    REACTION,
+    REST,
+    SUPPORT,
+    Label,
+    Look,
+    Mark,
+    Sketch,
+    dense,
+    flat_unit,
+    norm,
+    prefix,
+    rounded,
+    thinned,
+)
+
+__all__ = ["DPI", "Colour", "Sheet", "sheet_of"]
+
+Colour = Literal["moment", "magnitude", "none"]
+DOTTED = (0, (1, 2))
+"""Of the undeformed structure; dashes are for what is unstable."""
+WIDTH, HEIGHT, DPI = 7.0, 5.0, 150
+MANY = 14
+"""Labels; of more than that, those with the same text as another are left out."""
+FONT = 9.0
+"""Height of labels, points."""
+
+SIGNED = LinearSegmentedColormap.from_list("signed", ["#5E1A70", "#9970AB", "#D8D8D8", "#5AAE61", "#126B33"])
+SIZES = LinearSegmentedColormap.from_list("sizes", ["#D8D8D8", "#7FBF9B", "#2A788E", "#404688", "#4B0C5C"])
+
+
+def sheet_of(sketch: Sketch, looks: Sequence[Look], colour: Colour) -> Sheet:
+    """A figure with axes, centre lines, colour bar, title and legend; :meth:`Sheet.finish` draws the sketch on it.
+
+    ``looks`` are those of the earlier lines and of the last.
+    """
+    figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
+    paper = figure.add_subplot()
+    axes = paper if sketch.view.angles is None else _space_axes(figure, paper, sketch)
+    if axes is paper:
+        _fill_plane(axes, sketch)
+    lines, values = _add_lines(axes, sketch, looks)
+    if values is not None:
+        _add_bar(figure, paper, lines, values, sketch, colour)
+    title = _title(sketch.scene.title)
+    if title:
+        figure.suptitle(title, fontsize=11, parse_math=False)
+    handles = _legend(sketch, looks)
+    if handles:
+        figure.legend(
+            handles=handles, loc="outside lower center", ncols=min(4, len(handles)), fontsize=8, frameon=False
+        )
+    return Sheet(figure, axes, paper, sketch)
+
+
+def _title(text: str) -> str:
+    """The title in up to three lines of about the same length; a white box for what the font does not have."""
+    font = get_font(findfont(FontProperties()))
+    known = " ".join("".join(c if c.isspace() or font.get_char_index(ord(c)) else "\ufffd" for c in text).split())
+    lines = math.ceil(len(known) / 68)
+    even = (textwrap.wrap(known, width) for width in range(max(20, len(known) // max(1, lines)), 69))
+    fitting = (wrapped for wrapped in even if len(wrapped) <= min(3, lines))
+    return "\n".join(next(fitting, textwrap.wrap(known, 68, max_lines=3, placeholder=" ...")))
+
+
+def _fill_plane(axes: Axes, sketch: Sketch) -> None:
+    flat = sketch.view.flat(sketch.course.everything)
+    middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    axes.set_xlim(middle[0] - sketch.size, middle[0] + sketch.size)
+    axes.set_ylim(middle[1] - sketch.size, middle[1] + sketch.size)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlabel(f"x, {sketch.course.letter}m")
+    axes.set_ylabel(f"y, {sketch.course.letter}m")
+    axes.grid(color="#EBEBEB", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def _space_axes(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
+    """Axes in space below the paper, on which marks and labels are drawn."""
+    assert sketch.view.angles is not None
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
+    paper.set_axis_off()
+    paper.set_zorder(axes.get_zorder() + 1)
+    axes.set_proj_type("ortho")
+    axes.view_init(*sketch.view.angles)
+    behind = [mark.points[np.isfinite(mark.points[:, 0])] for mark in sketch.marks if mark.level <= BEHIND]
+    shown = np.vstack([sketch.course.everything, *behind])
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    half = 0.52 * np.maximum(high - low, 0.3 * float((high - low).max()))
+    middle = 0.5 * (low + high)
+    axes.set(xlim=_interval(middle, half, 0), ylim=_interval(middle, half, 1), zlim=_interval(middle, half, 2))
+    for axis, letter in zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", strict=True):
+        axis.set_label_text(f"{letter}, {sketch.course.letter}m")
+        axis.set_rotate_label(False)
+        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
+        # Axes in space take no other word for the look of their grid.
+        axis._axinfo["grid"].update(color="#DCDCDC", linewidth=0.6)
+    axes.set_box_aspect(half)
+    return axes
+
+
+def _interval(middle: Array, half: Array, i: int) -> tuple[float, float]:
+    return (middle[i] - half[i], middle[i] + half[i])
+
+
+def _add_lines(axes: Any, sketch: Sketch, looks: Sequence[Look]) -> tuple[Any, Array | None]:
+    """Undeformed, earlier and last lines; the last ones, and the values (n,) N m to colour their pieces by."""
+    course, space = sketch.course, sketch.view.angles is not None
+
+    def add(lines: Sequence[Array], name: str, **style: Any) -> Any:
+        kind = Line3DCollection if space else LineCollection
+        found = kind(lines if space else [line[:, :2] for line in lines], gid=name, clip_on=not space, **style)
+        axes.add_collection(found, **({} if space else {"autolim": False}))
+        return found
+
+    add(course.rest, "undeformed", colors=REST, linewidths=1.2, linestyles=DOTTED, zorder=2)
+    for lines, look in zip(course.earlier, looks[:-1], strict=True):
+        add(lines, "earlier", colors=look.colour, linewidths=1.3, linestyles=look.dashes, zorder=2.5)
+    add(course.last, "outline", colors="#222222", linewidths=3.8, capstyle="round", zorder=3)
+    style: dict[str, Any] = {"linewidths": 2.4, "capstyle": "round", "zorder": 3.5}
+    if not course.values:
+        return add(course.last, "deformed", colors="#7F8FA6", **style), None
+    pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in course.last])
+    values = np.concatenate([0.5 * (value[:-1] + value[1:]) for value in course.values])
+    return add(list(pieces), "deformed", **style), values
+
+
+def _add_bar(figure: Figure, paper: Axes, lines: Any, values: Array, sketch: Sketch, colour: Colour) -> None:
+    """Colour the pieces by the values (n,) in N m, and say so in a colour bar from zero to the extremes."""
+    plane = sketch.view.angles is None
+    signed = plane and colour == "moment"
+    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+    largest = max(high, -low)
+    factor, letter = prefix(largest, 0.2)
+    lines.set(cmap=SIGNED if signed else SIZES, norm=Normalize(-largest / factor if signed else 0.0, largest / factor))
+    lines.set_array(values / factor)
+    bar = figure.colorbar(lines, ax=paper, shrink=0.85, aspect=32, pad=0.02)
+    bar.ax.set_ylim(low / factor, high / factor)
+    name = "bending moment about z" if signed else "bending moment" if colour == "moment" else "size of bending moment"
+    bar.set_label(f"{name}, {letter}N m")
+
+
+def _legend(sketch: Sketch, looks: Sequence[Look]) -> list[Any]:
+    """What the lines and arrows are; the last line only where there is something to say about it."""
+    handles: list[Any] = [Line2D([], [], color=REST, linewidth=1.2, linestyle=DOTTED, label="undeformed")]
+    said: dict[str, Any] = {}
+    for look, width in zip(looks, [*[1.3] * (len(looks) - 1), 3.0], strict=True):
+        said.setdefault(
+            look.text, Line2D([], [], color=look.colour, linewidth=width, linestyle=look.dashes, label=look.text)
+        )
+    said.pop("", None)
+    handles += said.values()
+    drawn = {mark.name.partition("-")[0] for mark in sketch.marks}
+    arrows = {"load": (LOAD, "load"), "reaction": (REACTION, "reaction"), "motion": (MOTION, "prescribed motion")}
+    for name, (colour, text) in arrows.items():
+        if name in drawn:
+            line = Line2D([], [], color=colour, marker=">", markersize=5, label=text)
+            line.set_linestyle(":" if name == "motion" else "-")
+            handles.append(line)
+    if "contact" in drawn:
+        handles.append(Patch(facecolor="white", edgecolor=SUPPORT, hatch="////", linewidth=0.7, label="obstacle"))
+    return handles
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """A text's place: centre and half its width and height, pixels."""
+
+    centre: Array
+    half: Array
+
+    @property
+    def corners(self) -> Array:
+        """(2, 2)."""
+        return np.array([self.centre - self.half, self.centre + self.half])
+
+    def holds(self, points: Array) -> Any:
+        """Which of the points (n, 2) are inside."""
+        return (np.abs(points - self.centre) < self.half).all(axis=1)
+
+    def meets(self, other: _Box) -> bool:
+        """Whether the boxes overlap."""
+        return bool((np.abs(self.centre - other.centre) < self.half + other.half).all())
+
+
+def _box_of(text: Text, margin: float = 0.0) -> _Box:
+    extent = text.get_window_extent()
+    low, high = np.array(extent.min), np.array(extent.max)
+    return _Box(0.5 * (low + high), 0.5 * (high - low) + margin)
+
+
+def _text_width(text: str) -> float:
+    """Estimated width of a label, points."""
+    return 0.6 * FONT * len(text.replace("$", ""))
+
+
+def _arrow(points: Array, mark: Mark, style: dict[str, Any]) -> FancyArrowPatch:
+    head = 7.0 + 2.5 * mark.width
+    look: dict[str, Any] = {
+        "arrowstyle": "-|>",
+        "mutation_scale": head,
+        "shrinkA": 0,
+        "shrinkB": 0,
+        "color": mark.colour,
+    }
+    look |= {"linewidth": mark.width, "linestyle": ":" if mark.dotted else "-", "joinstyle": "miter"}
+    return FancyArrowPatch(path=Outline(points), fill=True, **look, **style)
+
+
+@dataclass(eq=False)
+class Sheet:
+    """A figure with its axes, the same where marks are drawn on, and what is to be drawn."""
+
+    figure: Figure
+    axes: Any
+    paper: Axes
+    sketch: Sketch
+    zoom: float = 1.0
+
+    def finish(self) -> None:
+        """Fit the axes to all that is drawn, and draw it."""
+        for _ in range(4 if self.axes is self.paper else 6):
+            self.figure.draw_without_rendering()
+            self._fit()
+        self.figure.draw_without_rendering()
+        if self.axes is not self.paper:
+            self._hide_colliding()
+        for mark in self.sketch.marks:
+            self._draw(mark)
+        gravity = self._gravity()
+        for label, box in self._placed(gravity):
+            self._write(box.centre, label.text, label.colour, label.name)
+
+    def pixels(self, points: Array) -> Array:
+        """Places (n, 2) on the sheet of points (n, 3) in drawn units."""
+        return np.asarray(self.axes.transData.transform(self._projected(points)))
+
+    def _projected(self, points: Array) -> Array:
+        if self.axes is self.paper:
+            return points[:, :2]
+        x, y, _ = proj3d.proj_transform(*points.T, self.axes.get_proj())
+        return np.stack([np.asarray(x), np.asarray(y)], axis=1)
+
+    def _point(self) -> float:
+        return float(self.figure.dpi) / 72.0
+
+    def _size(self) -> float:
+        """Size of the picture in pixels."""
+        middle = self.sketch.course.everything[0]
+        ends = self.pixels(np.array([middle, middle + self.sketch.size * self.sketch.view.right]))
+        return norm(ends[1] - ends[0])
+
+    # -- layout -----------------------------------------------------------------------------------
+
+    def _content(self) -> Array:
+        """Corners (2, 2) in pixels of the structure, the marks and the labels."""
+        sketch = self.sketch
+        parts = [self.pixels(sketch.course.everything)]
+        parts += [self.pixels(mark.points[np.isfinite(mark.points).all(axis=1)]) for mark in sketch.marks]
+        parts += [box.corners for _, box in self._placed([], framed=False)]
+        pixels = np.vstack(parts)
+        margin = 9.0 * self._point()
+        return np.array([pixels.min(axis=0) - margin, pixels.max(axis=0) + margin])
+
+    def _fit(self) -> None:
+        content = self._content()
+        if self.axes is self.paper:
+            self._fit_plane(content)
+        else:
+            self._fit_space(content)
+
+    def _fit_plane(self, content: Array) -> None:
+        size = np.array(self.axes.get_position(original=True).size) * self.figure.bbox.size
+        half = 0.5 * size * float(((content[1] - content[0]) / size).max())
+        middle = content.mean(axis=0)
+        (left, low), (right, high) = self.axes.transData.inverted().transform([middle - half, middle + half])
+        self.axes.set_xlim(left, right)
+        self.axes.set_ylim(low, high)
+        ticks = MaxNLocator(nbins=10, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, max(right - left, 1.2 * (high - low)))
+        for axis in (self.axes.xaxis, self.axes.yaxis):
+            axis.set_major_locator(MultipleLocator(float(ticks[1] - ticks[0])))
+
+    def _fit_space(self, content: Array) -> None:
+        cell, renderer = self.paper.get_window_extent(), FigureCanvasAgg(self.figure).get_renderer()  # type: ignore[no-untyped-call]
+        limits = np.array([self.axes.get_xlim(), self.axes.get_ylim(), self.axes.get_zlim()])
+        ticks = [axis.get_tightbbox(renderer) for axis in self._axes_in_space()]
+        corners = self.pixels(np.array(list(itertools.product(*limits))))
+        low = np.min([content[0], corners.min(axis=0), *(box.min for box in ticks)], axis=0)
+        high = np.max([content[1], corners.max(axis=0), *(box.max for box in ticks)], axis=0)
+        self.zoom *= float((cell.size / (high - low)).min())
+        self.axes.set_box_aspect(limits @ [-0.5, 0.5], zoom=self.zoom)
+        left, bottom, width, height = self.axes.get_position(original=True).bounds
+        shift = (0.5 * (cell.min + cell.max - low - high)) / self.figure.bbox.size
+        self.axes.set_position((left + shift[0], bottom + shift[1], width, height))
+        for axis in self._axes_in_space():
+            self._space_out(axis)
+
+    def _axes_in_space(self) -> tuple[Any, Any, Any]:
+        return self.axes.xaxis, self.axes.yaxis, self.axes.zaxis
+
+    def _space_out(self, axis: Any) -> None:
+        """Ticks some way apart; their labels, and that of the axis, at a fixed distance of the axis on the sheet."""
+        line = self.axes.transData.transform(np.stack(axis.line.get_data(), axis=1))
+        length, point = np.abs(line[1] - line[0]), self._point()
+        width = 6.5 * max([4, *(len(label.get_text()) for label in self._tick_labels(axis))])
+        # Labels along the axis are apart when they are either beside or above each other.
+        bins = min(6, max(1, int((length / (point * np.array([width + 10.0, 20.0]))).max())))
+        axis.set_major_locator(MaxNLocator(nbins=bins, steps=[1, 2, 2.5, 5, 10], min_n_ticks=min(2, bins)))
+        off = self.axes.transData.transform(axis.label.get_position()) - line.mean(axis=0)
+        across = np.abs(off) / norm(off)
+        tick = 5.0 + float(across @ [0.48 * width, 5.0])
+        per_pad = norm(off) / (point * (axis.labelpad + 21.0))
+        axis.set_tick_params(pad=tick / per_pad - 8.0)
+        axis.labelpad = (2.0 * tick + float(across @ [24.0, 8.0])) / per_pad - 21.0
+
+    # -- marks ------------------------------------------------------------------------------------
+
+    def _draw(self, mark: Mark) -> None:
+        if mark.level <= BEHIND and self.axes is not self.paper:
+            return self._draw_behind(mark)
+        points = self._projected(mark.points)
+        style: dict[str, Any] = {
+            "transform": self.axes.transData,
+            "zorder": mark.level,
+            "gid": mark.name,
+            "clip_on": False,
+        }
+        if mark.kind == "area":
+            patch = Polygon(points, facecolor=mark.fill, edgecolor=mark.colour, linewidth=mark.width, **style)
+            self.paper.add_patch(patch)
+        elif mark.kind == "arrow":
+            self.paper.add_patch(_arrow(points, mark, style))
+        else:
+            if mark.kind == "dot":
+                style |= {"marker": "o", "markersize": 5.5, "markerfacecolor": mark.fill}
+            line = Line2D(points[:, 0], points[:, 1], color=mark.colour, linewidth=mark.width, **style)
+            self.paper.add_line(line)
+
+    def _draw_behind(self, mark: Mark) -> None:
+        """Draw among the lines in space, which the paper is in front of."""
+        style: dict[str, Any] = {"zorder": mark.level, "gid": mark.name, "clip_on": False, "linewidth": mark.width}
+        if mark.kind == "area":
+            area = Poly3DCollection([mark.points], facecolor=mark.fill, edgecolor=mark.colour, **style)
+            self.axes.add_collection3d(area, autolim=False)
+        else:
+            self.axes.plot(*mark.points.T, color=mark.colour, **style)
+
+    def _gravity(self) -> list[_Box]:
+        """Draw gravity in the corner that is the emptiest; what it covers."""
+        gravity = self.sketch.scene.gravity
+        factor = self.sketch.step.factor
+        if gravity is None or not any(gravity) or factor == 0.0:
+            return []
+        text, point = f"gravity {rounded(abs(factor) * norm(gravity)):g} m/s²", self._point()
+        half = np.array([0.5 * _text_width(text) + 4.0, 28.0]) * point
+        box = min(self._corners(half), key=lambda corner: int(corner.holds(self._crowd()[0]).sum()))
+        direction = flat_unit(self.sketch.view.flat(math.copysign(1.0, factor) * np.array(unit(gravity))), (0.0, -1.0))
+        middle = box.centre + np.array([0.0, 7.0 * point])
+        ends = np.array([middle - 17.0 * point * direction, middle + 17.0 * point * direction])
+        points = self.paper.transAxes.inverted().transform(ends)
+        mark = Mark(kind="arrow", points=points, name="gravity", colour=LOAD, width=1.8)
+        self.paper.add_patch(_arrow(points, mark, {"transform": self.paper.transAxes, "gid": "gravity", "zorder": 7.0}))
+        self._write(box.centre - np.array([0.0, 20.0 * point]), text, LOAD, "gravity")
+        return [box]
+
+    def _corners(self, half: Array) -> Iterator[_Box]:
+        frame = self.paper.get_window_extent()
+        margin = half + 4.0 * self._point()
+        for x in (frame.x1 - margin[0], frame.x0 + margin[0]):
+            for y in (frame.y1 - margin[1], frame.y0 + margin[1]):
+                yield _Box(np.array([x, y]), half)
+
+    # -- labels -----------------------------------------------------------------------------------
+
+    def _write(self, centre: Array, text: str, colour: str, name: str) -> None:
+        x, y = self.paper.transAxes.inverted().transform(centre)
+        style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": FONT, "zorder": 9.0, "gid": name}
+        style |= {"color": colour, "path_effects": [withStroke(linewidth=2.0, foreground="white")]}
+        self.paper.text(x, y, text, transform=self.paper.transAxes, **style).set_in_layout(False)
+
+    def _crowd(self) -> tuple[Array, Array]:
+        """Samples (n, 2) in pixels of what labels should not hide, and how bad it is to hide one (n,)."""
+        sketch, spacing = self.sketch, 3.0 * self._point()
+        earlier = [line for lines in sketch.course.earlier for line in lines]
+        kinds = [
+            (1.0, [self.pixels(line) for line in (*sketch.course.rest, *earlier)]),
+            (2.5, [self.pixels(line) for line in sketch.course.last]),
+            (1.5, [self.axes.transData.transform(line) for line in self._axis_lines()]),
+            (4.0, [self.pixels(mark.points) for mark in sketch.marks if mark.level > BEHIND]),
+            (0.5, [self.pixels(mark.points) for mark in sketch.marks if mark.level <= BEHIND]),
+        ]
+        parts = [
+            (cost, thinned(np.vstack([dense(line, spacing) for line in lines]), spacing))
+            for cost, lines in kinds
+            if lines
+        ]
+        return np.vstack([part for _, part in parts]), np.concatenate(
+            [np.full(len(part), cost) for cost, part in parts]
+        )
+
+    def _axis_lines(self) -> list[Array]:
+        if self.axes is self.paper:
+            return []
+        return [np.stack(axis.line.get_data(), axis=1) for axis in self._axes_in_space()]
+
+    def _tick_labels(self, axis: Any) -> list[Text]:
+        """Those that were drawn last; asking the axis itself would move them."""
+        low, high = sorted(axis.get_view_interval())
+        ticks = axis.majorTicks[: len(axis.get_majorticklocs())]
+        return [tick.label1 for tick in ticks if low <= tick.get_loc() <= high and tick.label1.get_visible()]
+
+    def _writings(self) -> list[_Box]:
+        """Boxes of the tick labels and axis labels in space, which are among the lines."""
+        if self.axes is self.paper:
+            return []
+        texts = [text for axis in self._axes_in_space() for text in (axis.label, *self._tick_labels(axis))]
+        return [_box_of(text) for text in texts]
+
+    def _hide_colliding(self) -> None:
+        """Hide tick labels in space over others or close to those of another axis, sooner on an axis that has many."""
+        shown: list[_Box] = []
+        for labels in sorted(map(self._tick_labels, self._axes_in_space()), key=len):
+            own: list[_Box] = []
+            for label in labels:
+                box, tight = _box_of(label, 2.0 * self._point()), _box_of(label, -1.0 * self._point())
+                label.set_visible(not any(box.meets(other) for other in shown) and not any(map(tight.meets, own)))
+                own += [tight] if label.get_visible() else []
+            shown += own
+
+    def _placed(self, taken: Sequence[_Box], *, framed: bool = True) -> list[tuple[Label, _Box]]:
+        """The labels in turn where they hide least, and within the frame where there is one; of many alike one."""
+        cell = self.paper.get_window_extent()
+        frame = (
+            np.array([cell.min, cell.max]) if framed and self.axes is self.paper else np.array([[-np.inf], [np.inf]])
+        )
+        labels, crowd, found = self.sketch.labels, self._crowd(), []
+        boxes = [*taken, *self._writings()]
+        if len(labels) > MANY:
+            labels = list({(label.text, label.colour): label for label in reversed(labels)}.values())[::-1]
+        for label in labels:
+            choices = [
+                (cost + self._cost(box, crowd, boxes, frame), i, box)
+                for i, (cost, box) in enumerate(self._choices(label))
+            ]
+            box = min(choices)[2]
+            boxes.append(box)
+            found.append((label, box))
+        return found
+
+    def _cost(self, box: _Box, crowd: tuple[Array, Array], boxes: Sequence[_Box], frame: Array) -> float:
+        low, high = box.corners
+        outside = bool((low < frame[0]).any() or (high > frame[1]).any())
+        met = sum(box.meets(other) for other in boxes)
+        return float(crowd[1][box.holds(crowd[0])].sum()) + 80.0 * met + 40.0 * outside
+
+    def _choices(self, label: Label) -> Iterator[tuple[float, _Box]]:
+        """Places round the anchor, the preferred ones first and cheap."""
+        point, half = self._point(), self._half(label.text)
+        anchor, clear = self.pixels(label.anchor[None, :])[0], label.gap * self._size()
+        preferred = math.atan2(label.away[1], label.away[0])
+        for ring in (0, 1, 2):
+            for turn in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6):
+                angle = preferred + turn * math.pi / 6.0
+                towards = np.array([math.cos(angle), math.sin(angle)])
+                reach = float(np.abs(towards) @ half) * (1.0 - 0.25 * abs(math.sin(2.0 * angle)))
+                gap = clear + (2.0 + 9.0 * ring) * point
+                yield 0.3 * abs(turn) + 4.0 * ring, _Box(anchor + (reach + gap) * towards, half)
+
+    def _half(self, text: str) -> Array:
+        return np.array([0.5 * _text_width(text) + 1.0, 0.7 * FONT]) * self._point()

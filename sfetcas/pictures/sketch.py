@@ -1,0 +1,355 @@
+"""What a picture of an answer shows, before any of it is drawn: sampled centre lines, marks and labels in fixed axes.
+
+Lengths are in drawn units, metres with an SI prefix, from the sampling on; ``flat`` coordinates (n, 2) are those
+in the plane of the picture, which is x-y or faces the viewer.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..equilibria.solution import Equilibrium
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+
+__all__ = [
+    "BEHIND",
+    "LOAD",
+    "MOTION",
+    "REACTION",
+    "REST",
+    "SUPPORT",
+    "Course",
+    "Ink",
+    "Label",
+    "Look",
+    "Mark",
+    "Sketch",
+    "View",
+    "amount",
+    "broken",
+    "course_of",
+    "dense",
+    "flat_unit",
+    "in_short",
+    "left_of",
+    "norm",
+    "prefix",
+    "rounded",
+    "tangents_of",
+    "thinned",
+    "view_of",
+]
+
+LOAD, REACTION, MOTION = "#D55E00", "#0072B2", "#8F3B76"
+REST, SUPPORT = "#8C8C8C", "#333333"
+BEHIND = 1.5
+"""Level of marks that are drawn behind the structure, also in space."""
+PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T", 15: "P"}
+
+
+def rounded(value: float) -> float:
+    """A value in three digits."""
+    return float(f"{value:.3g}")
+
+
+def in_short(factor: float) -> str:
+    """A factor in up to four digits."""
+    return f"{float(f'{factor:.4g}'):g}"
+
+
+def prefix(value: float, least: float = 0.1) -> tuple[float, str]:
+    """Factor and letter of the SI prefix for a value: none from ``least`` to 9999, a power of ten beyond all."""
+    value = abs(value)
+    if value == 0.0 or least <= value < 1e4:
+        return 1.0, ""
+    power = 3 * math.floor(math.log10(value / (least if value < least else 1.0)) / 3.0)
+    return 10.0**power, PREFIXES.get(power, f"$10^{{{power}}}$ ")
+
+
+def amount(value: float, name: str) -> str:
+    """A value with its unit in three digits, as ``1.5 kN``."""
+    value = rounded(abs(value))
+    factor, letter = prefix(value)
+    return f"{rounded(value / factor):g} {letter}{name}"
+
+
+# The centre lines
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Sampled centre lines, each (n, 3) in drawn units.
+
+    Attributes
+    ----------
+    unit, letter : m, and the SI prefix of the drawn unit
+    members : names, in the order of the lists
+    rest, last : undeformed, and of the last step
+    earlier : the same of the earlier steps, step by step
+    values : (n,) N m along the lines of ``last``; empty where nothing is to be coloured
+    """
+
+    unit: float
+    letter: str
+    members: tuple[str, ...]
+    rest: list[Array]
+    last: list[Array]
+    earlier: list[list[Array]]
+    values: list[Array]
+
+    @functools.cached_property
+    def everything(self) -> Array:
+        """All samples, (n, 3)."""
+        return np.vstack([*self.rest, *self.last, *(line for lines in self.earlier for line in lines)])
+
+
+def course_of(scene: Scene, steps: Sequence[Equilibrium], colour: str) -> Course:
+    """Sampled centre lines of the undeformed scene and of equilibria, the last with values to colour by."""
+    names = tuple(scene.members)
+    last = {name: steps[-1].along(name, _samples(steps[-1], name)) for name in names}
+    deformed = [last[name]["position"] for name in names]
+    rest = [scene.center_lines[name].positions(_samples(steps[-1], name)) for name in names]
+    earlier = [[step.along(name, _samples(step, name))["position"] for name in names] for step in steps[:-1]]
+    extent = max(float(np.ptp(np.vstack(lines), axis=0).max()) for lines in (rest, deformed, *earlier))
+    unit, letter = prefix(extent, 0.2)
+    values = [_bending(steps[-1], name, last[name], colour) for name in names] if colour != "none" else []
+    if values and max(float(np.abs(value).max()) for value in values) <= _noise(steps[-1], last.values()):
+        values = []
+    scaled = [[line / unit for line in lines] for lines in (rest, deformed, *earlier)]
+    return Course(unit, letter, names, scaled[0], scaled[1], scaled[2:], values)
+
+
+def _samples(step: Equilibrium, member: str) -> Array:
+    """Fractions of the length where a member is drawn: at least 101, a step turning by 0.05 rad at most."""
+    line = step.model.scene.center_lines[member]
+    tangents = tangents_of(step, member, step.model.along(member))
+    turned = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
+    turning = float((2.0 * np.arcsin(np.clip(0.5 * turned, 0.0, 1.0))).sum())
+    return np.linspace(0.0, 1.0, 1 + min(20_000, max(100, math.ceil(max(turning, line.turning) / 0.05))))
+
+
+def tangents_of(step: Equilibrium, member: str, x: Array) -> Array:
+    """Unit tangents (n, 3) at fractions (n,) of the length of a deformed member, fixed axes."""
+    rest = step.model.scene.center_lines[member].tangents(x)
+    return quaternion.rotate(step.along(member, x)["quaternion"], rest)
+
+
+def _bending(step: Equilibrium, member: str, fields: dict[str, Array], colour: str) -> Array:
+    """Bending moment (n,) in N m: about z with its sign, or the magnitude of what is across the tangent."""
+    moment = fields["moment"]
+    if not step.model.space:
+        return moment[:, 2] if colour == "moment" else np.abs(moment[:, 2])
+    tangents = tangents_of(step, member, np.linspace(0.0, 1.0, len(moment)))
+    twist = np.einsum("ni,ni->n", moment, tangents)
+    return np.asarray(np.linalg.norm(moment - twist[:, None] * tangents, axis=1))
+
+
+def _noise(step: Equilibrium, fields: Iterable[dict[str, Array]]) -> float:
+    """Moments up to this many N m are rounding."""
+    scales = step.model.scales
+    largest = max(float(np.linalg.norm(field["force"], axis=1).max()) for field in fields)
+    return max(1e-9 * largest * scales.length, 1e-12 * scales.moment)
+
+
+# The point of view
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Directions (3,) to the right and up in the picture; elevation and azimuth in degrees in space."""
+
+    right: Array
+    up: Array
+    angles: tuple[float, float] | None = None
+
+    def flat(self, points: Any) -> Array:
+        """Points or vectors (..., 3) in the plane of the picture, (..., 2)."""
+        return np.asarray(np.asarray(points, float) @ np.stack([self.right, self.up], axis=1))
+
+    def raised(self, points: Any) -> Array:
+        """Vectors (..., 2) of the plane of the picture in fixed axes, (..., 3)."""
+        return np.asarray(np.asarray(points, float) @ np.stack([self.right, self.up]))
+
+
+def view_of(space: bool, lines: Sequence[Array]) -> View:
+    """The plane; in space that of some usual views which shows the lines the broadest."""
+    if not space:
+        return View(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    points = np.vstack([line[:: max(1, len(line) // 100)] for line in lines])
+    views = [_from(elevation, azimuth) for elevation in (22, 32) for azimuth in (-60, -45, -30, -120, -135, -150)]
+    return max(views, key=lambda view: _breadth(view.flat(points - points.mean(axis=0))))
+
+
+def _from(elevation: float, azimuth: float) -> View:
+    e, a = math.radians(elevation), math.radians(azimuth)
+    right = np.array([-math.sin(a), math.cos(a), 0.0])
+    up = np.array([-math.sin(e) * math.cos(a), -math.sin(e) * math.sin(a), math.cos(e)])
+    return View(right, up, (elevation, azimuth))
+
+
+def _breadth(flat: Array) -> float:
+    values = np.linalg.eigvalsh(flat.T @ flat)
+    # The shorter direction counts most; equal views are decided by the order, also after rounding.
+    return rounded(float(values[0] + 0.05 * values[1]))
+
+
+# What is sketched: marks and labels
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the lines of an equilibrium look, and what the legend says of them: nothing where ``text`` is empty."""
+
+    colour: str
+    dashes: Any
+    text: str
+
+
+@dataclass(frozen=True)
+class Ink:
+    """How the arrow of a load, a reaction or a motion looks; its name finds it again in the figure."""
+
+    name: str
+    colour: str
+    width: float
+    dotted: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mark:
+    """A drawn thing: ``line``, ``area``, ``arrow`` (head at the last point) or ``dot``; points (n, 3)."""
+
+    kind: Literal["line", "area", "arrow", "dot"]
+    points: Array
+    name: str
+    colour: str
+    width: float = 1.0
+    fill: str = "white"
+    dotted: bool = False
+    level: float = 6.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Label:
+    """A text beside an anchor (3,), in some direction ``away`` (2,) by preference, at least ``gap`` off."""
+
+    anchor: Array
+    away: Array
+    text: str
+    colour: str
+    name: str
+    gap: float = 0.0
+
+
+@dataclass(eq=False)
+class Sketch:
+    """Marks and labels of one equilibrium, and what they must not hide."""
+
+    scene: Scene
+    step: Equilibrium
+    course: Course
+    view: View
+    marks: list[Mark] = field(default_factory=list)
+    labels: list[Label] = field(default_factory=list)
+
+    @functools.cached_property
+    def size(self) -> float:
+        """Diagonal of what is drawn of the structure in the plane of the picture, drawn units."""
+        return float(np.hypot(*np.ptp(self.view.flat(self.course.everything), axis=0)))
+
+    @functools.cached_property
+    def lines(self) -> Array:
+        """Flat samples (n, 2) of the structure, undeformed and deformed."""
+        lines = [self.view.flat(line) for line in (*self.course.rest, *self.course.last)]
+        return thinned(np.vstack([dense(line, 0.005 * self.size) for line in lines]), 0.005 * self.size)
+
+    @property
+    def crowd(self) -> Array:
+        """Flat samples (n, 2) of all that is sketched so far."""
+        return np.vstack([self.lines, *(dense(self.view.flat(mark.points), 0.01 * self.size) for mark in self.marks)])
+
+    def at(self, node: str) -> Array:
+        """Place of a node (3,), drawn units."""
+        return self.step.position(node) / self.course.unit
+
+    def along(self, member: str, x: Array) -> Array:
+        """Places (n, 3) along a deformed member, drawn units."""
+        return self.step.along(member, x)["position"] / self.course.unit
+
+    def line(self, points: Array, name: str, *, colour: str = SUPPORT, width: float = 1.2, level: float = 5.0) -> None:
+        """Sketch a polyline (n, 3)."""
+        self.marks.append(Mark(kind="line", points=points, name=name, colour=colour, width=width, level=level))
+
+    def area(self, points: Array, name: str, fill: str = "white", level: float = 5.0) -> None:
+        """Sketch a polygon (n, 3)."""
+        mark = Mark(kind="area", points=points, name=name, colour=SUPPORT, width=1.2, fill=fill, level=level)
+        self.marks.append(mark)
+
+    def dot(self, point: Array, name: str, fill: str = "white") -> None:
+        """Sketch a small circle at (3,)."""
+        mark = Mark(kind="dot", points=point[None, :], name=name, colour=SUPPORT, fill=fill, level=8.0)
+        self.marks.append(mark)
+
+    def arrow(self, points: Array, ink: Ink) -> None:
+        """Sketch an arrow along a polyline (n, 3)."""
+        look: dict[str, Any] = {"name": ink.name, "colour": ink.colour, "width": ink.width, "dotted": ink.dotted}
+        self.marks.append(Mark(kind="arrow", points=points, level=7.0, **look))
+
+    def label(self, text: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
+        """Ask for a text."""
+        label = Label(anchor=anchor, away=away, text=text, colour=ink.colour, name=ink.name, gap=gap)
+        self.labels.append(label)
+
+    def leaving(self, node: str) -> Array:
+        """Unit tangents (k, 3) of the members that end at a node, out of it."""
+        found = []
+        for name, member in self.scene.members.items():
+            if node in member.nodes:
+                first, last = tangents_of(self.step, name, np.array([0.0, 1.0]))
+                found.append(first if member.nodes[0] == node else -last)
+        return np.array(found)
+
+
+def norm(vector: Any) -> float:
+    """Length of a vector of any size."""
+    return math.hypot(*vector)
+
+
+def left_of(flat: Array) -> Array:
+    """A flat vector turned left by a right angle."""
+    return np.array([-flat[1], flat[0]])
+
+
+def flat_unit(flat: Array, otherwise: tuple[float, float]) -> Array:
+    """Unit vector along a flat one; that of ``otherwise`` where it is seen end-on."""
+    length = norm(flat)
+    return flat / length if length > 0.05 else np.array(otherwise)
+
+
+def broken(*lines: Array) -> Array:
+    """Polylines (n, k) as one, with a row of nan after each."""
+    return np.vstack([part for line in lines for part in (line, np.full((1, line.shape[1]), np.nan))])
+
+
+def dense(flat: Array, spacing: float) -> Array:
+    """Samples (n, 2) of a flat polyline that may be broken by nan."""
+    finite = np.isfinite(flat.sum(axis=1))
+    whole = finite[:-1] & finite[1:]
+    first, steps = flat[:-1][whole], np.diff(flat, axis=0)[whole]
+    counts = 1 + np.minimum(200, np.hypot(*steps.T) / spacing).astype(int)
+    piece = np.repeat(np.arange(len(first)), counts)
+    share = (np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[piece]
+    return np.vstack([flat[finite], first[piece] + share[:, None] * steps[piece]])
+
+
+def thinned(flat: Array, spacing: float) -> Array:
+    """One place (m, 2) for all samples (n, 2) in the same square of this width."""
+    return np.asarray(np.unique((flat / spacing).round(), axis=0) * spacing)

@@ -1,0 +1,343 @@
+"""Following a curve of equilibria by its arc length, through limit points.
+
+The unknowns are those of the stationarity equations and the factor of loads and motions.  A step goes along the
+tangent, bent as the last two tangents say, and returns to the equilibria across it: Newton's method with one more
+row, which holds what is left across the tangent.  The length of a step is measured in the root mean square of
+the rotations, rad, and in the factor over a unit, so that it does not depend on the mesh.
+
+Multipliers take no part in lengths: where a structure carries more load without moving, only the factor counts.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Point, State
+from ..mechanics.loading import Loading
+from .newton import DUAL, PROXIMAL, ROUNDING, relative_residual
+from .prepared import Prepared
+from .stability import LIGHT, Inertia
+
+__all__ = ["Curve", "Standing", "Tangent"]
+
+TOLERANCE = 1e-12
+"""Relative residual that counts as converged; one more iteration is made while it gains."""
+
+PASSING = 1e-10
+"""The same for points in passing, which nobody asked for by name."""
+
+ITERATIONS = 10
+"""Newton iterations of a step at most."""
+
+TURN = 0.6
+"""No node turns by more than this, rad, in the corrections of a step."""
+
+FIRMER = 1e3
+"""Times the weight of the proximal term for a second attempt between two points of the curve."""
+
+DOUBT = 30.0
+"""A load of size one that moves more than this may meet an eigenvalue that vanishes: one of 1e-7 answers 1e5 times."""
+
+SHORT = 0.01
+"""Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its shape."""
+
+HELD = 1e-3
+"""Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
+
+NEUTRAL_FIRM = 1e3
+"""Times the weight of the proximal term along neutral directions: rounding of 1e-14 then leads 1e-7 rad along them."""
+
+HISTORY = 1e-5
+"""Share of the unit of the factor over which loads with histories are differenced: second order, so 1e-10."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Direction of the curve, of length one: rates of the unknowns and multipliers, and of the factor."""
+
+    z: Array
+    factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A point of the curve.
+
+    Attributes
+    ----------
+    state, factor, loading, point
+        The equilibrium and the equations there.
+    tangent : Tangent
+    arc : float
+        Arc length from the start of the curve.
+    iterations : int
+        Newton iterations that led here.
+    prepared : Prepared
+    doubtful : bool
+        Whether an eigenvalue may vanish: something answers more than usual.
+    """
+
+    state: State
+    factor: float
+    loading: Loading
+    point: Point
+    tangent: Tangent
+    arc: float
+    iterations: int
+    prepared: Prepared
+    doubtful: bool
+
+    @functools.cached_property
+    def inertia(self) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues of the energy on the closings."""
+        return self.prepared.inertia(self.point, doubtful=self.doubtful)
+
+
+class Curve:
+    """The equilibria of a model as a curve over a factor.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    unit : float
+        Change of the factor that counts as much as a radian.
+    piece : tuple of float
+        Factors between which no history has a knot.
+    """
+
+    def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
+        self.prepared, self.unit, self.piece, self.firm = prepared, unit, piece, 1.0
+        equations = prepared.equations
+        self.equations, self.model = equations, prepared.model
+        turning = equations.turning_unknowns
+        self.weight = np.zeros(equations.total)
+        lengths = sum(line.length for line in prepared.model.scene.center_lines.values())
+        self.weight[:turning] = equations.mass * prepared.model.scales.length / lengths
+        self.weight[equations.elastic_displacements] = LIGHT
+        self._turning, self._proximal = turning, PROXIMAL * prepared.weight
+        self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
+        self._driven = any(np.any(group.turn) for group in self.model.groups.values())
+        self._linear = set(self.model.groups) == {None}
+
+    def within(self, piece: tuple[float, float]) -> Curve:
+        """The same curve between two factors."""
+        there = copy.copy(self)
+        there.piece = piece
+        return there
+
+    def firmer(self) -> Curve:
+        """The same curve where a direction is neutral all along it: rounding must not lead far astray there."""
+        there = copy.copy(self)
+        there.firm = NEUTRAL_FIRM
+        return there
+
+    # -- lengths --------------------------------------------------------------------------------
+
+    def inner(self, a: Tangent, b: Tangent) -> float:
+        """Inner product of two directions."""
+        return float(a.z @ (self.weight * b.z)) + a.factor * b.factor / self.unit**2
+
+    def normed(self, direction: Tangent) -> Tangent:
+        """The direction with length one."""
+        length = np.sqrt(self.inner(direction, direction))
+        return Tangent(direction.z / length, direction.factor / length)
+
+    # -- derivative by the factor ---------------------------------------------------------------
+
+    def held(self, state: State, loading: Loading) -> State:
+        """The state with held rotations where the motions want them."""
+        return self.equations.holding(state, loading) if self._driven else state
+
+    def loading(self, factor: float) -> Loading:
+        """Loads and motions at a factor; beyond the piece as they would go on without the knot at its end."""
+        within = min(max(factor, self.piece[0]), self.piece[1])
+        there = self.model.loading(within)
+        return there if within == factor else there.plus(self.rate(within).scaled(factor - within))
+
+    def rate(self, factor: float) -> Loading:
+        """Change of loads and motions with the factor; at a knot of a history, on the side of the piece."""
+        if self._linear:
+            return self.model.groups[None]
+        low, high = self.piece
+        h = min(HISTORY * self.unit, 0.25 * (high - low))
+        middle = min(max(factor, low + h), high - h)
+        after, before = self.model.loading(middle + h), self.model.loading(middle - h)
+        return after.plus(before.scaled(-1.0)).scaled(0.5 / h)
+
+    def slope(self, state: State, factor: float, point: Point) -> Array:
+        """Derivative of the residual by the factor at a state.
+
+        Exact but for the turns of held nodes, which enter by fourth order differences.
+        """
+        rate = self.rate(factor)
+
+        def residual(w: float) -> Array:
+            there = self.loading(factor).plus(rate.scaled(w))
+            return self.equations.at(self.equations.holding(state, there), there).residual
+
+        turning, nodal = self._steady if self._linear else _kind(rate)
+        if turning == 0.0 and nodal:
+            return self.equations.slope(point, rate)
+        if turning == 0.0:
+            return np.asarray((residual(self.unit) - point.residual) / self.unit)
+        h = min(self.unit, HELD / turning)
+        a, b = ((residual(w) - residual(-w)) / (2.0 * w) for w in (h, 2.0 * h))
+        return np.asarray((4.0 * a - b) / 3.0)
+
+    @functools.cached_property
+    def _steady(self) -> tuple[float, bool]:
+        """What :func:`_kind` says where no history changes it."""
+        return _kind(self.model.groups[None])
+
+    # -- points ---------------------------------------------------------------------------------
+
+    def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
+        """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
+        entries = point.entries.copy()
+        entries[self._diagonal[0]] += max(firm, self.firm) * self._proximal
+        entries[self._diagonal[1]] -= DUAL
+        self.equations.solver.factor(entries)
+        return self.equations.solver.solve(right)
+
+    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> tuple[Tangent, bool]:
+        """Direction of the curve at a state, to the side of another, and whether an eigenvalue may vanish there."""
+        try:
+            both = self.solved(point, np.column_stack([-self.slope(state, factor, point), self._probe]))
+        except np.linalg.LinAlgError:
+            return along, True
+        if not np.all(np.isfinite(both)):
+            return along, True
+        rate, answer = both[: len(self.weight), 0], both[: self._turning, 1]
+        found = self.normed(Tangent(rate, 1.0))
+        doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
+        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor), doubtful
+
+    @functools.cached_property
+    def _probe(self) -> Array:
+        """A load of size one that has a share in every shape: where an eigenvalue vanishes it moves much."""
+        weight, probe = self.prepared.weight, np.zeros(self.equations.total)
+        shape = np.random.default_rng(0).standard_normal(self._turning)
+        probe[: self._turning] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), 1e-300))
+        return probe
+
+    def standing(
+        self, state: State, factor: float, along: Tangent, *, arc: float = 0.0, iterations: int = 0
+    ) -> Standing:
+        """Everything that is known of an equilibrium on the curve."""
+        loading = self.loading(factor)
+        point = self.equations.at(state, loading)
+        tangent, doubtful = self.tangent(state, factor, point, along)
+        return Standing(state, factor, loading, point, tangent, arc, iterations, self.prepared, doubtful)
+
+    def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
+        """State and factor a length along the tangent, bent by the rate of the tangent over the arc."""
+        z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
+        if bend is not None:
+            z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
+        return self.held(self.equations.moved(start.state, z), self.loading(factor)), factor
+
+    def corrected(
+        self,
+        state: State,
+        factor: float,
+        across: Tangent,
+        arc: float = 0.0,
+        *,
+        firm: float = 1.0,
+        sharp: bool = True,
+    ) -> Standing | None:
+        """The equilibrium that lies across a direction from a state near the curve; None where none is found.
+
+        With a ``firm`` proximal term directions that the equations leave open stay as they are; a ``sharp`` one is
+        iterated to rounding.
+        """
+        equations, n = self.equations, self._turning
+        row = self.weight * across.z
+        loading = self.loading(factor)
+        state = self.held(state, loading)
+        point = equations.at(state, loading)
+        residual, last, turned = relative_residual(equations, point), np.inf, 0.0
+        for count in range(ITERATIONS):
+            if count and (residual <= ROUNDING if sharp else self._passes(point, residual)):
+                break
+            try:
+                right = np.column_stack([-point.residual, -self.slope(state, factor, point)])
+                both = self.solved(point, right, firm)
+            except np.linalg.LinAlgError:
+                return None
+            base, rate = both[:, 0], both[:, 1]
+            change = -float(row @ base) / (float(row @ rate) + across.factor / self.unit**2)
+            step = base + change * rate
+            length = float(np.abs(step[:n]).max(initial=0.0))
+            turned += length
+            if (
+                not np.isfinite(length + change)
+                or turned > TURN
+                or (count and residual > 1e-9 and length > max(last, SHORT))
+            ):
+                return None
+            last = length
+            loading = self.loading(factor + change)
+            trial = self.held(equations.moved(state, step), loading)
+            there = equations.at(trial, loading)
+            gained = relative_residual(equations, there)
+            if residual <= TOLERANCE and gained > 0.25 * residual and count:
+                break
+            state, factor, point, residual = trial, factor + change, there, gained
+            if not np.isfinite(residual):
+                return None
+        if not (residual <= TOLERANCE or (not sharp and self._passes(point, residual))):
+            return None
+        tangent, doubtful = self.tangent(state, factor, point, across)
+        loading = self.loading(factor)
+        return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
+
+    def _passes(self, point: Point, residual: float) -> bool:
+        """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
+        gaps = float(np.abs(point.residual[self.equations.unknowns :]).max(initial=0.0))
+        return residual <= PASSING and gaps <= TOLERANCE
+
+    def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
+        """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there.
+
+        ``most``: largest turn of a node (rad) from there.
+        """
+        found = self.prepared.correct(near.state, self.loading(factor), firm=self.firm, most=most)
+        if not found.converged or self.prepared.distance(found.state, near.state) > most:
+            return None
+        return self.standing(found.state, factor, near.tangent, arc=near.arc)
+
+    # -- between two points ---------------------------------------------------------------------
+
+    def between(self, a: Standing, b: Standing) -> Callable[[float], Standing | None]:
+        """The curve from one of its points to the next as a function of the way along the first tangent."""
+        bend = self.bend(a, b)
+        if bend is not None:
+            along = self.inner(bend, a.tangent)
+            bend = Tangent(bend.z - along * a.tangent.z, bend.factor - along * a.tangent.factor)
+
+        def at(length: float) -> Standing | None:
+            near = self.predicted(a, length, bend)
+            found = self.corrected(*near, a.tangent, a.arc + length)
+            # Where the proximal term happens to make the matrix singular, a firmer one does not.
+            return found or self.corrected(*near, a.tangent, a.arc + length, firm=FIRMER)
+
+        return at
+
+    def bend(self, a: Standing, b: Standing) -> Tangent | None:
+        """Rate of the tangent over the arc, from two points."""
+        arc = b.arc - a.arc
+        if arc == 0.0:
+            return None
+        return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
+
+
+def _kind(rate: Loading) -> tuple[float, bool]:
+    """Largest angle or travel of driven nodes and joints, and whether there is nothing but nodal loads and motions."""
+    return max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven), rate.nodal

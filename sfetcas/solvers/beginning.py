@@ -1,0 +1,94 @@
+"""Where paths begin: at factor 0, or beside it where straight members have no slack to begin with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..mechanics.equations import State
+from .arclength import Curve, Standing, Tangent
+from .continuation import follow
+from .newton import loose_rows, rows_in
+from .prepared import Prepared
+from .tracing import Traced
+
+__all__ = ["begin_path", "check_slack"]
+
+BEGINNING = 1e-3
+"""Where straight members have no slack, or nothing but loads holds a mechanism, the path starts at this share."""
+
+TAUT = 1e3
+"""Multipliers above this many times the loads, in members without slack, are those of a taut string."""
+
+
+def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, Standing, tuple[str, ...]]:
+    """The curve with its unit, its first point, and what is to be said of it.
+
+    The path goes downwards where the range ends at 0, else upwards.
+
+    Raises
+    ------
+    SolveError
+        There is no equilibrium to start from.
+    """
+    up = 1.0 if span[1] > 0.0 else -1.0
+    widest = max(map(abs, span))
+    state, factor, notes = _first_state(prepared, up * BEGINNING * abs(span[1] if up > 0.0 else span[0]))
+    curve = Curve(prepared, widest)
+    along = Tangent(np.zeros(prepared.equations.total), up)
+    tangent = curve.standing(state, factor, along).tangent
+    share = (tangent.factor / widest) ** 2
+    # The unit is the factor that would turn the structure by a radian were it linear, if that is in the range.
+    if share < 0.5:
+        curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), 1e-6 * widest)
+    return curve, curve.standing(state, factor, along), notes
+
+
+def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple[str, ...]]:
+    """The equilibrium at factor 0 or, where straight members have no slack for the motions, beside it."""
+    model, equations = prepared.model, prepared.equations
+    unloaded = model.loading(0.0, 0.0)
+    state = equations.start(unloaded)
+    moved = np.any(model.loading(beside).shift - model.loading(0.0).shift)
+    if moved and prepared.lacks_slack:
+        note = f"straight members have no slack: the path starts at factor {beside:g}, where they have bent"
+        return _bent(prepared, beside), beside, (note,)
+    if prepared.diagnosis.mobility and model.minimisable:
+        note = f"without loads it is a mechanism: the path starts at factor {beside:g}"
+        return _bent(prepared, beside), beside, (note,)
+    if not model.scene.histories:
+        return prepared.correct(state, model.loading(0.0)).state, 0.0, ()
+    grown = follow(prepared, lambda t: model.loading(0.0, t), state)
+    if not grown.reached:
+        raise SolveError(Status.FAILED, "no equilibrium to start from at factor 0", grown.state)
+    return grown.state, 0.0, ()
+
+
+def _bent(prepared: Prepared, factor: float) -> State:
+    loading = prepared.model.loading(factor)
+    state, gap = prepared.guess(loading)
+    if gap > 0.2:
+        detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at factor {factor:g}"
+        raise SolveError(Status.INFEASIBLE, detail, state)
+    found, _ = prepared.minimise(loading, state)
+    stability = prepared.stability(found)
+    if stability.negative:
+        found, _ = prepared.leave(found.state, stability, loading)
+    return found.state
+
+
+def check_slack(curve: Curve, traced: Traced) -> None:
+    """Refuse members that are straight between held points from the start and carry the loads like a taut string.
+
+    Raises
+    ------
+    SolveError
+        They do.
+    """
+    equations, (first, *_, last) = curve.equations, traced.points
+    loose = loose_rows(equations, first.point)
+    loads = max(float(np.abs(part).max(initial=0.0)) for part in (last.loading.force, last.loading.pull))
+    if loose.size and loads > 0.0 and np.abs(last.state.lam).max() > TAUT * loads:
+        names = ", ".join(equations.row_names[row] for row in rows_in(loose))
+        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
+        raise SolveError(Status.INFEASIBLE, detail, last.state)

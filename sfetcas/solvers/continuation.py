@@ -1,0 +1,141 @@
+"""Following an equilibrium while loads and motions grow together from zero.
+
+Nobody has to prescribe load steps; this is a check, and it costs a few Newton iterations.  The library asks
+which of several equilibria the growing loads lead to: the state is followed from the undeformed scene in as
+few steps as Newton's method allows, the inertia is counted at each of them, and where the state ceases to be
+stable it is left along its escape shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SolveError
+from ..mechanics.equations import State
+from ..mechanics.loading import Loading
+from .newton import Corrected
+from .prepared import Prepared
+
+__all__ = ["JUMPED", "Followed", "follow", "near_factor"]
+
+STEP_ROTATION = 0.4
+"""A step is too long when its corrections turn a node by more than this, rad."""
+
+CONTRACTION = 0.35
+"""... or do not shrink at least by this from one to the next."""
+
+SHORTEST = 1e-4
+"""Steps below this share of the way done end the search on this branch."""
+
+TINY = 1e-12
+"""The first step is never below this part of the way."""
+
+HALF_TURN = np.pi
+"""Where turns are counted a step turns a node by this at most, rad."""
+
+NARROW = 0.02
+"""The share of the way done at which a stable and an unstable state are near enough to leave between them."""
+
+MOST = 400
+"""Steps tried before giving up."""
+
+MOST_WITHOUT_POTENTIAL = 6000
+"""The same where there is no other way: a follower of 1e4 EI/L^2 swings a cantilever through 4,000 steps."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Where following arrived.
+
+    Attributes
+    ----------
+    state : State
+        State at the end of the way, or where it was lost.
+    reached : bool
+        Whether the end of the way was reached.
+    left : tuple of float
+        Parts of the way at which an unstable equilibrium was left.
+    """
+
+    state: State
+    reached: bool
+    left: tuple[float, ...]
+
+
+def near_factor(factor: float) -> str:
+    """Where on the way of the loads a state was left, which is known to a few percent."""
+    return f"near factor {factor:.3g}"
+
+
+JUMPED = "left an unstable equilibrium there along its escape shape"
+"""What became of it."""
+
+
+def follow(
+    prepared: Prepared,
+    way: Callable[[float], Loading],
+    state: State,
+    *,
+    leave: bool = True,
+    allowed: Callable[[State, State], bool] | None = None,
+) -> Followed:
+    """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
+
+    With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A step
+    that is not ``allowed`` from one state to the next is too long.
+    """
+    # In space a whole turn of what is held or driven looks like none: no step may turn it by more than a radian.
+    whole = way(1.0).plus(way(0.0).scaled(-1.0))
+    turn = max(float(np.linalg.norm(whole.turn, axis=1).max(initial=0.0)), whole.driven)
+    longest = 1.0 / max(turn, 1.0) if prepared.model.space else 1.0
+    done, step = 0.0, 0.5
+    left: list[float] = []
+    now = prepared.correct(state, way(0.0))
+    for _ in range(MOST if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL):
+        if done >= 1.0:
+            return Followed(now.state, True, tuple(left))
+        step = min(step, longest)
+        trial = min(1.0, done + step)
+        there = prepared.correct(
+            now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
+        )
+        # Where turns are counted a step that turns by more than half of one could lose one.
+        far = prepared.model.winding.count and there.first > HALF_TURN
+        good = there.converged and not far and (allowed is None or allowed(now.state, there.state))
+        if not good:
+            if step > max(SHORTEST * done, TINY):
+                step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
+                continue
+            if not leave:
+                break
+            trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
+            snapped = _left(prepared, now, way(trial))
+            if snapped is None or not (allowed is None or allowed(now.state, snapped.state)):
+                break
+            now = snapped
+            left.append(done)
+            done, step = trial, 0.1
+            continue
+        if leave and prepared.negative(there) > 0:
+            if trial - done > NARROW * done:
+                step = 0.5 * (trial - done)
+                continue
+            escaped = _left(prepared, there, way(trial))
+            if escaped is None or not (allowed is None or allowed(now.state, escaped.state)):
+                break
+            there = escaped
+            left.append(trial)
+            step = 0.1
+        now, done = there, trial
+        step *= 4.0 if there.second < 0.05 else 2.0
+    return Followed(now.state, done >= 1.0, tuple(left))
+
+
+def _left(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:
+    try:
+        return prepared.leave(found.state, prepared.stability(found), loading)[0]
+    except SolveError:
+        return None

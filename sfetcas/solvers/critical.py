@@ -1,0 +1,250 @@
+"""Limit and bifurcation points between two points of a curve of equilibria.
+
+At a limit point the factor ceases to grow along the curve; at any other point where an eigenvalue of the energy
+on the closings changes its sign, branches cross.  Both are roots of a smooth function of the arc length, which
+are bracketed by what the two points say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from .arclength import Curve, Standing, Tangent
+
+__all__ = ["Event", "at_factors", "events_between", "root", "shapes_at"]
+
+SHARP = 1e-10
+"""Roots are sought to this share of the arc between the two points."""
+
+ZERO = 1e-10
+"""Share of a function's values at the two points below which there is nothing but rounding."""
+
+APART = 1e-6
+"""Eigenvalues that vanish within this share of the arc between the two points vanish together."""
+
+CLOSE = 0.1
+"""Share of the arc between the two points within which a point leads to the next that is looked at."""
+
+ASIDE = 0.01
+"""Share of the arc at which a bifurcation point is interpolated from both sides."""
+
+FIRM = 1e6
+"""Times the weight of the proximal term that holds the open direction at a bifurcation point."""
+
+NEAR = 0.02
+"""An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
+
+BESIDE = 1e-3
+"""Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A limit or bifurcation point.
+
+    Attributes
+    ----------
+    kind : str
+        limit or bifurcation.
+    standing : Standing
+        The point itself.
+    multiplicity : int
+        Number of eigenvalues that vanish there.
+    """
+
+    kind: Literal["limit", "bifurcation"]
+    standing: Standing
+    multiplicity: int = 1
+
+
+def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
+    """Limit and bifurcation points between two neighbouring points of the curve, in their order."""
+    if a.tangent.factor * b.tangent.factor >= 0.0:
+        return _bifurcations(curve, a, b)
+    limit = _limit(curve, a, b)
+    if limit is None:
+        return []
+    if abs(b.inertia.negative - a.inertia.negative) == 1:
+        return [Event("limit", limit)]
+    at, arc, place = curve.between(a, b), b.arc - a.arc, limit.arc - a.arc
+    left = at(place - min(BESIDE * arc, 0.5 * place)) or a
+    right = at(place + min(BESIDE * arc, 0.5 * (arc - place))) or b
+    return [*_bifurcations(curve, a, left), Event("limit", limit), *_bifurcations(curve, right, b)]
+
+
+def _limit(curve: Curve, a: Standing, b: Standing) -> Standing | None:
+    return _sought(curve, a, b, lambda standing: standing.tangent.factor)
+
+
+def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
+    before, after = a.inertia.negative, b.inertia.negative
+    found: list[Event] = []
+    for rank in range(min(before, after), max(before, after)):
+        value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
+        standing = _sought(curve, a, b, value)
+        if standing is None:
+            continue
+        standing = _settled(curve, a, b, standing)
+        twin = next((e for e in found if abs(e.standing.arc - standing.arc) <= APART * (b.arc - a.arc)), None)
+        if twin is not None:
+            found[found.index(twin)] = Event("bifurcation", twin.standing, twin.multiplicity + 1)
+        else:
+            found.append(Event("bifurcation", standing))
+    # Two complex eigenvalues whose real parts change their signs together make nothing singular.
+    met = [event for event in found if curve.prepared.singular(event.standing.point, event.multiplicity)]
+    return sorted(met, key=lambda event: event.standing.arc)
+
+
+def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing:
+    """A bifurcation point cleared of what rounding does in the direction that the equations leave open there.
+
+    State and tangent come from two points beside it, where the equations leave nothing open; Newton's method
+    then closes what that interpolation misses, held in the open direction.
+    """
+    at, place = curve.between(a, b), found.arc - a.arc
+    reach = min(ASIDE * (b.arc - a.arc), 0.5 * place, 0.5 * (b.arc - found.arc))
+    left, right = at(place - reach), at(place + reach)
+    if left is None or right is None or reach == 0.0:
+        return replace(found, tangent=_mean(curve, a, b))
+    tangent = _mean(curve, left, right)
+    # Between the two points what counts is the way along the tangent of a, as in looking for the point.
+    left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
+    state, factor = curve.predicted(left, reach, curve.bend(left, right))
+    settled = curve.corrected(state, factor, a.tangent, found.arc, firm=FIRM)
+    close = settled is not None and curve.prepared.distance(settled.state, found.state) < 1e-3
+    return replace(settled if settled is not None and close else found, tangent=tangent)
+
+
+def _per_way(tangent: Tangent, way: float) -> Tangent:
+    return Tangent(tangent.z / way, tangent.factor / way)
+
+
+def _mean(curve: Curve, a: Standing, b: Standing) -> Tangent:
+    return curve.normed(Tangent(a.tangent.z + b.tangent.z, a.tangent.factor + b.tangent.factor))
+
+
+def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], float]:
+    """The eigenvalue with so many below it; those that vanish all along the curve do not count."""
+
+    def value(standing: Standing) -> float:
+        first, values, _ = curve.prepared.around_zero(standing.point)
+        rest = np.sort(values[np.argsort(np.abs(values))[neutral:]])
+        if first <= rank < first + len(rest):
+            return float(rest[rank - first])
+        return float(np.abs(values).max()) * (1.0 if rank >= first else -1.0)
+
+    return value
+
+
+def _sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float]) -> Standing | None:
+    """The point between two others at which a function of the points vanishes."""
+    at, arc = curve.between(a, b), b.arc - a.arc
+    found: dict[float, Standing] = {0.0: a, arc: b}
+
+    def beside(length: float) -> Standing | None:
+        """From the nearest point found so far: from afar Newton's method may miss what is nearly singular."""
+        near = min(found, key=lambda place: abs(place - length))
+        share = curve.inner(found[near].tangent, a.tangent)
+        if near == arc or abs(length - near) > CLOSE * arc or share < 0.5:
+            return None
+        return curve.corrected(*curve.predicted(found[near], (length - near) / share), a.tangent, a.arc + length)
+
+    def function(length: float) -> float:
+        standing = beside(length) or at(length)
+        if standing is None:
+            return np.nan
+        found[length] = standing
+        return value(standing)
+
+    place = root(function, 0.0, value(a), b.arc - a.arc, value(b))
+    return found.get(place)
+
+
+def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: float) -> float:
+    """A place between a and b where a function changes its sign; the better end where it does not.
+
+    Inverse quadratic interpolation where it can be trusted, halving otherwise.  Where the function is not a
+    number, what is known so far decides.
+
+    Source: Chandrupatla 1997, A new hybrid quadratic/bisection algorithm.
+    """
+    if a == b or fa * fb >= 0.0 or not np.isfinite(fa * fb):
+        return a if abs(fa) < abs(fb) else b
+    # b is the latest place, a the other end of the bracket.
+    least_value = ZERO * min(abs(fa), abs(fb))
+    tolerance, share = SHARP * abs(b - a), min(max(fa / (fa - fb), 0.05), 0.95)
+    for _ in range(60):
+        x = a + share * (b - a)
+        fx = function(x)
+        if not np.isfinite(fx):
+            break
+        if fx * fa >= 0.0:
+            c, fc, a, fa = a, fa, x, fx
+        else:
+            c, fc, b, fb, a, fa = b, fb, a, fa, x, fx
+        least = tolerance / max(abs(b - a), 1e-300)
+        if abs(fa) <= least_value or least > 0.5:
+            break
+        share = 0.5
+        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+        if 1.0 - np.sqrt(1.0 - xi) < phi < np.sqrt(xi):
+            share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+        share = min(1.0 - least, max(least, share))
+    return a if abs(fa) < abs(fb) else b
+
+
+def at_factors(curve: Curve, points: list[Standing], factors: tuple[float, ...]) -> list[Standing]:
+    """The points of a curve at factors, in the order in which they are met."""
+    met: list[Standing] = [points[0]] * any(points[0].factor == factor for factor in factors)
+    for a, b in zip(points, points[1:], strict=False):
+        low, high = min(a.factor, b.factor), max(a.factor, b.factor)
+        here = [f for f in dict.fromkeys(factors) if low < f < high or f == b.factor]
+        for factor in sorted(here, reverse=bool(b.factor < a.factor)):
+            standing = b if factor == b.factor else _at_factor(curve, a, b, factor)
+            if standing is not None:
+                met.append(standing)
+    return met
+
+
+def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standing | None:
+    """The point between two others at a factor: Newton's method from an interpolated one, or a root along the arc."""
+    arc = b.arc - a.arc
+    # The factor as the cubic over the arc that both points and tangents give.
+    rise, left, right = b.factor - a.factor, arc * a.tangent.factor, arc * b.tangent.factor
+
+    def missing(x: float) -> float:
+        return a.factor - factor + x * (left + x * (3.0 * rise - 2.0 * left - right + x * (left + right - 2.0 * rise)))
+
+    place = arc * root(missing, 0.0, missing(0.0), 1.0, missing(1.0))
+    state, _ = curve.predicted(a, place, curve.bend(a, b))
+    found = curve.at_factor(replace(a, state=state, arc=a.arc + place), factor, most=NEAR)
+    if found is not None:
+        return found
+    near = _sought(curve, a, b, lambda standing: standing.factor - factor)
+    return None if near is None else curve.at_factor(near, factor)
+
+
+def shapes_at(curve: Curve, event: Event) -> Array:
+    """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest entry 1.
+
+    Of several, the first is the one with most rotation about z, then about y: so that meshes agree.
+    """
+    _, values, shapes = curve.prepared.around_zero(event.standing.point)
+    chosen = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]]
+    if chosen.shape[1] > 1:
+        number = curve.equations.number
+        liking = np.zeros(len(chosen))
+        for axis in range(number.shape[1]):
+            liking[number[number[:, axis] >= 0, axis]] = float(axis)
+        weight = curve.prepared.weight
+        chosen = chosen @ np.linalg.eigh(chosen.T @ ((weight * liking)[:, None] * chosen))[1][:, ::-1]
+    peaks = np.abs(chosen).max(axis=0)
+    # The sign is that of the first entry that counts: the largest may be one of two that differ by rounding.
+    first = (np.abs(chosen) > 0.3 * peaks).argmax(axis=0)
+    signs = np.sign(chosen[first, np.arange(chosen.shape[1])])
+    return np.asarray(chosen * (signs / peaks))

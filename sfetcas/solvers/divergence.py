@@ -1,0 +1,121 @@
+"""Where the static tangent under loads without potential becomes singular: divergence.
+
+Such loads make the Newton matrix H unsymmetric.  With A the derivative of the closings, N a basis of the null space
+of A and M a weight, the eigenvalues mu of ``N^T H N x = mu N^T M N x`` may be complex; the tangent is singular where
+one of them is zero.  Along a path a real one does so by changing its sign, and two at once where a symmetry makes
+them equal: then the determinant keeps its sign, while the number of eigenvalues with a negative real part changes by
+two.  A complex pair whose real part changes its sign leaves the tangent regular.
+
+What these numbers say of stability is one thing only: at a zero another equilibrium is adjacent (static divergence).
+Flutter does not show in them.  Where the loads have a potential all the same, as even pressure on a closed
+ring, the tangent is symmetric but for what the discretisation leaves; its symmetric part is taken, whose eigenvalues
+are those of the energy to the second order of the rest.
+
+Source: Bolotin 1963, Nonconservative problems of the theory of elastic stability; Leipholz 1987.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations, Point
+from .stability import LIGHT, NEUTRAL, RANK, ROUNDING, Inertia, Stability
+
+__all__ = ["TangentTest"]
+
+SINGULAR = 1e-6
+"""Imaginary parts below this leave the tangent singular where the real part vanishes: eigenvalues are of size one."""
+
+
+class TangentTest:
+    """The test for one model.
+
+    Parameters
+    ----------
+    equations : Equations
+    weight : ndarray (turning unknowns,)
+        Weight of the rotations, see :class:`~sfetcas.solvers.stability.StabilityTest`.
+    symmetric : bool
+        Whether the loads have a potential all the same.
+    """
+
+    def __init__(self, equations: Equations, weight: Array, symmetric: bool) -> None:
+        self._equations, self._symmetric = equations, symmetric
+        n = equations.unknowns
+        softest = float(weight.max(initial=1.0) / equations.mass.max(initial=1.0))
+        self._root = np.sqrt(np.concatenate([weight, np.full(n - len(weight), LIGHT * softest)]))
+        self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
+        self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
+
+    def _tangent(self, point: Point) -> tuple[Array, float, int]:
+        """The weighted tangent on the null space of the closings, what counts as zero, and the size of that space.
+
+        Across the null space it has its largest entry for an eigenvalue: projecting costs less than a basis does.
+        """
+        equations, n = self._equations, self._equations.unknowns
+        h, rows = np.zeros((n, n)), np.zeros((equations.rows, n))
+        h[equations.row[self._in_h], equations.column[self._in_h]] = point.entries[self._in_h]
+        rows[equations.row[self._in_a] - n, equations.column[self._in_a]] = point.entries[self._in_a]
+        h /= np.outer(self._root, self._root)
+        if self._symmetric:
+            h = 0.5 * (h + h.T)
+        largest, free = float(np.abs(h).max(initial=0.0)), n
+        if len(rows):
+            _, sizes, right = np.linalg.svd(rows / self._root, full_matrices=False)
+            across = right[sizes > RANK * sizes.max(initial=0.0)]
+            free -= len(across)
+            before, after = across @ h, h @ across.T
+            inner = before @ across.T + (largest + 1.0) * np.eye(len(across))
+            h += across.T @ (inner @ across - before) - after @ across
+        return h, NEUTRAL + ROUNDING * largest, free
+
+    def _eigenvalues(self, tangent: Array) -> Array:
+        """Eigenvalues by rising real part."""
+        values = np.linalg.eigvalsh(tangent) if self._symmetric else np.linalg.eigvals(tangent)
+        return np.asarray(values[np.argsort(values.real)])
+
+    def inertia(self, point: Point) -> Inertia:
+        """Numbers of eigenvalues with a negative real part, and of vanishing ones."""
+        tangent, limit, _ = self._tangent(point)
+        values = self._eigenvalues(tangent)
+        zero = int((np.abs(values) <= limit).sum())
+        return Inertia(int(((values.real < 0.0) & (np.abs(values) > limit)).sum()), zero)
+
+    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+        """Real parts of all eigenvalues, rising; zero, as none is before them; shapes, those of the smallest first.
+
+        The shapes are columns in the order of the real parts; they are singular vectors: where eigenvalues vanish
+        these span what the tangent leaves open, while eigenvectors may coincide.
+        """
+        tangent = self._tangent(point)[0]
+        if self._symmetric:
+            values, vectors = np.linalg.eigh(tangent)
+        else:
+            values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
+            vectors[:, np.argsort(np.abs(values))] = np.linalg.svd(tangent)[2][::-1].T
+        return 0, values, (vectors / self._root[:, None])[: self._equations.turning_unknowns]
+
+    def singular(self, point: Point, count: int) -> bool:
+        """Whether so many eigenvalues vanish at a point where their real parts do."""
+        values = self._eigenvalues(self._tangent(point)[0])
+        nearest = values[np.argsort(np.abs(values.real))[:count]]
+        return bool((np.abs(nearest.imag) <= SINGULAR).all())
+
+    def test(self, point: Point) -> Stability:
+        """Inertia, smallest eigenvalue and escape shape where the loads have a potential; "not defined" elsewhere."""
+        equations = self._equations
+        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
+        if not self._symmetric:
+            return Stability("not defined", 0, np.nan, np.zeros(turning), nothing)
+        tangent, limit, free = self._tangent(point)
+        if not free:
+            return Stability(True, 0, np.inf, np.zeros(turning), nothing)
+        values, vectors = np.linalg.eigh(tangent)
+        shape = vectors[:, 0] / self._root
+        masses = np.concatenate([equations.mass, np.full(len(nothing), LIGHT)])
+        quotient = float(values[0]) / float(shape @ (masses * shape))
+        shape = shape / shape[np.argmax(np.abs(shape[:turning]))]
+        negative = int((values < -limit).sum())
+        stable: bool | str = False if negative else bool(values[0] > limit) or "neutral"
+        return Stability(stable, negative, quotient, shape[:turning], shape[turning:])

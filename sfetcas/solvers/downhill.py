@@ -1,0 +1,63 @@
+"""Downhill where there is an energy whose value is not at hand: under even pressure, and under moments about hinges.
+
+Gradient flow ``M dx/dt = -F(x)`` leads from beside an unstable equilibrium to a stable one, whatever lies between.
+Its implicit steps ``(K + s M) dx = -F`` need the equations and their derivative only; with ``s`` beyond the lowest
+eigenvalue below zero every step points to where the energy falls, and where there is none they are Newton's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..mechanics.equations import Equations, Point, State
+from ..mechanics.loading import Loading
+from .newton import newton_step
+from .stability import Stability
+
+__all__ = ["flow"]
+
+LONGEST = 0.3
+"""No node turns by more than this in a step, rad: the flow is not to jump over what lies in its way."""
+
+ARRIVED = 1e-5
+"""Newton's steps shorter than this, rad, have arrived."""
+
+MOST = 200
+"""Steps at most: leaving a nearly neutral state takes some ten, the way from one shape to another some thirty."""
+
+FIRMER, SMALL = 4.0, 1e-3
+"""Growth of ``s`` until a step is short enough, and the least that it begins with, in units of force."""
+
+
+def flow(equations: Equations, state: State, loading: Loading, test: Callable[[Point], Stability]) -> State | None:
+    """Where the flow leads from a state; None where it does not come to rest.
+
+    Parameters
+    ----------
+    test : callable
+        Stability at a point of the equations.
+    """
+    turning = equations.turning_unknowns
+    for _ in range(MOST):
+        point = equations.at(state, loading)
+        found = test(point)
+        shift = 2.0 * max(0.0, -found.smallest) if found.negative else 0.0
+        length = np.inf
+        while length > LONGEST:
+            entries = point.entries.copy()
+            entries[equations.diagonal[:turning]] += shift * equations.mass
+            try:
+                step = newton_step(equations, replace(point, entries=entries), equations.mass)
+            except np.linalg.LinAlgError:
+                return None
+            length = float(np.abs(step[:turning]).max(initial=0.0))
+            if not np.isfinite(length):
+                return None
+            shift = max(FIRMER * shift, abs(found.smallest), SMALL)
+        state = equations.moved(state, step)
+        if not found.negative and length < ARRIVED:
+            return state
+    return None

@@ -1,0 +1,261 @@
+"""States to start from: supports, closings and motions satisfied as far as possible, straight chains bent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations, State
+from ..mechanics.loading import Loading
+from ..mechanics.model import Model
+from ..mechanics.rotations import Turn
+from .newton import TURN, descend, loose_rows
+
+__all__ = ["first_guess", "lacks_slack", "lead", "restore"]
+
+LEADING, SETTLING = 30, 10
+"""Steps in which nodes are led to the places wished for them, and in which they settle there."""
+
+SPRING = 300.0
+"""Stiffness of the springs that lead nodes, EI/L^3 of the scene: stiffer than beams, soft enough to yield."""
+
+NEAR = 0.3
+"""The same, rad, from a ``start`` that a user gave: the basin it lies in is not to be left."""
+
+BOW = 0.2
+"""Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
+
+
+def lacks_slack(equations: Equations) -> bool:
+    """Whether straight members keep closings from giving way to first order; what joints hold twice does not count.
+
+    A bow of the members gives slack, redundant joints stay redundant.
+    """
+    state = equations.start(equations.model.loading(0.0, 0.0))
+    nothing = equations.model.loading(0.0, 0.0)
+    loose = loose_rows(equations, equations.at(state, nothing))
+    if not loose.size:
+        return False
+    bowed = replace(state, q=_turned_by(equations, state, _bow(equations)))
+    return bool(loose_rows(equations, equations.at(bowed, nothing)).shape[1] < loose.shape[1])
+
+
+def restore(equations: Equations, state: State, loading: Loading, weight: Array) -> tuple[State, float]:
+    """A state near the given one that satisfies closings, motions and joints, and the gap that is left.
+
+    Each step is the smallest change in the elastic energy of the undeformed scene that closes the linearised
+    gaps, shortened to 0.5 rad.
+    """
+    state = replace(equations.holding(state, loading), lam=np.zeros(equations.rows))
+    n, rows = equations.unknowns, equations.rows
+    if rows == 0:
+        return state, 0.0
+    metric = equations.elastic_entries()
+    metric[equations.diagonal[: equations.turning_unknowns]] += 0.1 * weight
+    metric[equations.diagonal[equations.turning_unknowns : n]] += 1e-6
+    metric[equations.diagonal[n:]] -= 1e-9
+    coupling = (equations.row >= n) != (equations.column >= n)
+    gap = np.inf
+    for _ in range(60):
+        point = equations.at(state, loading)
+        gap = float(np.abs(point.residual[n:]).max())
+        if gap < 1e-9:
+            break
+        equations.solver.factor(np.where(coupling, point.entries, metric))
+        step = equations.solver.solve(np.concatenate([np.zeros(n), -point.residual[n:]]))
+        step[n:] = 0.0
+        length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
+        state = equations.moved(state, step * min(1.0, 0.5 / max(length, 1e-30)))
+    return state, gap
+
+
+def lead(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> tuple[State, float]:
+    """The unloaded scene with some nodes pulled towards places, and how far they stay from them.
+
+    ``targets`` (nodes * axes, nan where none) are displacements.  Springs pull the nodes along straight ways, so
+    that beams take the short turn, and yield where a place cannot be reached.
+    """
+    unloaded = loading.unloaded()
+    chosen = np.flatnonzero(np.isfinite(targets))
+    begun, missing = None, np.zeros(0)
+    for count in range(LEADING + SETTLING):
+        point = equations.at(state, unloaded, convex=True)
+        nodal, jacobian = equations.node_jacobian(state, unloaded, chosen)
+        begun = nodal if begun is None else begun
+        missing = targets[chosen] - nodal
+        wanted = begun + min(1.0, (count + 1) / LEADING) * (targets[chosen] - begun) - nodal
+        entries = point.entries.copy()
+        entries[equations.diagonal[: equations.turning_unknowns]] += 1e-3 * weight
+        entries[equations.diagonal[equations.unknowns :]] -= 1e-9
+        border = np.zeros((equations.total, len(chosen)))
+        border[: equations.unknowns] = jacobian.T
+        equations.solver.factor(entries)
+        base = equations.solver.solve(np.column_stack([-point.residual, border]))
+        pull = np.linalg.solve(border.T @ base[:, 1:] + np.eye(len(chosen)) / SPRING, wanted - border.T @ base[:, 0])
+        step = base[:, 0] + base[:, 1:] @ pull
+        length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
+        state = equations.moved(state, step * min(1.0, 0.5 / max(length, 1e-30)))
+    return state, float(np.abs(missing).max())
+
+
+def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[State, float]:
+    """A state to start from, and the gap of the closings that is left.
+
+    The undeformed scene, its rotations carried along by the prescribed ones; straight members bent where the
+    closings would otherwise have no slack (a straight member cannot shorten to first order); then closings,
+    motions and the ``start`` places of nodes satisfied as far as possible.
+    """
+    state = equations.start(loading)
+    if np.any(loading.turn):
+        state = _carried(equations, loading)
+    targets = _wished(equations)
+    if equations.rows and targets is None and lacks_slack(equations):
+        state = _bent(equations, state, loading, weight)
+    if targets is not None:
+        state = _placed(equations, state, loading, weight, targets)
+    state, gap = restore(equations, state, loading, weight)
+    if gap > 1e-6:
+        return state, gap
+    return descend(equations, state, loading, weight, most=TURN if targets is None else NEAR), gap
+
+
+def _placed(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> State:
+    """The state with its nodes near their targets, of two slight bows or, if need be, of several ways to curl up."""
+
+    def tried(turns: tuple[float, ...]) -> tuple[float, float, State]:
+        sides = []
+        for curl in _curls(equations, turns):
+            bent = replace(state, q=_turned_by(equations, state, curl))
+            placed, gap = lead(equations, bent, loading, weight, targets)
+            sides.append((round(gap, 1), equations.at(placed, loading.unloaded()).strain, placed))
+        return min(sides, key=lambda side: side[:2])
+
+    best = tried((0.5, -0.5))
+    # Where both ends are held, curls would change the twist that motions prescribe.
+    if best[0] > 0.0 and equations.rows <= equations.displacement_unknowns:
+        best = min(best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0)), key=lambda side: side[:2])
+    return replace(best[2], lam=np.zeros(equations.rows))
+
+
+def _curls(equations: Equations, turns: tuple[float, ...]) -> list[Array]:
+    """Rotation vectors growing with the distance from the ground to the given turns, rad, about section axes."""
+    model = equations.model
+    far = _distances(model)
+    far /= far.max()
+    frame = quaternion.matrix(model.scene.center_lines[model.members[0]].quaternions(np.array([0.0])))[0]
+    axes = [frame[:, 2], frame[:, 1]] if model.space else [np.array([0.0, 0.0, 1.0])]
+    return [turn * far[:, None] * axis for axis in axes for turn in turns]
+
+
+def _distances(model: Model) -> Array:
+    """Shortest length along members from the ground to each rotation."""
+    lengths = {name: line.length for name, line in model.scene.center_lines.items()}
+    to_node = {name: 0.0 if node.support != "free" else np.inf for name, node in model.scene.nodes.items()}
+    for _ in model.nodes:
+        for name, member in model.scene.members.items():
+            start, end = member.nodes[0], member.nodes[-1]
+            to_node[start] = min(to_node[start], to_node[end] + lengths[name])
+            to_node[end] = min(to_node[end], to_node[start] + lengths[name])
+    distances = np.full(len(model.rotations.kind), np.inf)
+    for name in model.members:
+        part = model.along(name) * lengths[name]
+        a, b = (to_node[node] for node in model.scene.members[name].nodes)
+        chain = model.chain(name)
+        distances[chain] = np.minimum(distances[chain], np.minimum(a + part, b + lengths[name] - part))
+    return np.where(np.isfinite(distances), distances, 0.0)
+
+
+def _turned_by(equations: Equations, state: State, vectors: Array) -> Array:
+    """Rotations of a state turned further by rotation vectors where they are free."""
+    vectors = np.where((equations.model.rotations.kind == Turn.FREE)[:, None], vectors, 0.0)
+    if equations.model.space:
+        return quaternion.multiply(quaternion.from_rotation_vector(vectors), state.q)
+    return np.asarray(state.q + vectors[:, 2:3])
+
+
+def _wished(equations: Equations) -> Array | None:
+    """Displacements to the ``start`` places, dimensionless, nan where none is given."""
+    model = equations.model
+    axes = model.element.axes
+    targets = np.full((len(model.segments.places), axes), np.nan)
+    for i, node in enumerate(model.scene.nodes.values()):
+        if node.start is not None and (node.support == "free" or node.slides):
+            targets[i] = (np.asarray(node.start) - np.asarray(node.position))[:axes] / model.scales.length
+    return targets.ravel() if np.isfinite(targets).any() else None
+
+
+def _carried(equations: Equations, loading: Loading) -> State:
+    """Prescribed rotation vectors spread over the scene like heat, members being rods."""
+    model = equations.model
+    count = len(model.rotations.kind)
+    names = tuple(name for name, ends in model.rotations.ends.items() if len(ends) == 2)
+    ends = np.array([model.rotations.ends[name] for name in names])
+    used, index = np.unique(ends, return_inverse=True)
+    index = index.reshape(ends.shape)
+    laplacian = np.zeros((len(used), len(used)))
+    for a, b in index:
+        laplacian[[a, b, a, b], [a, b, b, a]] += [1.0, 1.0, -1.0, -1.0]
+    held = model.rotations.kind[used] == Turn.HELD
+    vectors = loading.turn[used]
+    free = ~held
+    if free.any():
+        matrix = laplacian[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
+        vectors[free] = np.linalg.solve(matrix, -laplacian[np.ix_(free, held)] @ vectors[held])
+    field = np.zeros((count, 3))
+    for (a, b), (i, j), name in zip(ends, index, names, strict=True):
+        field[a], field[b] = vectors[i], vectors[j]
+        if name not in model.members:
+            continue
+        chain = model.chain(name)
+        part = model.along(name)[:, None]
+        field[chain] = (1.0 - part) * vectors[i] + part * vectors[j]
+    about = model.rotations.kind == Turn.AXIS
+    field[about] = (field[about] * model.rotations.axis[about]).sum(axis=1, keepdims=True) * model.rotations.axis[about]
+    q = quaternion.from_rotation_vector(field) if model.space else field[:, 2:3]
+    wound = model.winding.of_vectors(field)
+    return equations.holding(replace(equations.start(loading), q=q, wound=wound), loading)
+
+
+def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -> State:
+    """Straight members bent by a slight bow, each or as chains, to the side that takes least energy."""
+    sides = []
+    for vectors in (_bow(equations), _tent(equations)):
+        for sign in (1.0, -1.0):
+            bent = replace(state, q=_turned_by(equations, state, sign * vectors))
+            closed, gap = restore(equations, bent, loading, weight)
+            sides.append((round(gap, 6), equations.at(closed, loading).potential, bent))
+    least = min(side[:2] for side in sides)
+    margin = 1e-9 * max(1.0, abs(least[1]))
+    # Symmetric sides differ by rounding only: then the first, so that answers repeat.
+    return next(bent for gap, energy, bent in sides if gap == least[0] and energy <= least[1] + margin)
+
+
+def _tent(equations: Equations) -> Array:
+    """Rotations that raise the middle of chains between held nodes: one way going out, the other coming back."""
+    model, bow = equations.model, _bow(equations)
+    far, vectors = _distances(model), np.zeros((len(equations.model.rotations.kind), 3))
+    for name in model.members:
+        chain = model.chain(name)
+        direction = np.abs(bow[chain]).max(axis=0) * np.sign(bow[chain][1])
+        vectors[chain] = np.sign(np.gradient(far[chain], model.along(name)))[:, None] * direction
+    return vectors
+
+
+def _bow(equations: Equations) -> Array:
+    """Rotation vectors of a slight bow of each straight member about its weak axis."""
+    model = equations.model
+    vectors = np.zeros((len(model.rotations.kind), 3))
+    for name in model.members:
+        member, line = model.scene.members[name], model.scene.center_lines[name]
+        if line.turning > 0.05 or member.type == "rigid":
+            continue
+        stiffness = model.scene.sections[str(member.section)].stiffness(np.array([0.5]))[0]
+        weak_2 = model.space and stiffness[1] < stiffness[2] * (1.0 - 1e-9)
+        frame = quaternion.matrix(line.quaternions(np.array([0.0])))[0]
+        axis = np.array([0.0, 0.0, 1.0]) if not model.space else (-frame[:, 1] if weak_2 else frame[:, 2])
+        inner = model.chain(name)[1:-1]
+        vectors[inner] = BOW * np.sin(2.0 * np.pi * model.along(name)[1:-1])[:, None] * axis
+    return vectors

@@ -1,0 +1,281 @@
+"""Newton's method on the stationarity equations: to rounding from a near state, downhill from a far one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations, Point, State
+from ..mechanics.loading import Loading
+
+__all__ = [
+    "DUAL",
+    "PROXIMAL",
+    "ROUNDING",
+    "TURN",
+    "Corrected",
+    "correct",
+    "descend",
+    "loose_rows",
+    "newton_step",
+    "relative_residual",
+    "rows_in",
+]
+
+PROXIMAL = 1e-10
+"""Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
+
+TURN = 1.2
+"""Largest rotation (rad) of a step downhill under forces."""
+
+SHORT = 0.05
+"""Steps shorter than this, rad, need not shrink yet."""
+
+ROUNDING = 3e-15
+"""Relative residual at which there is nothing left to gain."""
+
+DUAL = 1e-12
+"""Softness of the closings in the matrix (not in the equations), against redundant ones."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """Where Newton's method arrived.
+
+    ``first`` and ``second`` are the largest rotations (rad) of the first two steps: how far the equations were
+    from linear.
+    """
+
+    state: State
+    point: Point
+    converged: bool
+    iterations: int
+    first: float
+    second: float
+    residual: float
+
+
+def relative_residual(equations: Equations, point: Point) -> float:
+    """Largest out-of-balance moment or force over what is added up at its node, or largest gap."""
+    return float((np.abs(point.residual) / np.maximum(point.scale, TINY)).max(initial=0.0))
+
+
+TINY = 1e-14
+"""Of the units of the model: where nothing acts and nothing is stiff, less than this is nothing."""
+
+
+def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
+    """The step of all unknowns and multipliers."""
+    entries = point.entries.copy()
+    n, total = equations.turning_unknowns, equations.total
+    diagonal = equations.diagonal
+    entries[diagonal[:n]] += PROXIMAL * weight
+    entries[diagonal[equations.unknowns : total]] -= DUAL
+    equations.solver.factor(entries)
+    step = equations.solver.solve(-point.residual)
+    if equations.redundant is None:
+        equations.redundant = bool(loose_rows(equations, point).size)
+    if equations.redundant:
+        # Of redundant closings only the softness above limits the multipliers: their loose part has no meaning.
+        rows, loose = slice(equations.unknowns, None), loose_rows(equations, point)
+        if loose.size:
+            step[rows] -= loose @ (loose.T @ step[rows])
+    return step
+
+
+def correct(
+    equations: Equations,
+    state: State,
+    loading: Loading,
+    weight: Array,
+    *,
+    tolerance: float = 1e-12,
+    iterations: int = 12,
+    most: float = np.inf,
+    contraction: float = 1.0,
+    tangent: Array | None = None,
+) -> Corrected:
+    """Newton's method from a near state down to rounding.
+
+    Parameters
+    ----------
+    weight : ndarray
+        Weight of the proximal term, see :class:`~sfetcas.solvers.stability.StabilityTest`.
+    tolerance : float
+        Relative residual that counts as converged; iterations go on while they still gain a factor of 4.
+    most : float
+        Give up when a later step than the first turns any node by more, rad.
+    contraction : float
+        Give up when a step is not shorter than this times the one before (or than 0.05 rad).
+    tangent : ndarray, optional
+        Entries of the Newton matrix of the equilibrium that is left, for the first step: then it goes along the
+        path, while the matrix under the new load may already point away from it.
+    """
+    state = equations.holding(state, loading)
+    point = equations.at(state, loading)
+    residual = relative_residual(equations, point)
+    first = second = last = np.inf
+    begun = state, point, residual
+    count = 0
+    for count in range(iterations):
+        # One step is always taken: under a tiny load even the whole answer is below rounding of the stiffness.
+        if residual == 0.0 or (count and residual <= ROUNDING and _balanced(equations, point)):
+            break
+        try:
+            here = replace(point, entries=tangent) if tangent is not None and count == 0 else point
+            step = newton_step(equations, here, weight)
+            if here is not point and _unresisted(equations, step, point, weight):
+                step = newton_step(equations, point, weight)
+        except np.linalg.LinAlgError:
+            break
+        length = float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
+        if not np.isfinite(length):
+            break
+        if count == 0:
+            first = length
+        elif count == 1:
+            second = length
+        if count and residual > tolerance and (length > most or length > max(contraction * last, SHORT)):
+            if begun[2] <= tolerance:
+                break
+            return Corrected(state, point, False, count, first, second, residual)
+        last = length
+        trial = equations.moved(state, step)
+        there = equations.at(trial, loading)
+        gained = relative_residual(equations, there)
+        if residual <= tolerance and gained > 0.25 * residual and (count or _balanced(equations, point)):
+            if gained < residual:
+                state, point, residual = trial, there, gained
+            break
+        state, point, residual = trial, there, gained
+        if not np.isfinite(residual):
+            break
+    if not residual <= tolerance and begun[2] <= tolerance:
+        state, point, residual = begun
+    second = 0.0 if second == np.inf else second
+    return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+
+
+def _balanced(equations: Equations, point: Point) -> bool:
+    """Whether what is out of balance is little beside all that acts, too, and not only beside what is stiff."""
+    n = equations.unknowns
+    acting = (point.scale - equations.noise)[:n].max(initial=0.0)
+    return float(np.abs(point.residual[:n]).max(initial=0.0)) <= BALANCED * acting
+
+
+BALANCED = 1e-9
+"""Share of the largest moment or force that acts: where more is out of balance, stiffness beside it hides it."""
+
+
+def _unresisted(equations: Equations, step: Array, point: Point, weight: Array) -> bool:
+    """Whether little but the proximal term resists a step: an unloaded mechanism of rigid members has no stiffness."""
+    turned = step[: equations.turning_unknowns]
+    return bool(PROXIMAL * float(weight @ turned**2) > 0.1 * abs(float(step @ point.residual)))
+
+
+def descend(
+    equations: Equations, state: State, loading: Loading, weight: Array, *, iterations: int = 30, most: float = TURN
+) -> State:
+    """Downhill towards a minimum of the potential on the closings, from any state.
+
+    Newton steps with element matrices made positive, so that each points downhill, shortened until the
+    potential (with the gaps, weighted beyond the multipliers) falls by a third of what the step promises.
+    Forces turn no node by more than ``most`` in a step, so that they do not wind a beam up; a moment may roll
+    it up at once.  Stops where steps have become short: the state is meant for IPOPT or Newton's method.
+    """
+    scale = 1.0
+    most = np.inf if np.any(loading.moment) and most == TURN else most
+    point = equations.at(state, loading, convex=True)
+    for _ in range(iterations):
+        try:
+            step = newton_step(equations, point, 1e4 * weight)
+        except np.linalg.LinAlgError:
+            return state
+        n = equations.unknowns
+        length = float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
+        if not np.isfinite(length):
+            return state
+        # Slope of the potential alone: the residual without the multipliers' share.
+        lam = state.lam + step[n:]
+        penalty = 2.0 * float(np.abs(lam).max(initial=0.0))
+        gaps = np.abs(point.residual[n:]).sum()
+        slope = float(point.residual[:n] @ step[:n]) + float(state.lam @ point.residual[n:]) - penalty * gaps
+        slope = min(slope, 0.0)
+        before = point.potential + penalty * gaps
+        scale = min(1.0, 4.0 * scale, most / max(length, 1e-30))
+        for _ in range(40):
+            trial = equations.moved(state, np.concatenate([scale * step[:n], scale * step[n:]]))
+            there = equations.at(trial, loading, convex=True)
+            after = there.potential + penalty * np.abs(there.residual[n:]).sum()
+            if after - before <= 0.3 * (scale - 0.5 * scale**2) * slope + 1e-12 * abs(before):
+                break
+            scale *= 0.5
+        state, point = trial, there
+        if scale == 1.0 and length < 0.02:
+            break
+    return state
+
+
+def loose_rows(equations: Equations, point: Point) -> Array:
+    """Combinations of rows that vanish to first order at this state: orthonormal columns, (rows, n)."""
+    if not equations.rows:
+        return np.zeros((0, 0))
+    # A row that no rotation changes is loose too, also where it is the only one.
+    # Without beams rows are of the size of the units of the model.
+    usual = float((equations.model.beams.weight**2).sum()) or 1.0
+    find = _smallest if equations.rows > MANY else _all_singular
+    squares, left, largest = find(equations, point)
+    return np.asarray(left[:, squares < SLACK**2 * max(largest, usual)])
+
+
+def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
+    """Squares of all singular values of the rows, their left vectors and the largest square."""
+    n = equations.unknowns
+    chosen = (equations.row >= n) & (equations.column < n)
+    rows = np.zeros((equations.rows, n))
+    rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
+    squares, left = np.linalg.eigh(rows @ rows.T)
+    return squares, left, float(squares[-1])
+
+
+def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
+    """The same for the smallest ones only, by inverse iteration with the sparse matrix of the rows."""
+    n = equations.unknowns
+    entries = np.where((equations.row >= n) != (equations.column >= n), point.entries, 0.0)
+    largest = float(np.bincount(equations.row, weights=entries**2, minlength=equations.total)[n:].max())
+    entries[equations.diagonal[:n]] = 1.0
+    entries[equations.diagonal[n:]] -= TINY_SHARE * largest
+    equations.solver.factor(entries)
+    count = 8
+    while True:
+        block = np.random.default_rng(0).standard_normal((equations.total, min(count, equations.rows)))
+        for _ in range(INVERSE):
+            block[:n] = 0.0
+            block[n:] = np.linalg.qr(block[n:])[0]
+            block = equations.solver.solve(block)
+        left, sizes, _ = np.linalg.svd(block[n:], full_matrices=False)
+        squares = 1.0 / sizes - TINY_SHARE * largest
+        if squares.max() > SLACK * largest or count >= equations.rows:
+            return squares[::-1], left[:, ::-1], largest
+        count *= 4
+
+
+MANY = 300
+"""From this many rows on only the loose ones are looked for."""
+
+INVERSE = 3
+"""Inverse iterations: what is loose stands out by twelve digits."""
+
+TINY_SHARE = 1e-15
+"""Share of the largest square that keeps the matrix of loose rows regular."""
+
+
+def rows_in(loose: Array) -> list[int]:
+    """The rows that take part in combinations, columns of :func:`loose_rows`."""
+    return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist() if loose.size else []
+
+
+SLACK = 1e-6
+"""Singular values of the closings below this share of the largest: no slack to first order."""

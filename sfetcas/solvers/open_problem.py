@@ -1,0 +1,172 @@
+"""The equilibrium problem, open to a user's own terms, rows and bounds in CasADi.
+
+:func:`equilibrium_nlp` gives the potential energy of a model with its constraints as a plain
+:class:`~sfetcas.mathematics.nlp.NLP`, and expressions for what the scene names: positions, angles, curvatures.  Add to
+it, solve it with any nlpsol plugin, read the answer by name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import nearest
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.nlp import NLP, Ipopt, NLPResult, Solver
+from ..mechanics.equations import State
+from ..mechanics.model import Model
+from .prepared import Prepared
+from .problem import EquilibriumProblem
+
+__all__ = ["OpenAnswer", "OpenProblem", "equilibrium_nlp"]
+
+
+def equilibrium_nlp(model: Model | Prepared, factor: float = 1.0) -> OpenProblem:
+    """The equilibrium of a model at a load factor as a nonlinear program that can be extended.
+
+    Raises
+    ------
+    SceneError
+        The scene has loads without potential, contacts, or stops of springs.
+
+    Example
+    -------
+    >>> problem = equilibrium_nlp(assemble(scene, uniform_mesh(scene, 4, 8)))      # doctest: +SKIP
+    >>> x, y = ca.vertsplit(problem.position("tip"))                              # doctest: +SKIP
+    >>> answer = problem.with_row("tip on the line", y - 0.2, unit=1.0).solve()   # doctest: +SKIP
+    """
+    prepared = model if isinstance(model, Prepared) else Prepared(model)
+    prepared.model.check_complete()
+    if not prepared.model.minimisable:
+        raise SceneError("loads that follow and moments in space have no energy, which a program to be extended needs")
+    loading = prepared.model.loading(factor)
+    guess, _ = prepared.guess(loading)
+    return OpenProblem(prepared, factor, EquilibriumProblem(prepared.model, loading, guess, kernels="interpreted"))
+
+
+@dataclass(frozen=True, eq=False)
+class OpenProblem:
+    """The program of an equilibrium with expressions in SI units by the names of the scene.
+
+    Attributes
+    ----------
+    prepared : Prepared
+    factor : float
+    parts : EquilibriumProblem
+        Unknowns and parameters of the model and how they make up the rotations.
+    """
+
+    prepared: Prepared
+    factor: float
+    parts: EquilibriumProblem
+    extended: NLP | None = None
+    added: tuple[tuple[str, float, int], ...] = field(default=())
+
+    @property
+    def nlp(self) -> NLP:
+        """The program as it stands; its objective is the potential energy over ``model.scales.moment``."""
+        return self.extended or self.parts.nlp
+
+    @property
+    def model(self) -> Model:
+        """The model behind the program."""
+        return self.prepared.model
+
+    # -- expressions ----------------------------------------------------------------------------
+
+    def position(self, node: str) -> ca.MX:
+        """Position of a node, (2,) or (3,) m."""
+        _known(node, self.model.nodes, "node")
+        start = np.asarray(self.model.scene.nodes[node].position)[: self.model.element.axes]
+        return ca.DM(start) + self.model.scales.length * self.parts.displacement(self.model.nodes.index(node))
+
+    def rotation(self, node: str) -> ca.MX:
+        """Angle of a node since the undeformed scene (plane, rad) or its quaternion (4,)."""
+        number = self.model.rotations.node_turn[_known(node, self.model.nodes, "node")]
+        if number is None:
+            raise SceneError(f"node {node!r} has no rotation of its own")
+        return self.parts.rotation(number)
+
+    def curvature(self, member: str, at: float) -> ca.MX:
+        """Curvature minus that of the unloaded member at a fraction of its length, 1/m.
+
+        A number in the plane, (3,) about the section's axes b1, b2, b3 in space.
+        """
+        _known(member, self.model.members, "member")
+        return self.parts.strain(member, at) / self.model.scales.length
+
+    # -- extensions -----------------------------------------------------------------------------
+
+    def with_row(
+        self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None, *, unit: float = 1.0
+    ) -> OpenProblem:
+        """With rows ``lower <= row <= upper``; ``unit`` is the size of the row, to make it dimensionless."""
+        scaled = None if upper is None else np.asarray(upper, dtype=float) / unit
+        nlp = self.nlp.with_row(name, row / unit, np.asarray(lower, dtype=float) / unit, scaled)
+        return replace(self, extended=nlp, added=(*self.added, (name, unit, ca.vec(row).numel())))
+
+    def with_energy(self, energy: ca.MX) -> OpenProblem:
+        """With a term (N m) added to the potential energy."""
+        return replace(self, extended=self.nlp.with_term(energy / self.model.scales.moment))
+
+    # -- solution -------------------------------------------------------------------------------
+
+    def solve(self, solver: Ipopt | Solver | None = None) -> OpenAnswer:
+        """Solve with IPOPT, or any nlpsol plugin: ``problem.solve(Solver("sqpmethod"))``.
+
+        Raises
+        ------
+        SolveError
+            The solver did not succeed; the sentence says what it reported.
+        """
+        result = (solver or Ipopt()).solve(self.nlp)
+        if result.status is not Status.SOLVED:
+            raise SolveError(result.status, result.message, result)
+        return OpenAnswer(self, result)
+
+
+@dataclass(frozen=True, eq=False)
+class OpenAnswer:
+    """The answer of an extended program, read by name."""
+
+    problem: OpenProblem
+    result: NLPResult
+
+    def value(self, expression: ca.MX) -> Array:
+        """Value of any expression of the problem."""
+        nlp = self.problem.nlp
+        return np.asarray(
+            ca.Function("value", [nlp.x, nlp.p], [expression])(self.result.x, nlp.p_value).full()
+        ).squeeze()
+
+    def position(self, node: str) -> Array:
+        """Position of a node, (3,) m."""
+        position = np.zeros(3)
+        found = self.value(self.problem.position(node))
+        position[: len(found)] = found
+        return position
+
+    def multiplier(self, name: str) -> Array:
+        """Multiplier of an added row in SI units: the generalised force (N m over the row's unit) that keeps it."""
+        position = len(self.problem.parts.nlp.rows)
+        for row, unit, size in self.problem.added:
+            if row == name:
+                return self.result.lam[position : position + size] * self.problem.model.scales.moment / unit
+            position += size
+        raise SceneError(f"found row {name!r}; {nearest(name, [row for row, _, _ in self.problem.added])}")
+
+    @property
+    def state(self) -> State:
+        """The rotations, displacements and multipliers, dimensionless."""
+        loading = self.problem.model.loading(self.problem.factor)
+        return self.problem.parts.state(self.result.x, self.result.lam, loading)
+
+
+def _known(name: str, names: tuple[str, ...], kind: str) -> str:
+    if name not in names:
+        raise SceneError(f"found {kind} {name!r}; {nearest(name, names)}")
+    return name

@@ -1,0 +1,261 @@
+"""A model made ready for any number of solves: IPOPT, Newton's method and the stability test."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..description.records import counted
+from ..errors import SolveError, Status
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Kernels
+from ..mathematics.nlp import Ipopt, NLPResult
+from ..mechanics.equations import Equations, Point, State
+from ..mechanics.loading import Loading
+from ..mechanics.model import Model
+from .divergence import TangentTest
+from .doctor import Diagnosis, contradiction, diagnose
+from .downhill import flow
+from .guess import first_guess, lacks_slack, restore
+from .newton import Corrected, correct
+from .problem import EquilibriumProblem
+from .stability import Inertia, Stability, StabilityTest
+
+__all__ = ["SOLVED", "Prepared"]
+
+MOST_COUNTED = 600
+"""Up to this many unknowns the eigenvalues of a tangent, all of them, take less than a second."""
+
+SOLVED = 1e-9
+"""Relative residual after the last Newton steps that is taken for an equilibrium; usual are 1e-13 to 1e-16."""
+
+ESCAPES = 8
+"""Unstable equilibria that are left in a row before giving up."""
+
+
+class Prepared:
+    """Solvers of one model; each is made when it is first needed.
+
+    Parameters
+    ----------
+    model : Model
+    kernels : str
+        ``auto`` compiles element functions where that pays in one run; ``compiled`` always, for many solves;
+        ``interpreted`` never.  Without a compiler everything is interpreted.
+    evaluations : float
+        How often the equations will be evaluated, for ``auto``.
+    """
+
+    def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
+        self.model = model
+        self._evaluations = evaluations
+        self.kernels: Kernels = kernels
+
+    @functools.cached_property
+    def equations(self) -> Equations:
+        """The stationarity equations in rotations."""
+        return Equations(self.model, kernels=self.kernels, evaluations=self._evaluations)
+
+    @functools.cached_property
+    def diagnosis(self) -> Diagnosis:
+        """What the undeformed structure is free to do, and what its joints hold twice."""
+        return diagnose(self.equations, self._test.weight)
+
+    @functools.cached_property
+    def lacks_slack(self) -> bool:
+        """Whether straight members keep the closings from giving way, as :func:`~sfetcas.solvers.guess.lacks_slack`."""
+        return lacks_slack(self.equations)
+
+    @property
+    def _norms(self) -> int:
+        return int((self.model.widths >= 2).sum()) if self.model.space else 0
+
+    @functools.cached_property
+    def _test(self) -> StabilityTest:
+        return StabilityTest(self.equations)
+
+    @functools.cached_property
+    def _problem(self) -> EquilibriumProblem:
+        loading = self.model.loading(1.0)
+        return EquilibriumProblem(self.model, loading, self.equations.start(loading), kernels=self.kernels)
+
+    def _ipopt(self, scale: float) -> Callable[..., NLPResult]:
+        return self._solvers(10.0 ** round(np.log10(scale)))
+
+    @functools.lru_cache(maxsize=8)  # noqa: B019 - lives as long as the model
+    def _solvers(self, scale: float) -> Callable[..., NLPResult]:
+        return Ipopt(objective_scale=1.0 / scale).prepare(self._problem.nlp)
+
+    def guess(self, loading: Loading) -> tuple[State, float]:
+        """A state to start from, and the gap of its closings."""
+        return first_guess(self.equations, loading, self._test.weight)
+
+    def correct(self, state: State, loading: Loading, *, firm: float = 1.0, **limits: Any) -> Corrected:
+        """Newton's method from a near state, with a proximal term that may be made firmer."""
+        return correct(self.equations, state, loading, firm * self._test.weight, **limits)
+
+    @functools.cached_property
+    def _tangent(self) -> TangentTest:
+        return TangentTest(self.equations, self._test.weight, self.model.conservative)
+
+    @property
+    def _tester(self) -> StabilityTest | TangentTest:
+        return self._test if self.model.has_potential else self._tangent
+
+    def stability(self, found: Corrected) -> Stability:
+        """The stability test at a state; without a potential no energy tells stable from unstable."""
+        return self._tester.test(found.point)
+
+    def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues, these only where it is ``doubtful``; paths ask here.
+
+        Without a potential of those of the tangent, see :class:`~sfetcas.solvers.divergence.TangentTest`.
+        """
+        return (
+            self._test.inertia(point, doubtful=doubtful) if self.model.has_potential else self._tangent.inertia(point)
+        )
+
+    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+        """Eigenvalues around zero as :class:`~sfetcas.solvers.stability.StabilityTest`; real ones without potential."""
+        return self._tester.around_zero(point)
+
+    def singular(self, point: Point, count: int) -> bool:
+        """Whether so many eigenvalues vanish where their real parts do: always where there is an energy."""
+        return self.model.conservative or self._tangent.singular(point, count)
+
+    def negative(self, found: Corrected) -> int:
+        """Number of negative eigenvalues at a state; none is counted where :attr:`leaves` is false."""
+        if not self.leaves:
+            return 0
+        return (
+            self._test.negative(found.point)
+            if self.model.has_potential
+            else self._tangent.inertia(found.point).negative
+        )
+
+    @property
+    def leaves(self) -> bool:
+        """Whether unstable states can be left: there is an energy and, where its value is not known, not too much."""
+        return self.model.minimisable or (self.model.conservative and self.equations.unknowns <= MOST_COUNTED)
+
+    def spectrum(self, found: Corrected, count: int) -> tuple[Array, Array]:
+        """Eigenvalues and lowest shapes at a state, see :meth:`StabilityTest.spectrum`."""
+        return self._test.spectrum(found.point, count)
+
+    @property
+    def weight(self) -> Array:
+        """Weight of the turning unknowns, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
+        return self._test.weight
+
+    def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
+        """IPOPT from a state, then Newton's method to rounding; the equilibrium and IPOPT's iterations.
+
+        Raises
+        ------
+        SolveError
+            No equilibrium: what IPOPT says of it.
+        """
+        if not self.model.minimisable:
+            raise SolveError(Status.FAILED, "loads without potential cannot be minimised, only followed", state)
+        if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
+            # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
+            found = self.correct(state, loading, iterations=50)
+            if not found.converged:
+                detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
+                told = contradiction(self.equations, state, loading)
+                raise SolveError(Status.INFEASIBLE if told else Status.FAILED, told or detail, state)
+            return found, 0
+        problem = self._problem
+        scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
+        result = self._ipopt(scale)(
+            p=problem.parameters(loading, state),
+            guess=problem.unknowns(state),
+            lam=problem.multipliers(state) / scale,
+        )
+        trial = problem.state(result.x, result.lam, loading, state)
+        if not np.all(np.isfinite(trial.q)):
+            raise SolveError(Status.FAILED, result.message, state)
+        polished = self.correct(trial, loading)
+        # What falls without end has no finite residual, which no comparison would find too large.
+        if not polished.converged and not polished.residual <= SOLVED:
+            status = result.status if result.status is not Status.SOLVED else Status.FAILED
+            detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
+            if status is Status.FAILED:
+                detail += f"; Newton's method left a residual of {polished.residual:.1e}"
+            told = contradiction(self.equations, trial, loading) if status is Status.INFEASIBLE else ""
+            detail += f"; {told}" if told else ""
+            raise SolveError(status, detail, trial)
+        return polished, result.iterations
+
+    def leave(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:
+        """Leave an unstable equilibrium along its escape shape to a stable or neutral one.
+
+        Raises
+        ------
+        SolveError
+            None was found.
+        """
+        amplitude = 0.2
+        for _ in range(ESCAPES):
+            try:
+                found = self._fallen(self._nudged(state, stability, loading, amplitude), loading)
+            except SolveError:
+                if not self.model.minimisable:
+                    # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
+                    break
+                amplitude *= 1.7
+                continue
+            there = self.stability(found)
+            if there.negative == 0:
+                return found, there
+            same = np.abs(found.state.q - state.q).max() < 1e-6
+            amplitude = 1.7 * amplitude if same else 0.2
+            state, stability = found.state, there
+        raise SolveError(Status.FAILED, "no stable equilibrium found along the escape shapes", state)
+
+    def _fallen(self, state: State, loading: Loading) -> Corrected:
+        """The equilibrium below a state."""
+        if self.model.minimisable:
+            return self.minimise(loading, state)[0]
+        there = flow(self.equations, state, loading, lambda point: self._tester.test(point))
+        found = None if there is None else self.correct(there, loading)
+        if found is None or not found.converged:
+            raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
+        return found
+
+    def _nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
+        """The state moved along the escape shape to the side of lower energy, closings restored."""
+        equations = self.equations
+        sides = []
+        for sign in (1.0, -1.0):
+            step = np.zeros(equations.total)
+            step[: equations.turning_unknowns] = sign * amplitude * stability.shape
+            step[equations.turning_unknowns : equations.unknowns] = sign * amplitude * stability.travel
+            moved = replace(equations.moved(state, step), lam=state.lam)
+            if equations.rows:
+                moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
+            sides.append((equations.at(moved, loading).potential, moved))
+        # A symmetric pair differs by rounding only: then the first side, so that answers repeat.  Loads that follow
+        # are not in the potential: from an unstable state both sides go down.
+        (up, first), (down, second) = sides
+        if not self.model.has_potential:
+            return first
+        return second if up - down > 1e-9 * max(abs(up), abs(down)) else first
+
+    def load_size(self, found: Corrected) -> float:
+        """Largest elastic moment or load in the balance of a state, dimensionless."""
+        loading = self.model.loading(1.0)
+        return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.moment))
+
+    def distance(self, a: State, b: State) -> float:
+        """Largest angle between the rotations of two states, rad."""
+        if not self.model.space:
+            return float(np.abs(a.q - b.q).max(initial=0.0))
+        relative = quaternion.multiply(quaternion.conjugate(a.q), b.q)
+        sine = np.linalg.norm(relative[:, 1:], axis=-1)
+        return float(2.0 * np.arctan2(sine, np.abs(relative[:, 0])).max(initial=0.0))

@@ -1,0 +1,398 @@
+"""Stability of an equilibrium: inertia of the energy on the closings, smallest eigenvalue, escape shape.
+
+With ``H`` the second derivative of the potential by rotations, ``A`` the derivative of the closings and ``M`` a
+diagonal weight, the eigenvalues of ``H x = mu M x`` on the null space of ``A`` decide: all above zero is a strict
+minimum, one below zero is a way out.  They are counted through Sylvester's law of inertia: the negative
+eigenvalues of ``H - sigma M`` less those of the Schur complement ``A (H - sigma M)^-1 A^T``.
+
+The weight of a rotation is its length times the smallest stiffness of all members over the square of its
+member's length: the eigenvalues are pure numbers, of the size of one for what the softest member does.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.linear import InertiaSolver, pattern
+from ..mechanics.equations import Equations, Point
+
+__all__ = ["LIGHT", "NEUTRAL", "RANK", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
+
+NEUTRAL = 1e-7
+"""Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
+
+ROUNDING = 2e-15
+"""The same, relative to the largest entry of the weighted matrix."""
+
+DENSE = 120
+"""Up to this many unknowns all eigenvalues by LAPACK are cheaper than factorisations (measured)."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Numbers of eigenvalues below zero, and of those that cannot be told from zero."""
+
+    negative: int
+    zero: int
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Outcome of the test.
+
+    Attributes
+    ----------
+    stable : bool, "neutral", or "not defined" for loads without potential
+    negative : int
+        Eigenvalues below zero: independent ways out.
+    smallest : float
+        Rayleigh quotient of the escape shape by the integral of its square, dimensionless.
+    shape : ndarray
+        Escape shape: the turning unknowns of the smallest eigenvalue, largest entry 1.
+    travel : ndarray
+        The displacements kept as unknowns in it.
+    """
+
+    stable: bool | str
+    negative: int
+    smallest: float
+    shape: Array
+    travel: Array
+
+
+class StabilityTest:
+    """The test for one model, prepared for repeated use."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.equations = equations
+        # Displacements that springs and bodies act upon count as rotations do; all others follow from the closings.
+        self._chosen = np.concatenate([np.arange(equations.turning_unknowns), equations.elastic_displacements])
+        self._n = n = len(self._chosen)
+        place = np.full(equations.total, -1, dtype=np.intp)
+        place[self._chosen] = np.arange(n)
+        row, column = place[equations.row], place[equations.column]
+        self._in_h = np.flatnonzero((row >= 0) & (column >= 0))
+        self._h_row, self._h_column = row[self._in_h], column[self._in_h]
+        self._in_a = np.flatnonzero((equations.row >= equations.unknowns) & (column >= 0))
+        self._a_column = column[self._in_a]
+        self._diagonal = np.flatnonzero(self._h_row == self._h_column)
+
+    @functools.cached_property
+    def _combine(self) -> Array:
+        return _left_null_space(self.equations)
+
+    @functools.cached_property
+    def weight(self) -> Array:
+        """The weight M of the module's docstring, (turning unknowns,)."""
+        return self.equations.mass * self._softest
+
+    @functools.cached_property
+    def _weights(self) -> Array:
+        """The weight of all that counts: displacements have next to none."""
+        count = len(self.equations.elastic_displacements)
+        return np.concatenate([self.weight, np.full(count, LIGHT * self._softest)])
+
+    @functools.cached_property
+    def _masses(self) -> Array:
+        return np.concatenate([self.equations.mass, np.full(len(self.equations.elastic_displacements), LIGHT)])
+
+    @functools.cached_property
+    def _softest(self) -> float:
+        model = self.equations.model
+        x, softest = np.linspace(0.0, 1.0, 5), np.inf
+        for name, member in model.scene.members.items():
+            line = model.scene.center_lines[name]
+            if member.section is None or member.type == "rigid":
+                continue
+            values = model.scene.sections[str(member.section)].stiffness(x)
+            values = values if model.space else values[:, [1 if line.bending_axis == 2 else 2]]
+            softest = min(softest, float(np.nanmin(values)) / line.length**2)
+        softest = softest if np.isfinite(softest) else model.scales.moment / model.scales.length
+        return softest / model.scales.moment * model.scales.length
+
+    def _rows(self, point: Point) -> Array:
+        """The closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
+        equations = self.equations
+        rows = np.zeros((equations.rows, self._n))
+        rows[equations.row[self._in_a] - equations.unknowns, self._a_column] = point.entries[self._in_a]
+        return (self._combine.T @ rows) / np.sqrt(self._weights)
+
+    def _weighted(self, point: Point) -> Array:
+        root = np.sqrt(self._weights)
+        return np.asarray(point.entries[self._in_h] / (root[self._h_row] * root[self._h_column]))
+
+    def test(self, point: Point) -> Stability:
+        """Inertia, smallest eigenvalue and escape shape at an equilibrium."""
+        equations = self.equations
+        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
+        if self._n == 0:
+            return Stability(True, 0, np.inf, np.zeros(0), nothing)
+        entries = self._weighted(point)
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        find = self._dense if self._is_dense else self._sparse
+        values, vector, negative = find(point, entries, limit)
+        if not len(values):
+            return Stability(True, 0, np.inf, np.zeros(turning), nothing)
+        stable: bool | str = bool(values[0] > limit)
+        if negative == 0 and not stable:
+            stable = "neutral"
+        shape = vector / np.sqrt(self._weights)
+        quotient = float(values[0]) * float(vector @ vector) / float(shape @ (self._masses * shape))
+        turned = shape[:turning] if np.abs(shape[:turning]).max(initial=0.0) > 0.0 else shape
+        shape = shape / turned[np.argmax(np.abs(turned))]
+        travel = nothing.copy()
+        travel[equations.elastic_displacements - turning] = shape[turning:]
+        return Stability(stable, negative, quotient, shape[:turning], travel)
+
+    def negative(self, point: Point) -> int:
+        """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
+        if self._n == 0:
+            return 0
+        entries = self._weighted(point)
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        if not self._is_dense:
+            return self._below(point, entries, -limit)
+        return int((np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]) < -limit).sum())
+
+    @property
+    def _is_dense(self) -> bool:
+        # Displacements without stiffness of their own make the sparse factorisation without pivots break down.
+        return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.elastic_displacements) else DENSE)
+
+    def spectrum(self, point: Point, count: int) -> tuple[Array, Array]:
+        """All eigenvalues, zero where they are neutral, and the lowest shapes (count or fewer, turning unknowns)."""
+        entries, rows = self._weighted(point), self._rows(point)
+        projected, basis = self._projected(entries, rows)
+        values, vectors = np.linalg.eigh(projected)
+        turning = self.equations.turning_unknowns
+        shapes = ((basis @ vectors[:, :count]).T / np.sqrt(self._weights))[:, :turning]
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
+        return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
+
+    def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
+        """Numbers of negative and of vanishing eigenvalues alone; many unknowns: of these only where it is doubtful."""
+        if self._n == 0:
+            return Inertia(0, 0)
+        entries = self._weighted(point)
+        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        if not self._is_dense:
+            below = self._below(point, entries, -limit)
+            return Inertia(below, 0) if not doubtful else Inertia(below, self._below(point, entries, limit) - below)
+        values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
+        below = int((values < -limit).sum())
+        return Inertia(below, int((values <= limit).sum()) - below)
+
+    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+        """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
+
+        Few unknowns: all eigenvalues.  Many: the few that are nearest to zero.
+        """
+        entries, turning = self._weighted(point), self.equations.turning_unknowns
+        root = np.sqrt(self._weights)[:, None]
+        if self._is_dense:
+            projected, basis = self._projected(entries, self._rows(point))
+            values, vectors = np.linalg.eigh(projected)
+            return 0, values, (basis @ vectors / root)[:turning]
+        values, vectors = self._inverse_iterated(point, entries)
+        before = self._below(point, entries, float(values[0] - 1e-6 * np.abs(values).max()))
+        return before, values, (vectors / root)[:turning]
+
+    def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
+        """The full matrix on the null space of the rows, and a basis of that."""
+        h = np.zeros((self._n, self._n))
+        h[self._h_row, self._h_column] = entries
+        if not len(rows):
+            return h, np.eye(self._n)
+        _, sizes, right = np.linalg.svd(rows)
+        basis = right[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
+        return basis.T @ h @ basis, basis
+
+    def _dense(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
+        projected, basis = self._projected(entries, self._rows(point))
+        values, vectors = np.linalg.eigh(projected)
+        if not len(values):
+            return values, np.zeros(self._n), 0
+        return values, basis @ vectors[:, 0], int((values < -limit).sum())
+
+    def _sparse(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
+        negative = self._below(point, entries, -limit)
+        shift = -limit
+        while negative and self._below(point, entries, shift) > 0:
+            shift *= 8.0 if shift < -0.1 else 1000.0
+        values, vector = self._subspace(point, entries, shift)
+        if negative == 0 and values[0] < -limit:
+            values[0] = -limit
+        return values, vector, negative
+
+    def _below(self, point: Point, entries: Array, shift: float) -> int:
+        """Number of eigenvalues on the null space of the rows below the shift."""
+        if self.equations.rows > MANY_ROWS or len(self.equations.elastic_displacements):
+            return self._below_bordered(point, shift)
+        rows = self._rows(point)
+        shifted = entries.copy()
+        shifted[self._diagonal] -= shift
+        matrix = ca.DM(self._pattern, shifted)
+        self._ldl.nfact(matrix)
+        if not len(rows):
+            return self._ldl.neig(matrix)
+        schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
+        values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
+        return self._ldl.neig(matrix) - int((values < -REDUNDANT * np.abs(values).max()).sum())
+
+    def _below_bordered(self, point: Point, shift: float) -> int:
+        """The same from the whole Newton matrix, with closings and displacements very slightly soft.
+
+        Each row of the closings adds a negative eigenvalue.  The softness moves an eigenvalue by its share of the
+        stiffness; rounding by its inverse: both stay below a millionth.
+        """
+        equations = self.equations
+        entries, diagonal = point.entries.copy(), equations.diagonal
+        entries[diagonal[self._chosen]] -= shift * self._weights
+        size = float(np.abs(entries[diagonal[: equations.turning_unknowns]]).max(initial=1.0))
+        # Without pivots the factors break down where displacements hang between two slides, or between many rigid
+        # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
+        for soft in (SOFT,) if self._n <= FULL else SOFTER:
+            softened = entries.copy()
+            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self._softest
+            softened[diagonal[equations.unknowns :]] -= soft / size
+            matrix, ones = ca.DM(self._bordered_pattern, softened), ca.DM.ones(equations.total)
+            self._bordered.nfact(matrix)
+            gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
+            if np.abs(gap).max() < BROKEN:
+                return self._bordered.neig(matrix) - equations.rows
+        return self._below_dense(point, shift)
+
+    def _below_dense(self, point: Point, shift: float) -> int:
+        values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
+        return int((values < shift).sum())
+
+    @functools.cached_property
+    def _bordered_pattern(self) -> ca.Sparsity:
+        return pattern(self.equations.total, self.equations.row, self.equations.column)
+
+    @functools.cached_property
+    def _bordered(self) -> InertiaSolver:
+        return InertiaSolver("bordered_inertia", self._bordered_pattern)
+
+    @functools.cached_property
+    def _pattern(self) -> ca.Sparsity:
+        return pattern(self._n, self._h_row, self._h_column)
+
+    @functools.cached_property
+    def _ldl(self) -> InertiaSolver:
+        return InertiaSolver("inertia", self._pattern)
+
+    @functools.cached_property
+    def _starts(self) -> Array:
+        return np.searchsorted(self._h_column, np.arange(self._n))
+
+    def _times(self, entries: Array, block: Array) -> Array:
+        """The weighted matrix times a block of vectors."""
+        # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
+        return np.asarray(np.add.reduceat(entries[:, None] * block[self._h_row], self._starts, axis=0))
+
+    def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
+        """Smallest eigenvalues above the shift by inverse iteration of a small subspace.
+
+        The Newton matrix, shifted, keeps the vectors on the closings; it is as sparse as that of a solve.
+        """
+        equations, n = self.equations, self._n
+        root = np.sqrt(self._weights)[:, None]
+        block = np.random.default_rng(0).standard_normal((n, min(4, n)))
+        loads = np.zeros((equations.total, block.shape[1]))
+        smallest = np.array([np.inf])
+        for count in range(60):
+            shifted = point.entries.copy()
+            shifted[equations.diagonal[self._chosen]] -= shift * self._weights
+            # A tiny negative diagonal keeps redundant rows from making the matrix singular.
+            shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
+            equations.solver.factor(shifted)
+            loads[self._chosen] = root * block
+            block = root * equations.solver.solve(loads)[self._chosen]
+            block = np.linalg.qr(block)[0]
+            product = self._times(entries, block)
+            new, turn = np.linalg.eigh(block.T @ product)
+            block = block @ turn
+            if abs(new[0] - smallest[0]) <= 1e-7 * max(abs(new[0]), abs(shift)):
+                return new, block[:, 0]
+            smallest = new
+            if count >= 2:
+                # Each solve factorises anyway: a nearer shift is free and converges ten times as fast.
+                shift = new[0] - 0.1 * (new[-1] - new[0]) - 1e-3 * abs(new[0])
+        return smallest, block[:, 0]
+
+    def _inverse_iterated(self, point: Point, entries: Array) -> tuple[Array, Array]:
+        """The eigenvalues nearest to zero, half of a block, and their vectors."""
+        equations, n = self.equations, self._n
+        root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
+        block = np.random.default_rng(0).standard_normal((n, width))
+        loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
+        shifted = point.entries.copy()
+        shifted[equations.diagonal[self._chosen]] += BESIDE * self._weights
+        shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
+        equations.solver.factor(shifted)
+        for _ in range(60):
+            loads[self._chosen] = root * block
+            block = np.linalg.qr(root * equations.solver.solve(loads)[self._chosen])[0]
+            product = self._times(entries, block)
+            values, turn = np.linalg.eigh(block.T @ product)
+            block = block @ turn
+            nearest = np.sort(np.argsort(np.abs(values))[:NEAREST])
+            if np.abs(values[nearest] - last).max() <= 1e-10 * np.abs(values[nearest]).max():
+                break
+            last = values[nearest]
+        return values[nearest], block[:, nearest]
+
+
+BESIDE = 1.3e-4
+"""Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
+
+NEAREST = 4
+"""Eigenvalues that are looked at around zero where there are many: in space two may vanish at once."""
+
+DENSE_WITH_TRAVEL = 500
+"""The same where displacements take part."""
+
+MANY_ROWS = 150
+"""From this many closings on their dense complement costs more than the bordered matrix (measured)."""
+
+LIGHT = 1e-3
+"""Weight of a displacement over the length scale beside that of a rotation along the length."""
+
+SOFT = 1e-9
+"""Softness of closings in the bordered matrix, and stiffness of displacements, beside the rest."""
+
+SOFTER = (SOFT, 10.0 * SOFT, 100.0 * SOFT)
+"""The same one after the other, where full matrices would take long."""
+
+FULL = 600
+"""Up to this many unknowns full matrices take less than a second."""
+
+BROKEN = 1e-2
+"""Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
+
+REDUNDANT = 1e-13
+"""Eigenvalues of the closings' complement below this, relative to the largest, come of redundant ones: rounding.
+
+A neutral direction shifted by 1e-7 leaves 1e-8 there, while the largest may be 1e3 and more.
+"""
+
+RANK = 1e-10
+"""Singular values below this, relative to the largest, are zero."""
+
+
+def _left_null_space(equations: Equations) -> Array:
+    """Combinations of the rows in which no displacement appears, (rows, combinations)."""
+    w = np.zeros((equations.rows, equations.displacement_unknowns))
+    w[: len(equations.model.positions.rows)] = equations.model.positions.W.full()
+    w = np.delete(w, equations.elastic_displacements - equations.turning_unknowns, axis=1)
+    if not w.shape[1]:
+        return np.eye(equations.rows)
+    left, sizes, _ = np.linalg.svd(w)
+    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+    return np.asarray(left[:, rank:])

@@ -1,0 +1,216 @@
+"""Tracing a curve of equilibria step by step, with its limit and bifurcation points.
+
+A step is taken back and halved where Newton's method does not lead to the curve soon, where the curve turns, where
+what is found is far from what was expected, or where more eigenvalues change their signs than one step explains:
+then it may have jumped over a fold or to another branch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from .arclength import Curve, Standing, Tangent
+from .critical import Event, events_between
+
+__all__ = ["Traced", "switched", "trace"]
+
+TURNING = 0.25
+"""Angle between the tangents of neighbouring points, rad, that steps aim at."""
+
+SHARPEST = 2.5
+"""More than this many times that angle is too much."""
+
+STRIDE = 0.35
+"""No node turns by more than this in a step, rad."""
+
+SHARE = 30
+"""No step takes more than this part of the range."""
+
+FAR = 0.5
+"""A point farther from the expected one than this share of the step is not on the same curve."""
+
+SHORTEST = 1e-7
+"""Shorter steps, rad or shares of the unit, end a curve."""
+
+FINE = 1e-4
+"""Below this length a step may meet several eigenvalues at once."""
+
+FIRST = 0.1
+"""Length of the first step, rad or shares of the unit."""
+
+MOST_AT_ONCE = 6
+"""So many eigenvalues at most change their signs at once: more do so where a mesh is too coarse for what it carries."""
+
+EXPECTED = 3
+"""Newton iterations of a step that is as long as it should be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """A stretch of a curve.
+
+    Attributes
+    ----------
+    points : list of Standing
+        In their order, limit and bifurcation points among them.
+    events : list of Event
+    end : str
+        Why it ends: ``range``, ``points``, or ``lost``.
+    """
+
+    points: list[Standing]
+    events: list[Event]
+    end: str
+
+
+def trace(
+    curve: Curve, start: Standing, span: tuple[float, float], count: int, knots: tuple[float, ...] = ()
+) -> Traced:
+    """Follow a curve from a point until the factor leaves the span, or for so many points.
+
+    At the knots of histories the curve has a corner: it is followed from one to the next.
+    """
+    traced, curve = Traced([start], [], "range"), curve.firmer() if start.inertia.zero else curve
+    stops = [span[0], *knots, span[1]]
+    while traced.end == "range":
+        now = traced.points[-1]
+        pieces = [(a, b) for a, b in zip(stops, stops[1:], strict=False) if a <= now.factor <= b]
+        ahead = [(a, b) for a, b in pieces if now.factor != (b if now.tangent.factor > 0.0 else a)]
+        if not ahead:
+            return traced
+        here = curve.within(ahead[0]) if curve.model.scene.histories else curve
+        if here is not curve:
+            along = Tangent(np.zeros_like(now.tangent.z), now.tangent.factor)
+            now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
+        stride = (span[1] - span[0]) / SHARE
+        part = _piece(here, now, ahead[0], stride, count - len(traced.points) + len(traced.events))
+        traced = Traced(traced.points + part.points[1:], traced.events + part.events, part.end)
+    return traced
+
+
+def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: float, more: int) -> Traced:
+    """The same within one piece, with steps that change the factor by a stride at most."""
+    points: list[Standing] = [start]
+    events: list[Event] = []
+    now, before, length = start, None, FIRST
+    for _ in range(more):
+        length = min(length, _longest(curve, now, stride))
+        step = _step(curve, now, before, length, span)
+        if step is None:
+            return Traced(points, events, "lost")
+        there, used, left = step
+        met = events_between(curve, now, there)
+        events += met
+        points += [*(event.standing for event in met), there]
+        if left:
+            return Traced(points, events, "range")
+        if len(points) > LOOP and _closes(curve, start, now, there):
+            return Traced(points, events, "closed")
+        length = used * _growth(curve, now, there)
+        before, now = now, there
+    return Traced(points, events, "points")
+
+
+def _closes(curve: Curve, start: Standing, now: Standing, there: Standing) -> bool:
+    """Whether the curve has come back to where it began, in the same direction."""
+    step = 1.2 * curve.prepared.distance(now.state, there.state)
+    near = curve.prepared.distance(start.state, there.state) < step
+    level = abs(there.factor - start.factor) <= 1.2 * abs(there.factor - now.factor) + 1e-9 * curve.unit
+    return near and level and curve.inner(start.tangent, there.tangent) > 0.9
+
+
+LOOP = 8
+"""Points before a curve may close: fewer make no loop."""
+
+
+def _longest(curve: Curve, now: Standing, stride: float) -> float:
+    turning = float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
+    return min(STRIDE / max(turning, 1e-300), stride / max(abs(now.tangent.factor), 1e-300))
+
+
+def _step(
+    curve: Curve, now: Standing, before: Standing | None, length: float, span: tuple[float, float]
+) -> tuple[Standing, float, bool] | None:
+    """The next point, the length that led to it and whether it is the end of the span."""
+    bend = None if before is None else curve.bend(before, now)
+    while length > SHORTEST:
+        guess = curve.predicted(now, length, bend)
+        there = curve.corrected(*guess, now.tangent, now.arc + length, sharp=False)
+        if there is not None and _same_curve(curve, now, there, guess[0], length):
+            if span[0] <= there.factor <= span[1]:
+                return there, length, False
+            end = _at_end(curve, now, there, span)
+            if end is not None:
+                return end, length, True
+        length *= 0.5
+    return None
+
+
+def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, length: float) -> bool:
+    if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST * TURNING):
+        return False
+    turned = length * float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
+    if curve.prepared.distance(expected, there.state) > FAR * turned + SHORTEST:
+        return False
+    folded = now.tangent.factor * there.tangent.factor < 0.0
+    changed = abs(there.inertia.negative - now.inertia.negative)
+    plausible = changed == 1 if folded else changed <= 2
+    return plausible or (length < FINE and changed <= MOST_AT_ONCE)
+
+
+def _at_end(curve: Curve, now: Standing, there: Standing, span: tuple[float, float]) -> Standing | None:
+    """The point of the curve at the end of the span that lies before a point beyond it."""
+    end = span[1] if there.factor > span[1] else span[0]
+    a, b = now, there
+    for _ in range(60):
+        share = (end - a.factor) / (b.factor - a.factor) if b.factor != a.factor else 0.5
+        found = curve.between(now, there)(a.arc - now.arc + min(max(share, 0.0), 1.0) * (b.arc - a.arc))
+        if found is None:
+            return None
+        exact = curve.at_factor(found, end) if abs(found.factor - end) <= 0.01 * curve.unit else None
+        if exact is not None:
+            return exact
+        a, b = (found, b) if span[0] <= found.factor <= span[1] else (a, found)
+    return None
+
+
+def _growth(curve: Curve, now: Standing, there: Standing) -> float:
+    """How much longer the next step may be."""
+    cosine = min(1.0, curve.inner(now.tangent, there.tangent))
+    by_angle = TURNING / max(np.arccos(cosine), 1e-12)
+    by_effort = 2.0 ** (EXPECTED + 0.5 - there.iterations)
+    return float(np.clip(min(by_angle, by_effort), 0.3, 2.0))
+
+
+def switched(curve: Curve, event: Event, shape: Array, side: int) -> Standing | None:
+    """The first point on the branch that crosses at a bifurcation, looking away from it.
+
+    The branch is looked for across the shape at growing distances: there the shape's share is given and the
+    factor is found, while on the curve that was followed there is no such point.
+    """
+    here = event.standing
+    across = _full_shape(curve, here, shape)
+    across = Tangent(side * across.z, side * across.factor)
+    for length in (0.01, 0.02, 0.04, 0.08, 0.16, 0.3):
+        state, factor = curve.predicted(replace(here, tangent=across), length)
+        found = curve.corrected(state, factor, across, length)
+        if found is not None and curve.inner(found.tangent, across) > 0.3:
+            return replace(found, arc=length)
+    return None
+
+
+def _full_shape(curve: Curve, here: Standing, shape: Array) -> Tangent:
+    """A direction along the shape with the displacements and multipliers that belong to it, across the curve."""
+    equations, n = curve.equations, curve.equations.turning_unknowns
+    right = np.zeros(equations.total)
+    right[:n] = curve.prepared.weight * shape
+    z = curve.solved(here.point, right)
+    z *= np.sign(z[:n] @ (curve.prepared.weight * shape)) or 1.0
+    along = curve.normed(Tangent(z, 0.0))
+    share = curve.inner(along, here.tangent)
+    mixed = Tangent(along.z - share * here.tangent.z, along.factor - share * here.tangent.factor)
+    return curve.normed(mixed)
