@@ -76,7 +76,7 @@ class Winding:
         return np.asarray(raw + period * np.round((near - raw) / period))
 
     def _parts(self, q: Array) -> tuple[Array, Array, Array]:
-        """Sine and cosine of the angles over the share, and the share, as :class:`~sfetcas.mechanics.joints.Turning`."""
+        """Sines, cosines of the angles over the share, and the share, of :class:`~sfetcas.mechanics.joints.Turning`."""
         relative = q[self.sides[:, 1]]
         if not self._on_ground:
             q = np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
