@@ -439,7 +439,7 @@ def test_threads_draw_the_same_as_one_alone(tmp_path, solved):
 
 
 def test_no_window_is_ever_needed():
-    code = "import sys, sfetcas.plotting; sys.exit('matplotlib.pyplot' in sys.modules)"
+    code = "import sys, sfetcas.pictures.plotting; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
