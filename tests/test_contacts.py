@@ -766,6 +766,61 @@ def test_hump_over_a_weak_pull_is_that_of_small_deflections():
     assert (1.0 - one[1], two[0]) == (pytest.approx(0.75 * pull / heavy, rel=1e-4),) * 2
 
 
+def test_stretch_grows_from_nothing_where_a_tip_comes_to_lie_flat():
+    """The tip of a heavy cantilever lies flat from the weight at which its angle vanishes; then a stretch grows."""
+
+    def lying(heavy):
+        step = solve(made(above(0.2, loads=weight(heavy))), accuracy=1e-9).last
+        return step.angle("B"), step.contacts["floor"]["at"]
+
+    (one, _), (two, _) = lying(15.0), lying(15.02)
+    flat = 15.02 + 0.02 * two / (one - two)
+    assert lying(flat * (1.0 - 1e-5))[1] == 1.0
+    rates = []
+    for beyond in (1e-5, 1e-4, 1e-3):
+        angle, (begin, end) = lying(flat * (1.0 + beyond))
+        assert (angle, end) == (pytest.approx(0.0, abs=1e-9), 1.0)
+        rates.append((1.0 - begin) / beyond)
+    # The weight at which the angle vanishes is extrapolated, to 1e-7 of it; small deflections give a quarter.
+    np.testing.assert_allclose(rates, rates[-1], rtol=1e-2)
+    assert rates[-1] == pytest.approx(0.25, rel=0.05)
+
+
+def test_hump_beside_an_end_that_a_couple_presses_down():
+    """Flat and without moment where it begins, on the floor at its end: a couple M opens ``d = 2 sqrt(M / p)``."""
+    couple, heavy = 0.2, 5000.0
+    loads = weight(heavy) | {"M": {"type": "moment", "node": "B", "value": -couple}}
+    begin, end = solve(made(above(0.0, loads=loads)), accuracy=1e-9).last.contacts["floor"]["at"]
+    hump = 2.0 * np.sqrt(couple / heavy)
+    assert end == 1.0
+    # It turns by M d / 4 = 6e-4: small deflections hold to the square of that.
+    assert (begin[0], 1.0 - begin[1]) == (pytest.approx(0.0, abs=1e-9), pytest.approx(hump, rel=1e-6))
+
+
+def test_hump_that_closes_leaves_one_stretch():
+    """A very heavy chain with kinks, clamped above a floor: two places of its first member come to lie between them."""
+    points = {"a": [0.0, 0.467], "b": [0.604, 0.495], "c": [1.014, 0.4], "d": [1.573, 0.705]}
+    table = {
+        "gravity": [0, -1],
+        "sections": {"s": {**SOFT, "rhoA": 7500.0}},
+        "nodes": {n: {"position": p} for n, p in points.items()},
+        "members": {"m": {"nodes": ["a", "b"]}, "n": {"nodes": ["b", "c"]}, "o": {"nodes": ["c", "d"]}},
+        "loads": {
+            "b": {"type": "moment", "node": "b", "value": -0.36},
+            "d": {"type": "moment", "node": "d", "value": -0.23},
+        },
+        "contacts": {"floor": {**{k: v for k, v in FLOOR.items() if k != "member"}, "members": "all"}},
+    }
+    table["nodes"]["a"]["support"] = "clamped"
+    for member in table["members"].values():
+        member["section"] = "s"
+    step = solve(made(table)).last
+    assert smallest_gap(step) > -1e-4 * 2.0  # the accuracy asked for, times the size of the scene
+    lengths = sum(np.linalg.norm(np.subtract(points[p], points[q])) for p, q in ("ab", "bc", "cd"))
+    np.testing.assert_allclose(balance(step), [0.0, 7500.0 * lengths, 0.0], atol=1e-4 * 7500.0 * lengths)
+    assert sum(isinstance(x, list) for x in step.contacts["floor"]["at"]) == 3
+
+
 @pytest.mark.parametrize("height", [0.3, 0.6])
 def test_stiff_bar_falls_onto_a_floor_and_leans_on_it(height):
     """A bar hinged at a height leans at the angle that geometry asks for, half of its weight on the floor."""

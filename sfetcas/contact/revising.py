@@ -60,6 +60,8 @@ class Reviser:
         """
         touches, i, k = ran.touches, ran.touch, ran.place
         touch, rest = touches[i], touches[:i] + touches[i + 1 :]
+        if ran.met is not None:
+            return self._met(touches, i, ran.met)
         if ran.collapsed:
             middle = 0.5 * sum(touch.places)
             at = middle if min(touch.places) > 0.0 and max(touch.places) < 1.0 else float(round(middle))
@@ -80,6 +82,30 @@ class Reviser:
                 at = 1e-3 if self.scene.members[other].nodes[0] == node else 1.0 - 1e-3
                 return _numbered((*rest, replace(touch, member=other, at=at)))
         return _numbered((*rest, replace(touch, at=end)))
+
+    @staticmethod
+    def _met(touches: Touches, one: int, other: int) -> Touches:
+        """Two touches that ran into each other as one: a stretch over both; of two places the one between them."""
+        places = (*touches[one].places, *touches[other].places)
+        rest = tuple(touch for i, touch in enumerate(touches) if i not in (one, other))
+        low, high = min(places), max(places)
+        joined = (
+            replace(touches[one], at=low, to=high) if len(places) > 2 else replace(touches[one], at=0.5 * (low + high))
+        )
+        return _numbered((*rest, joined))
+
+    def lying_to_the_end(self, ran: Ran) -> Touches | None:
+        """A place that ran to an end where touching at the end alone was wrong before: what is between them lies flat."""
+        if ran.met is not None:
+            return None
+        touches, i = ran.touches, ran.touch
+        touch, end = touches[i], float(round(touches[i].places[ran.place]))
+        node = self.scene.members[touch.member].nodes[int(end)]
+        flat = self.scene.contacts[touch.contact].type not in ("point", "line") and not self._stiff(touch.member)
+        if ran.collapsed or touch.to is not None or not flat or not self._takes_part(touch.contact, node):
+            return None
+        low, high = sorted((touch.at, end))
+        return _numbered((*touches[:i], replace(touch, at=low, to=high), *touches[i + 1 :])) if low < high else None
 
     def check(self, touches: Touches) -> None:
         """Refuse what cannot be modelled.

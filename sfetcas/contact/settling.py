@@ -33,6 +33,9 @@ APART = 1e-7
 CLOSE = 1e-4
 """Fractions of the length beside an end of a member in which a double root is lost in rounding."""
 
+TOGETHER = 1e-3
+"""Fractions of the length between two touches in which a root is lost in rounding: moments there fall as its square."""
+
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
 
@@ -78,12 +81,16 @@ class Way:
 
 @dataclass(frozen=True)
 class Ran:
-    """A place (0 or 1) of a touch that ran to the end of its member, or into the other place of its stretch."""
+    """A place (0 or 1) of a touch that ran to the end of its member, or into the other place of its stretch.
+
+    Or into the touch of number ``met`` on the same obstacle.
+    """
 
     touches: tuple[Touch, ...]
     touch: int
     place: int
     collapsed: bool
+    met: int | None = None
 
 
 def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
@@ -233,14 +240,14 @@ class Settler:
             if not np.isfinite(step).all():
                 return None
             step, ran, room = _shortened(held.mesh.touches, free, step)
-            near = ran is not None or _nearest_end(held.mesh.touches, free) is not None
+            near = ran is not None or _nearest(held.mesh.touches, free) is not None
             crowded = crowded + 1 if near else 0
             end = ran or end
             if ran is not None and room < 10.0 * APART:
                 return ran
             size, before = float(np.abs(step).max()), size
             if end is not None and crowded > PATIENCE and size > ARRIVING * before:
-                return _nearest_end(held.mesh.touches, free) or replace(end, touches=held.mesh.touches)
+                return _nearest(held.mesh.touches, free) or replace(end, touches=held.mesh.touches)
             if size < SETTLED:
                 # Where places have no say, as along a straight rigid member, no step is no answer.
                 return replace(held, slopes=slopes) if np.abs(here).max() < MISSED else None
@@ -316,13 +323,30 @@ def _places(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Array:
     return np.array([touches[i].places[k] for i, k in free])
 
 
-def _nearest_end(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Ran | None:
-    """The place that is nearest to an end of its member, if so near that rounding may lead it to and fro there."""
-    room = {(i, k): min(touches[i].places[k], 1.0 - touches[i].places[k]) for i, k in free}
-    i, k = min(room, key=lambda place: room[place])
+def _ahead(touches: tuple[Touch, ...], i: int, k: int, sign: float) -> tuple[float, int | None]:
+    """How far it is from a place to the end of its member, or to a touch of the same obstacle before it, and which."""
     touch, x = touches[i], touches[i].places[k]
-    collapsed = touch.to is not None and (touch.places[1 - k] > x) == (x > 0.5)
-    return Ran(touches, i, k, collapsed) if room[i, k] <= CLOSE else None
+    room, met = 1.0 - x if sign > 0.0 else x, None
+    for j, other in enumerate(touches):
+        if j != i and (other.contact, other.member) == (touch.contact, touch.member):
+            for ahead in (sign * (y - x) for y in other.places):
+                room, met = (ahead, j) if 0.0 < ahead < room else (room, met)
+    return room, met
+
+
+def _nearest(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Ran | None:
+    """The place nearest to an end of its member or to another touch, if so near that rounding may lead it to and fro."""
+    found = []
+    for i, k in free:
+        touch = touches[i]
+        for sign in (1.0, -1.0):
+            room, met = _ahead(touches, i, k, sign)
+            inwards = touch.to is not None and (touch.places[1 - k] > touch.places[k]) == (sign > 0.0)
+            if inwards and met is not None:
+                continue
+            found.append((room / (CLOSE if met is None else TOGETHER), Ran(touches, i, k, inwards, met)))
+    share, ran = min(found, key=lambda pair: pair[0])
+    return ran if share <= 1.0 else None
 
 
 def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Array) -> tuple[Array, Ran | None, float]:
@@ -332,13 +356,13 @@ def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Ar
         if abs(change) < SETTLED:
             continue
         touch, x = touches[i], touches[i].places[k]
-        room, collapsed = 1.0 - x if change > 0.0 else x, False
+        (room, met), collapsed = _ahead(touches, i, k, float(np.sign(change))), False
         # Towards the other place of its stretch, unless that is an end of the member on the same side.
         if touch.to is not None and (touch.places[1 - k] > x) == (change > 0.0):
-            room, collapsed = abs(touch.places[1 - k] - x), True
+            room, collapsed, met = abs(touch.places[1 - k] - x), True, None
         # Half of the room again and again: a double root at its end, as of a weight that hangs over.
         if (abs(change) > 0.4 * room or room < 10.0 * APART) and room < least:
-            ran, least = Ran(touches, i, k, collapsed), room
-        # Two places of a stretch may both move towards each other.
+            ran, least = Ran(touches, i, k, collapsed, met), room
+        # Two places may both move towards each other.
         factor = min(factor, 0.45 * room / abs(change))
     return factor * step, ran, least

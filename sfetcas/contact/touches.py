@@ -249,8 +249,7 @@ class Touched:
             bends = float((1.0 - 2.0 * at) * (moment @ axis) * away)
             held = model.scene.nodes[node].support != "free"
             if push < -1e-9 * model.scales.force or (abs(bends) > 1e-8 and not held):
-                stays = push > 0.0 and bends < 0.0
-                return Loose(at, self._risen(touch, push, bends * model.scales.moment, at), stays)
+                return Loose(at, *self._risen(touch, push, bends * model.scales.moment, at))
         return None
 
     def left_over(self, node: str) -> tuple[Array, Array]:
@@ -270,19 +269,22 @@ class Touched:
                     moment = moment + (2.0 * i - 1.0) * found["moment"][0] / self.model.scales.moment
         return moment, force
 
-    def _risen(self, touch: Touch, push: float, bends: float, at: float) -> float:
-        """How far a heavy beam rises from a plane under a force and a couple at its end, as a fraction of the length.
+    def _risen(self, touch: Touch, push: float, bends: float, at: float) -> tuple[float, bool]:
+        """How far a heavy beam rises from a plane under a force and a couple at its end, and whether the end stays.
 
-        Where ``bends - push d - pressure d^2 / 2`` vanishes; where the couple presses the end on the plane,
-        ``d = 2 sqrt(couple / pressure)``.
+        As a fraction of the length.  A couple that presses the end on the plane lifts what is beside it, over
+        ``d = 2 sqrt(couple / pressure)``, and pushes the end by three quarters of the weight of that length.
+        Otherwise the end rises as well, where ``bends - push d - pressure d^2 / 2`` vanishes.
         """
         pressure, span, length = self._pressure(touch, at), float(touch.to or 0.0) - touch.at, self._length(touch)
+        weight = max(pressure, 0.0)
+        stays = bends < 0.0 and push > -1.5 * np.sqrt(-bends * weight)
         if pressure <= 0.0:
-            return FIRST_RISE * span
+            return FIRST_RISE * span, stays
         inner = push**2 + 2.0 * bends * pressure
-        rise = 2.0 * np.sqrt(abs(bends) / pressure) if inner < 0.0 or push > 0.0 > bends else 0.0
-        rise = rise or (np.sqrt(inner) - push) / pressure
-        return float(np.clip(rise / length, 1e-3 * span, MOST_RISE * span))
+        beside = 2.0 * np.sqrt(abs(bends) / pressure)
+        rise = beside if stays or inner < 0.0 else (np.sqrt(inner) - push) / pressure
+        return float(np.clip(rise / length, 1e-3 * span, MOST_RISE * span)), bool(stays)
 
     def _length(self, touch: Touch) -> float:
         return self.model.scene.center_lines[touch.member].length
