@@ -860,6 +860,19 @@ def test_member_inside_a_circle_may_pass_its_centre():
     np.testing.assert_allclose(step.position("B")[:2], [np.sin(2.5) / 2.5, (1 - np.cos(2.5)) / 2.5], atol=1e-6)
 
 
+def test_bar_that_begins_across_the_centre_of_a_bowl_comes_to_rest_in_it():
+    """A stiff bar rests on its two ends, half of its weight on each: at the centre itself no direction leads out."""
+    bowl = {"type": "circle", "center": [0.5, 0.0], "radius": 0.6, "side": "inside", "members": "all"}
+    table = above(0.0, contact=bowl, loads=weight(0.01))
+    table["nodes"]["A"]["support"] = "free"
+    step = solve(made(table)).last
+    # It bends by 1e-4, and rests as low as its half length allows.
+    drop = np.sqrt(0.6**2 - 0.5**2)
+    for end, x in (("A", 0.0), ("B", 1.0)):
+        np.testing.assert_allclose(step.position(end), [x, -drop, 0.0], atol=1e-3)
+    np.testing.assert_allclose(np.sum(step.contacts["floor"]["force"], axis=0), [0.0, 0.01, 0.0], atol=1e-6)
+
+
 def test_body_without_support_lies_in_a_bowl():
     """Nothing but the bowl holds it: half of the weight on either end, along the normals there."""
     bowl = {"type": "circle", "center": [0.5, 1.0], "radius": 1.3, "member": "m", "side": "inside"}

@@ -95,7 +95,7 @@ class Reviser:
         return _numbered((*rest, joined))
 
     def lying_to_the_end(self, ran: Ran) -> Touches | None:
-        """A place that ran to an end where touching at the end alone was wrong before: what is between them lies flat."""
+        """A place that ran to an end where the end alone was wrong before: what is between them lies flat."""
         if ran.met is not None:
             return None
         touches, i = ran.touches, ran.touch

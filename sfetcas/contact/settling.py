@@ -335,7 +335,7 @@ def _ahead(touches: tuple[Touch, ...], i: int, k: int, sign: float) -> tuple[flo
 
 
 def _nearest(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Ran | None:
-    """The place nearest to an end of its member or to another touch, if so near that rounding may lead it to and fro."""
+    """The place nearest to an end of its member or to another touch, if rounding may lead it to and fro there."""
     found = []
     for i, k in free:
         touch = touches[i]

@@ -23,6 +23,9 @@ __all__ = [
     "OnRound",
 ]
 
+CENTRE = 1e-60
+"""Added to the square of a distance, dimensionless: below rounding wherever the distance is not itself nothing."""
+
 
 @final
 @dataclass(frozen=True)
@@ -91,7 +94,9 @@ def _gap_of_plane(u: Side, data: ca.SX) -> ca.SX:
 def _gap_of_round(u: Side, data: ca.SX) -> ca.SX:
     n = len(u)
     out = ca.mtimes(ca.reshape(data[: n * n], n, n), ca.vertcat(*u) + data[n * n : n * n + n])
-    return data[n * n + n + 1] * (ca.norm_2(out) - data[n * n + n])
+    # At the centre itself, where a bar across a bowl may be, the distance still has derivatives.
+    distance = ca.sqrt(ca.sumsqr(out) + CENTRE)
+    return data[n * n + n + 1] * (distance - data[n * n + n])
 
 
 def _cushion(gap: ca.SX, data: ca.SX) -> ca.SX:
