@@ -797,6 +797,33 @@ def test_hump_beside_an_end_that_a_couple_presses_down():
     assert (begin[0], 1.0 - begin[1]) == (pytest.approx(0.0, abs=1e-9), pytest.approx(hump, rel=1e-6))
 
 
+def test_hump_beside_a_kink_that_is_pressed_down():
+    """A kink and a stretch beyond it touch; between them the beam rises, though at the kink it bends down."""
+    points = {"a": [0.0, 0.197], "b": [0.3, 0.196], "c": [0.675, 0.02], "d": [1.394, 0.02]}
+    forces = {"c": [-0.709, 1.052], "d": [-0.761, -1.42]}
+    table = {
+        "gravity": [0, -1],
+        "sections": {"s": {**SOFT, "rhoA": 15.0}},
+        "nodes": {name: {"position": place} for name, place in points.items()},
+        "members": {p + q: {"nodes": [p, q], "section": "s"} for p, q in ("ab", "bc", "cd")},
+        "loads": {
+            **{f"F{n}": {"type": "force", "node": n, "value": value} for n, value in forces.items()},
+            **{f"M{n}": {"type": "moment", "node": n, "value": x} for n, x in (("b", 1.024), ("d", -0.409))},
+        },
+        "contacts": {"floor": {**{k: v for k, v in FLOOR.items() if k != "member"}, "members": "all"}},
+    }
+    table["nodes"]["a"]["support"] = "clamped"
+    step = solve(made(table)).last
+    weight = 15.0 * sum(np.linalg.norm(np.subtract(points[p], points[q])) for p, q in ("ab", "bc", "cd"))
+    up = weight - sum(force[1] for force in forces.values())
+    np.testing.assert_allclose(balance(step)[1], up, atol=1e-4 * weight)  # the accuracy of contact places
+    node, lying, end = step.contacts["floor"]["at"]
+    assert (node, end) == (0.0, 1.0)
+    x = np.linspace(0.0, lying[0], 20)[1:-1]
+    assert step.along("cd", x)["position"][:, 1].min() > 1e-12  # rounding is 1e-15
+    assert smallest_gap(step) > -1e-4 * step.model.scene.size
+
+
 def test_hump_that_closes_leaves_one_stretch():
     """A very heavy chain with kinks, clamped above a floor: two places of its first member come to lie between them."""
     points = {"a": [0.0, 0.467], "b": [0.604, 0.495], "c": [1.014, 0.4], "d": [1.573, 0.705]}
@@ -871,6 +898,24 @@ def test_bar_that_begins_across_the_centre_of_a_bowl_comes_to_rest_in_it():
     for end, x in (("A", 0.0), ("B", 1.0)):
         np.testing.assert_allclose(step.position(end), [x, -drop, 0.0], atol=1e-3)
     np.testing.assert_allclose(np.sum(step.contacts["floor"]["force"], axis=0), [0.0, 0.01, 0.0], atol=1e-6)
+
+
+def test_chain_that_fills_a_groove_is_carried_by_both_of_its_sides():
+    """A stretch on one side ends at the bottom, where the other side pushes its end."""
+    sides = {"l": [0.778, 0.629], "r": [-0.778, 0.629]}
+    points = {"a": [-0.592, 1.397], "b": [-0.292, 1.396], "c": [0.083, 1.22], "d": [0.802, 1.22]}
+    table = {
+        "gravity": [0, -1],
+        "sections": {"s": {**SOFT, "rhoA": 15.0}},
+        "nodes": {name: {"position": place} for name, place in points.items()},
+        "members": {p + q: {"nodes": [p, q], "section": "s"} for p, q in ("ab", "bc", "cd")},
+        "contacts": {s: {"type": "plane", "point": [0, -0.6], "normal": n, "members": "all"} for s, n in sides.items()},
+    }
+    step = solve(made(table)).last
+    weight = 15.0 * sum(np.linalg.norm(np.subtract(points[p], points[q])) for p, q in ("ab", "bc", "cd"))
+    np.testing.assert_allclose(balance(step), [0.0, weight, 0.0], atol=1e-4 * weight)  # the accuracy of contact places
+    assert any(isinstance(x, list) for x in np.atleast_1d(np.array(step.contacts["l"]["at"], dtype=object)))
+    assert smallest_gap(step) > -1e-4 * step.model.scene.size
 
 
 def test_body_without_support_lies_in_a_bowl():

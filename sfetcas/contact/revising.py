@@ -182,7 +182,7 @@ class Reviser:
             loose = touched.loose_end(touch)
             if loose is not None:
                 return _numbered((*touches[:i], *self._loosened(held, touch, loose), *touches[i + 1 :]))
-        flatter = self._opened(held) or self._flattened(held) or self._joined(held, way)
+        flatter = self._opened(held) or self._flattened(held, way) or self._joined(held, way)
         if flatter is not None:
             return flatter
         gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size, self.noise * self.scene.size)
@@ -226,7 +226,7 @@ class Reviser:
             return _numbered(tuple(found))
         return None
 
-    def _flattened(self, held: Held) -> Touches | None:
+    def _flattened(self, held: Held, way: Way) -> Touches | None:
         """A place beside which the member curves into a plane or a round obstacle becomes a stretch."""
         touches = held.mesh.touches
         for i, touch in enumerate(touches):
@@ -235,7 +235,7 @@ class Reviser:
             beside = [touch, *self._across_node(touch)]
             if touch.at in (0.0, 1.0) and len(beside) == 1:
                 continue
-            lying = [self._laid(held, part) for part in beside]
+            lying = [None if self._humps(held, part, way) else self._laid(held, part) for part in beside]
             found = [part for part in lying if part is not None]
             if found:
                 return _numbered((*touches[:i], *found, *touches[i + 1 :]))
@@ -279,6 +279,21 @@ class Reviser:
         inwards = 1.0 - 2.0 * touch.at
         tangent = held.touched.fields.tangents(touch.member, np.array([touch.at]))[0]
         return bool(inwards * float(tangent @ held.touched.normal(touch, touch.at)) > CORNER)
+
+    def _humps(self, held: Held, touch: Touch, way: Way) -> bool:
+        """Whether a member rises from its end to come down again where it touches the obstacle next.
+
+        As where a couple presses the end: it bends into the obstacle there, and lies nowhere beside it.
+        """
+        if touch.at not in (0.0, 1.0):
+            return False
+        here = [t for t in held.mesh.touches if (t.contact, t.member) == (touch.contact, touch.member)]
+        others = [x for t in here for x in t.places if x != touch.at]
+        if not others:
+            return False
+        x = np.linspace(touch.at, min(others, key=lambda x: abs(x - touch.at)), 12)[1:-1]
+        gaps = held.touched.gaps(touch.contact, touch.member, x, way.offsets.get(touch.contact, 0.0))
+        return bool(gaps.min() > ROUNDED * self.scene.size)
 
     def _joined(self, held: Held, way: Way) -> Touches | None:
         """Between two places of one obstacle without any gap between them the member lies on it."""

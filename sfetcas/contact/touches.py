@@ -174,12 +174,17 @@ class Touched:
         node = record.nodes[int(at)]
         if not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
             return np.asarray(self.fields.along(touch.member, np.array([at]))["force"][0])
-        beyond = np.array(self.fields.own_force(node))
+        beyond = self.fields.own_force(node) + self._other_pushes(node, touch.contact)
         for name, member in model.scene.members.items():
             if name != touch.member and node in member.nodes and name in model.members:
                 ends = self.fields.along(name, np.array([0.0, 1.0]))["force"]
                 beyond = beyond + ends[0] if member.nodes[0] == node else beyond - ends[1]
         return way * beyond
+
+    def _other_pushes(self, node: str, contact: str) -> Array:
+        """Force (3,) of all obstacles but one that touch a node by itself, N."""
+        others = [t for t in self.model.mesh.touches if t.contact != contact and t.to is None]
+        return sum((self.force(t) for t in others if self._node_at(t, t.at) == node), np.zeros(3))
 
     def goes_on(self, touch: Touch, at: float) -> bool:
         """Whether another stretch of the same obstacle begins where a stretch reaches the end of its member."""
@@ -198,7 +203,7 @@ class Touched:
             return np.zeros(3)
         here = [t for t in self.model.mesh.touches if t.contact == touch.contact and t.to is not None]
         first = next(t for t in here if any(self._node_at(t, x) == node for x in t.places))
-        return self.left_over(node)[1] if first is touch else np.zeros(3)
+        return self.left_over(node, touch.contact)[1] if first is touch else np.zeros(3)
 
     def _node_at(self, touch: Touch, x: float) -> str | None:
         """The node at a place of a touch; None within its member."""
@@ -241,7 +246,7 @@ class Touched:
             if not node or not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
                 continue
             axis = self.fields.pressed_moments(touch, np.array([at]))[1][0]
-            moment, force = self.left_over(node)
+            moment, force = self.left_over(node, touch.contact)
             normal = self.normal(touch, at)
             push = float(force @ normal)
             # Positive where the moment at the end would bend the member away from the obstacle.
@@ -252,13 +257,15 @@ class Touched:
                 return Loose(at, *self._risen(touch, push, bends * model.scales.moment, at))
         return None
 
-    def left_over(self, node: str) -> tuple[Array, Array]:
+    def left_over(self, node: str, contact: str) -> tuple[Array, Array]:
         """Moment (dimensionless) and force (N) on a node that neither its members, loads nor springs balance.
 
+        Nor other obstacles than the one that is asked about.
         Members that lie on obstacles count with what their shape takes.
         """
         scene, fields = self.model.scene, self.fields
         moment, force = -fields.own_moment(node) + fields.balance.spring_moment(node), -fields.own_force(node)
+        force = force - self._other_pushes(node, contact)
         for name, member in scene.members.items():
             for i, (at, joint) in enumerate(end_joints(scene, member)):
                 if at != node or name not in self.model.members:
@@ -316,7 +323,7 @@ class Touched:
             node = model.scene.members[touch.member].nodes[int(at)]
             if not self.takes_part(touch.contact, node) or not self.goes_on(touch, at):
                 continue
-            moment, force = self.left_over(node)
+            moment, force = self.left_over(node, touch.contact)
             pull = max(-float(force @ self.normal(touch, at)) / model.scales.force, 0.0)
             couple = abs(float(moment @ fields.pressed_moments(touch, np.array([at]))[1][0]))
             if pull > size or couple > size:
