@@ -14,7 +14,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import SAME, Touch
 from ..mechanics.model import Model
 from .settling import APART, Held, Ran, Way, moved
-from .touches import NOISE, Gap, Loose, obstacles_of
+from .touches import MOST_RISE, NOISE, Gap, Loose, obstacles_of
 
 __all__ = ["Reviser"]
 
@@ -200,6 +200,9 @@ class Reviser:
             if beside:
                 return [touch, *beside]
         shorter = moved(touch, k, touch.places[k] + (1.0 - 2.0 * k) * loose.risen)
+        if loose.risen >= MOST_RISE * (float(touch.to or 0.0) - touch.at):
+            # It would rise over more than its length: what is left is its other end.
+            shorter = replace(touch, at=touch.places[1 - k], to=None)
         return [shorter, end] if loose.stays else [shorter]
 
     def _opened(self, held: Held) -> Touches | None:

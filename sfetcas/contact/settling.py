@@ -34,7 +34,7 @@ CLOSE = 1e-4
 """Fractions of the length beside an end of a member in which a double root is lost in rounding."""
 
 TOGETHER = 1e-3
-"""Fractions of the length between two touches in which a root is lost in rounding: moments there fall as its square."""
+"""The same before another touch, or before an end that a stretch comes to reach: moments there fall as the square."""
 
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
@@ -344,7 +344,8 @@ def _nearest(touches: tuple[Touch, ...], free: list[tuple[int, int]]) -> Ran | N
             inwards = touch.to is not None and (touch.places[1 - k] > touch.places[k]) == (sign > 0.0)
             if inwards and met is not None:
                 continue
-            found.append((room / (CLOSE if met is None else TOGETHER), Ran(touches, i, k, inwards, met)))
+            close = CLOSE if met is None and touch.to is None else TOGETHER
+            found.append((room / close, Ran(touches, i, k, inwards, met)))
     share, ran = min(found, key=lambda pair: pair[0])
     return ran if share <= 1.0 else None
 

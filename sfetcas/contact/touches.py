@@ -26,7 +26,7 @@ from ..mechanics.mesh import Touch
 from ..mechanics.model import Model
 from ..mechanics.rotations import STIFF, end_joints
 
-__all__ = ["COARSE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
+__all__ = ["COARSE", "MOST_RISE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
 
 COARSE = 1e-6
 """Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
