@@ -570,6 +570,31 @@ def test_searches_that_know_no_contact_are_refused(analysis, sentence):
 # -- ways to a state in contact -------------------------------------------------------------------------
 
 
+def just_beyond(name, factor, share):
+    """A problem at a factor just above one where a stretch begins to lie on the obstacle."""
+    scene = load(f"problems/{name}.toml")
+    return scene.replace(analysis=scene.analysis.replace(steps=(factor * (1.0 + share),), accuracy=1e-8), expect=())
+
+
+# Factors at which the place becomes a stretch, and where: collocation and multiple shooting, as in the problems.
+@pytest.mark.parametrize(
+    ("name", "factor", "contact", "place"),
+    [
+        ("drum_cantilever_tip_force", 2.44762615664504, "drum", 0.733458511275678 / 2.0),
+        ("wall_hinged_beam_end_shortening", 0.0307490369058916, "upper", 0.5),
+        ("floor_heavy_cantilever", 15.0275660357196, "floor", 1.0),
+    ],
+)
+@pytest.mark.parametrize("share", [1e-7, 1e-6, 3e-6, 3e-5, 1e-4])
+def test_stretch_begins_without_length(name, factor, contact, place, share):
+    step = solve(just_beyond(name, factor, share)).last
+    found = step.contacts[contact]
+    # Their ends are off by about the share of the factor, by half or twice.
+    assert np.asarray(found["at"]) == pytest.approx(place, abs=3.0 * share + 1e-8)
+    assert step.certificate.stable is True
+    assert step.certificate.residual < 1e-12
+
+
 @pytest.mark.parametrize("name", ["knife_edge_half_beam", "drum_cantilever_tip_force", "floor_rod_lifted_by_one_end"])
 def test_one_factor_alone_gives_what_steps_give(name):
     """No load step is needed, and no obstacle is jumped over on the way."""

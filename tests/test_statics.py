@@ -385,6 +385,40 @@ def _strip(nodes, members, **rest):
     return sfetcas.Scene(sections={"strip": section}, nodes=nodes, members=beams, **rest)
 
 
+def two_bars(rise, *, length=1.0, force=1.0, turned=0.0, kinds=("rigid", "rigid")):
+    """Two bars between hinges, loaded across where they meet, the joint by ``rise`` off their line."""
+    x, y = np.array([np.cos(turned), np.sin(turned)]), np.array([-np.sin(turned), np.cos(turned)])
+    return {
+        "sections": {"s": SOFT},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "hinge"},
+            "B": {"position": (x + rise * y).tolist(), "joint": "hinge"},
+            "C": {"position": ((1.0 + length) * x).tolist(), "support": "hinge"},
+        },
+        "members": {
+            "a": {"nodes": ["A", "B"], "type": kinds[0], "section": "s"},
+            "b": {"nodes": ["B", "C"], "type": kinds[1], "section": "s"},
+        },
+        "loads": {"F": {"type": "force", "node": "B", "value": (force * y).tolist()}},
+    }
+
+
+@pytest.mark.parametrize("force", [1e-5, 1.0, 100.0])
+@pytest.mark.parametrize(("length", "turned"), [(1.0, 0.7), (0.5, 0.0)])
+@pytest.mark.parametrize("kinds", [("rigid", "rigid"), ("rigid", "flexible"), ("flexible", "flexible")])
+def test_no_finite_force_holds_two_straight_bars(kinds, length, turned, force):
+    """Newton's method halves their rise and doubles their forces until rounding stops it: that is no equilibrium."""
+    with pytest.raises(SolveError, match=r"fully stretched|straight between|free to move"):
+        solve(made(two_bars(0.0, length=length, force=force, turned=turned, kinds=kinds)))
+
+
+@pytest.mark.parametrize("rise", [1e-2, 1e-4, 1e-5])
+def test_two_bars_that_are_nearly_straight_are_held_by_large_forces(rise):
+    force = solve(made(two_bars(rise))).last.reaction("A")[0]
+    # Rounding of the closings, 1e-16, moves the joint by that over its rise.
+    np.testing.assert_allclose(force, [-0.5 / rise, -0.5, 0.0], rtol=1e-16 / rise**2 + 1e-12, atol=1e-9)
+
+
 def test_slider_across_a_straight_member_is_refused():
     nodes = {
         "a": sfetcas.Node(position=[0, 0], support="clamped"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..mechanics.model import Model
 from .settling import APART, Held, Ran, Way, moved
 from .touches import MOST_RISE, NOISE, Gap, Loose, obstacles_of
 
-__all__ = ["Reviser"]
+__all__ = ["Reviser", "Tried"]
 
 Touches = tuple[Touch, ...]
 
@@ -37,6 +37,22 @@ CORNER = 1e-4
 """Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
 
 
+@dataclass
+class Tried:
+    """What came to nothing while touches were looked for at one point of the way.
+
+    Attributes
+    ----------
+    crossed : set of str
+        Nodes to which places ran along their members.
+    collapsed : set of (str, str)
+        Contact and member of stretches whose ends met.
+    """
+
+    crossed: set[str] = field(default_factory=set)
+    collapsed: set[tuple[str, str]] = field(default_factory=set)
+
+
 class Reviser:
     """Changes of the touches of one scene.
 
@@ -53,16 +69,17 @@ class Reviser:
     def __init__(self, scene: Scene, limit: float, sides: Mapping[tuple[str, str], float]) -> None:
         self.scene, self.limit, self.noise, self.sides = scene, limit, NOISE, sides
 
-    def ended(self, ran: Ran, crossed: set[str]) -> Touches:
+    def ended(self, ran: Ran, tried: Tried) -> Touches:
         """What becomes of a touch one of whose places ran to the end of its member or met the other one.
 
-        It goes on along the next member; at a node that was ``crossed`` before, to which it is added, it stays.
+        It goes on along the next member; at a node that was crossed before it stays.  What was ``tried`` is added to.
         """
         touches, i, k = ran.touches, ran.touch, ran.place
         touch, rest = touches[i], touches[:i] + touches[i + 1 :]
         if ran.met is not None:
             return self._met(touches, i, ran.met)
         if ran.collapsed:
+            tried.collapsed.add((touch.contact, touch.member))
             middle = 0.5 * sum(touch.places)
             at = middle if min(touch.places) > 0.0 and max(touch.places) < 1.0 else float(round(middle))
             return _numbered((*rest, replace(touch, at=at, to=None)))
@@ -75,8 +92,8 @@ class Reviser:
         sharp = self.scene.contacts[touch.contact].type in ("point", "line")
         if not self._takes_part(touch.contact, node) or (sharp and not others):
             return _numbered(rest)
-        back = node in crossed
-        crossed.add(node)
+        back = node in tried.crossed
+        tried.crossed.add(node)
         for other in () if back else others:
             if self.scene.nodes[node].joint == "rigid" and self.scene.members[other].type == "flexible":
                 at = 1e-3 if self.scene.members[other].nodes[0] == node else 1.0 - 1e-3
@@ -170,8 +187,9 @@ class Reviser:
                 return replace(stop, place=stop.place - shift)
         return stop
 
-    def wrong(self, held: Held, way: Way) -> Touches | None:
-        """What has to touch otherwise at this state; None where all is right."""
+    def wrong(self, held: Held, way: Way, tried: Tried | None = None) -> Touches | None:
+        """What has to touch otherwise at this state, after what was ``tried``; None where all is right."""
+        tried = tried or Tried()
         touched, touches = held.touched, held.mesh.touches
         smallest = 1e-9 * held.prepared.model.scales.force
         pulls = [(touched.push(touch), i) for i, touch in enumerate(touches) if touch.to is None]
@@ -182,7 +200,7 @@ class Reviser:
             loose = touched.loose_end(touch)
             if loose is not None:
                 return _numbered((*touches[:i], *self._loosened(held, touch, loose), *touches[i + 1 :]))
-        flatter = self._opened(held) or self._flattened(held, way) or self._joined(held, way)
+        flatter = self._opened(held) or self._flattened(held, way, tried) or self._joined(held, way)
         if flatter is not None:
             return flatter
         gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size, self.noise * self.scene.size)
@@ -229,11 +247,17 @@ class Reviser:
             return _numbered(tuple(found))
         return None
 
-    def _flattened(self, held: Held, way: Way) -> Touches | None:
-        """A place beside which the member curves into a plane or a round obstacle becomes a stretch."""
+    def _flattened(self, held: Held, way: Way, tried: Tried) -> Touches | None:
+        """A place beside which the member curves into a plane or a round obstacle becomes a stretch.
+
+        It stays a place where the ends of that stretch met: where flattening has just begun they are no more than
+        rounding apart.
+        """
         touches = held.mesh.touches
         for i, touch in enumerate(touches):
             if touch.to is not None or held.touched.obstacles[touch.contact].kind == "sharp":
+                continue
+            if (touch.contact, touch.member) in tried.collapsed:
                 continue
             beside = [touch, *self._across_node(touch)]
             if touch.at in (0.0, 1.0) and len(beside) == 1:

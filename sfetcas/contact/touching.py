@@ -19,7 +19,7 @@ from ..description.scene import Scene
 from ..errors import SolveError
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.prepared import Prepared
-from .revising import Reviser
+from .revising import Reviser, Tried
 from .settling import Held, Ran, Settler, Way, placed
 from .touches import Touched
 
@@ -83,7 +83,7 @@ class Toucher:
     def _resolved(self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way) -> Held | None:
         source = None if now is None else (now.prepared.model, now.corrected.state)
         seen: list[tuple[Touch, ...]] = []
-        crossed: set[str] = set()
+        tried = Tried()
         for _ in range(CHANGES):
             if sum(_alike(touches, other) for other in seen) > 1:
                 return None
@@ -95,11 +95,11 @@ class Toucher:
             if found is None:
                 return None
             if isinstance(found, Ran):
-                touches = self.reviser.ended(found, crossed)
+                touches = self.reviser.ended(found, tried)
                 if any(_alike(touches, other) for other in seen):
                     touches = self.reviser.lying_to_the_end(found) or touches
                 continue
-            wrong = self.reviser.wrong(found, way)
+            wrong = self.reviser.wrong(found, way, tried)
             if wrong is None:
                 return None if self.reviser.ran_over(now, found) else found
             touches = wrong

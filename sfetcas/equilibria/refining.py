@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other, largest_difference, roughness
-from ..mechanics.equations import Equations, State
+from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
@@ -42,6 +42,18 @@ MOST_ELEMENTS = 20_000
 
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
+
+CARRIED = 0.01
+"""Share of the loads that is out of balance without redundant multipliers: these carry it on next to nothing."""
+
+NEARLY = 1e-3
+"""Share of the largest singular value of the closings below which members may be on their way to being stretched."""
+
+LARGE = 1e3
+"""Multipliers over the loads above which that is looked at."""
+
+GROWING = 0.01
+"""Share by which closing them would change rows that nearly vanish, from which on it makes them vanish."""
 
 
 class Refining(Piloting):
@@ -202,17 +214,43 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     """
     equations, corrected = found.prepared.equations, found.corrected
     loose = loose_rows(equations, corrected.point)
+    loads = found.prepared.load_size(corrected)
+    largest = float(np.abs(corrected.state.lam).max(initial=0.0)) / max(1.0, loads)
     if not loose.size:
+        nearly = loose_rows(equations, corrected.point, NEARLY) if largest > LARGE else loose
+        if nearly.size and _grow(equations, corrected.point, nearly):
+            raise _stretched(equations, nearly, corrected)
         return found
-    names = ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
     lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
     state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
     if residual <= SOLVED:
         corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif np.abs(corrected.state.lam).max() > BEYOND * max(1.0, found.prepared.load_size(corrected)):
-        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
-        raise SolveError(Status.INFEASIBLE, detail, corrected.state)
-    note = f"reactions are not unique, the smallest are given; redundant: {names}"
+    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > CARRIED * loads > 0.0:
+        raise _stretched(equations, loose, corrected)
+    note = f"reactions are not unique, the smallest are given; redundant: {_named_in(equations, loose)}"
     return replace(found, corrected=corrected, notes=(*found.notes, note))
+
+
+def _grow(equations: Equations, point: Point, nearly: Array) -> bool:
+    """Whether the multipliers of rows that nearly vanish have no end.
+
+    To close what is left of the closings by rows of the size s takes a step (left / s) that changes s itself by as
+    much: beside s only where the rows vanish at the closed state.
+    """
+    n = equations.unknowns
+    chosen = (equations.row >= n) & (equations.column < n)
+    row, column, entries = equations.row[chosen] - n, equations.column[chosen], point.entries[chosen]
+    sizes = np.array([np.linalg.norm(np.bincount(column, weights=entries * way[row])) for way in nearly.T])
+    return bool((np.abs(nearly.T @ point.residual[n:]) > GROWING * sizes**2).any())
+
+
+def _stretched(equations: Equations, loose: Array, corrected: Corrected) -> SolveError:
+    """What is said of members that no finite force holds straight."""
+    detail = "fully stretched between held points, where an inextensible member takes any force: "
+    return SolveError(Status.INFEASIBLE, detail + _named_in(equations, loose), corrected.state)
+
+
+def _named_in(equations: Equations, loose: Array) -> str:
+    return ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))

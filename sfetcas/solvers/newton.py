@@ -218,8 +218,12 @@ def descend(
     return state
 
 
-def loose_rows(equations: Equations, point: Point) -> Array:
-    """Combinations of rows that vanish to first order at this state: orthonormal columns, (rows, n)."""
+def loose_rows(equations: Equations, point: Point, slack: float | None = None) -> Array:
+    """Combinations of rows that vanish to first order at this state: orthonormal columns, (rows, n).
+
+    Their singular values are below the share ``slack`` of the largest, without one 1e-6.
+    """
+    slack = SLACK if slack is None else slack
     if not equations.rows:
         return np.zeros((0, 0))
     # A row that no rotation changes is loose too, also where it is the only one.
@@ -227,7 +231,7 @@ def loose_rows(equations: Equations, point: Point) -> Array:
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
     find = _smallest if equations.rows > MANY else _all_singular
     squares, left, largest = find(equations, point)
-    return np.asarray(left[:, squares < SLACK**2 * max(largest, usual)])
+    return np.asarray(left[:, squares < slack**2 * max(largest, usual)])
 
 
 def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
