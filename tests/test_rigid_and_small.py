@@ -13,6 +13,7 @@ from systems import linked, linked_space, small_space
 
 import sfetcas
 from sfetcas.cli import main
+from sfetcas.description.matrices import read_matrix
 from sfetcas.equilibria.statics import solve_model
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics.fields import Fields
@@ -554,6 +555,33 @@ def test_matrices_from_files_beside_the_scene(how, tmp_path, monkeypatch):
     np.testing.assert_array_equal(np.array(scene.members["m"].mass), m)
     monkeypatch.chdir(folder)
     assert made(table) == scene
+
+
+def fortran(text):
+    """Exponents as Fortran writes those of double precision."""
+    return re.sub(r"(\d)e([+-]?\d)", r"\1D\2", text)
+
+
+WRITTEN = {
+    "byte order mark": lambda text: "\ufeff" + text,
+    "Fortran": fortran,
+    "Fortran, small letters": lambda text: fortran(text).replace("D", "d"),
+    "upper case": str.upper,
+    "line ends of Windows": lambda text: text.replace("\n", "\r\n"),
+    "blank lines": lambda text: "\n" + text.replace("\n", "\n\n") + "  \n",
+    "comments between": lambda text: re.sub("\n", "\n  % 1.0 and 2.0\n%\n", text),
+    "a comment in another language": lambda text: text.replace("a comment", "Prüfmatrix, Länge 1 m"),
+}
+"""How programs write the same matrix."""
+
+
+@pytest.mark.parametrize("how", WRITTEN)
+@pytest.mark.parametrize(("layout", "symmetry"), FILES)
+def test_matrix_market_as_programs_write_it(how, layout, symmetry, tmp_path):
+    k = 1e-7 * matrix_of_unlike()
+    text = market(k, layout, symmetry)
+    (tmp_path / "k.mtx").write_bytes(WRITTEN[how](text).encode())
+    np.testing.assert_array_equal(read_matrix(tmp_path / "k.mtx"), k)
 
 
 BAD_FILES = {
