@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import SOFT, UNLIKE, arc_across, made, model_of
+from scenes import SOFT, UNLIKE, arc_across, made, model_of, textbook
 from systems import linked, linked_space, small_space
 
 import sfetcas
@@ -406,20 +406,6 @@ def test_deflection_across_a_straight_beam_is_right_to_the_third_order():
 
 
 # -- condensed matrices -------------------------------------------------------------------------------------
-
-
-def textbook(length, ea, gj, ei2, ei3):
-    """The 12 x 12 stiffness of a straight Euler-Bernoulli beam along b1, three places, three rotations each end."""
-    k, n = np.zeros((12, 12)), length
-    for i, stiffness in ((0, ea / n), (3, gj / n)):
-        k[np.ix_([i, i + 6], [i, i + 6])] = stiffness * np.array([[1, -1], [-1, 1]])
-    for ei, place, turn, sign in ((ei3, 1, 5, 1.0), (ei2, 2, 4, -1.0)):
-        c = np.array([[12, 6 * n, -12, 6 * n], [6 * n, 4 * n**2, -6 * n, 2 * n**2],
-                      [-12, -6 * n, 12, -6 * n], [6 * n, 2 * n**2, -6 * n, 4 * n**2]]) * ei / n**3  # fmt: skip
-        s = np.diag([1, sign, 1, sign])
-        index = [place, turn, place + 6, turn + 6]
-        k[np.ix_(index, index)] = s @ c @ s
-    return k
 
 
 def consistent_mass(length, rho):

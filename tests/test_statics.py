@@ -198,7 +198,14 @@ def test_many_elements_are_estimated_from_half_of_them():
 
 @pytest.mark.parametrize(
     ("word", "value"),
-    [("accuracy", 0.0), ("accuracy", 1e-20), ("accuracy", 0.2), ("element", "SFET1"), ("elements", 0), ("assembly", "both")],
+    [
+        ("accuracy", 0.0),
+        ("accuracy", 1e-20),
+        ("accuracy", 0.2),
+        ("element", "SFET1"),
+        ("elements", 0),
+        ("assembly", "both"),
+    ],
 )
 def test_settings_refuse_in_sentences(word, value):
     with pytest.raises(sfetcas.SceneError, match=f"{word}: found .*, accepted: "):
