@@ -169,8 +169,8 @@ def clamped(section, load, **scene):
 
 def test_sections_and_springs_of_next_to_nothing_are_refused_beside_the_loads():
     assert message(clamped({"EI3": 1e-300}, [0, 1])) == (
-        "members.m: nothing resists its bending: found a stiffness of 1e-300 N m under loads of 1 N m, "
-        "accepted: from 1e-20 of the loads on"
+        "members.m: nothing resists its bending: found a stiffness of 1e-300 N m beside loads of 1 N m, "
+        "accepted: from 1e-20 of this on"
     )
     soft = {"EI2": 1.0, "EI3": 1.0, "GJ": 1e-300}
     assert message(clamped(soft, [0, 1, 1])).startswith("members.m: nothing resists its torsion: found")

@@ -17,29 +17,37 @@ WEAK = 1e-20
 
 
 def check_resistance(scene: Scene) -> None:
-    """Refuse members and springs whose stiffness is nothing beside the loads, but not zero.
+    """Refuse members and springs whose stiffness is nothing beside the loads or the stiffest member, but not zero.
 
     Raises
     ------
     SceneError
-        Names the motion that nothing resists, its stiffness and the size of the loads.
+        Names the motion that nothing resists, its stiffness and what it is nothing beside.
     """
     length = max(line.length for line in scene.center_lines.values())
-    factors = scene.analysis.span if scene.analysis.type == "path" else scene.analysis.steps
-    scale = 1.0 if scene.histories else max(map(abs, factors))
     with np.errstate(over="ignore"):
-        loads = scale * load_size(scene, length)
-        for where, motion, stiffness in _stiffnesses(scene):
-            if 0.0 < stiffness < WEAK * loads:
+        loads = _factor(scene) * load_size(scene, length)
+        found = list(_stiffnesses(scene))
+        stiffest = max((stiffness for *_, stiffness, member in found if member), default=0.0)
+        for where, motion, stiffness, member in found:
+            beside, what = max((loads, "loads"), (stiffest if member else 0.0, "a stiffness"))
+            if 0.0 < stiffness < WEAK * beside:
                 message = (
-                    f"nothing resists its {motion}: found a stiffness of {stiffness:.3g} N m under loads of "
-                    f"{loads:.3g} N m, accepted: from {WEAK:g} of the loads on"
+                    f"nothing resists its {motion}: found a stiffness of {stiffness:.3g} N m beside {what} of "
+                    f"{beside:.3g} N m, accepted: from {WEAK:g} of this on"
                 )
                 raise SceneError(message, where)
 
 
-def _stiffnesses(scene: Scene) -> Iterator[tuple[tuple[str, ...], str, float]]:
-    """Place, motion and stiffness, N m, of all that is elastic."""
+def _factor(scene: Scene) -> float:
+    """The largest factor that a load of the scene is multiplied by."""
+    steps = scene.analysis.span if scene.analysis.type == "path" else scene.analysis.steps
+    grown = [history.factor(step) for history in scene.histories.values() for step in steps]
+    return max(map(abs, [*steps, *grown]))
+
+
+def _stiffnesses(scene: Scene) -> Iterator[tuple[tuple[str, ...], str, float, bool]]:
+    """Place, motion and stiffness, N m, of all that is elastic, least and largest, and whether it is a member."""
     space, x = scene.resolved_dimension == "space", np.linspace(0.0, 1.0, 5)
     for name, member in scene.members.items():
         line = scene.center_lines[name]
@@ -47,13 +55,14 @@ def _stiffnesses(scene: Scene) -> Iterator[tuple[tuple[str, ...], str, float]]:
             length = line.length
             unit = np.tile([1.0, 1.0, 1.0, length, length, length], len(member.nodes))
             largest = float(np.abs(np.asarray(member.stiffness) / np.outer(unit, unit)).max()) * length**2
-            yield ("members", name, "stiffness"), "deformation", largest
+            yield ("members", name, "stiffness"), "deformation", largest, True
         elif member.section is not None and member.type != "rigid":
-            values = scene.sections[member.section].stiffness(x).min(axis=0) / line.length
+            values = scene.sections[member.section].stiffness(x) / line.length
             for i in range(3) if space else [line.bending_axis - 1]:
-                yield ("members", name), "bending" if i else "torsion", float(values[i])
+                for value in (values[:, i].min(), values[:, i].max()):
+                    yield ("members", name), "bending" if i else "torsion", float(value), True
     for name, spring in scene.springs.items():
         turning = spring.type == "rotational"
         lever = 1.0 if turning else max(line.length for line in scene.center_lines.values()) ** 2
         motion = f"{'turn' if turning else 'travel'} at node {spring.node!r}"
-        yield ("springs", name, "stiffness"), motion, spring.stiffness * lever
+        yield ("springs", name, "stiffness"), motion, spring.stiffness * lever, False
