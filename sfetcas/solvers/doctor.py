@@ -73,10 +73,9 @@ class Diagnosis:
         return f"{free}; {self.excess} redundant among {held}"
 
 
-def diagnose(equations: Equations, weight: Array) -> Diagnosis:
-    """Mobility and redundancy of a model at its undeformed state."""
+def diagnose(equations: Equations, motions: Array) -> Diagnosis:
+    """Mobility and redundancy of a model at its undeformed state, from its :func:`free_motions` there."""
     state = _undeformed(equations)
-    motions = free_motions(equations, weight, state)
     loose = loose_rows(equations, equations.at(state, equations.model.loading(0.0, 0.0)))
     names = tuple(equations.row_names[row] for row in rows_in(loose))
     words = tuple(in_words(equations, motion) for motion in motions.T)

@@ -55,7 +55,7 @@ def refuse_unheld(prepared: Prepared, factor: float) -> None:
     if stopped or model.scene.motions or not prepared.diagnosis.mobility:
         return
     loading, start = model.loading(factor), prepared.equations.start(model.loading(0.0, 0.0))
-    motions = free_motions(prepared.equations, prepared.weight, start)
+    motions = prepared.motions
     motion = _travel(prepared, loading, start, motions)
     if motion is None and motions.shape[1] == 1 and _known(prepared, loading):
         motion = _round(prepared, loading, start, motions[:, 0])
@@ -86,8 +86,8 @@ def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) 
     """The motion of displacements alone that the loads drive furthest, where nothing ever holds it."""
     equations = prepared.equations
     unloaded, turning = prepared.model.loading(0.0, 0.0), equations.turning_unknowns
-    _, sizes, right = np.linalg.svd(motions[:turning], full_matrices=True)
-    straight = motions @ right[(np.append(sizes, np.zeros(len(right) - len(sizes))) < NOTHING)].T
+    _, sizes, right = np.linalg.svd(np.linalg.qr(motions[:turning], mode="r"))
+    straight = motions @ right[np.append(sizes, np.zeros(len(right) - len(sizes))) < NOTHING].T
     motion = straight @ (straight.T @ _pull(prepared, start, loading))
     if not np.abs(motion).max(initial=0.0) > 0.0:
         return None
