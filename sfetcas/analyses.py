@@ -9,6 +9,7 @@ from .description.scene import Scene, check_loaded
 from .equilibria import statics, stops
 from .equilibria.solution import Solution
 from .equilibria.statics import Settings
+from .mechanics.resistance import check_resistance
 from .paths import paths
 from .paths.path import Path
 
@@ -43,6 +44,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     """
     settings = replace(settings or Settings(), **changes)
     check_loaded(scene)
+    check_resistance(scene)
     if scene.analysis.type == "path":
         return paths.follow_path(scene, settings)
     stopped = any(spring.stop is not None for spring in scene.springs.values())

@@ -11,7 +11,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,11 +25,14 @@ from .equilibria.statics import Settings, pilot_of
 from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
+from .mechanics.resistance import check_resistance
 from .paths.path import Branch
 from .paths.path import Path as Course
 from .solvers.prepared import Prepared
 
 __all__ = ["main"]
+
+T = TypeVar("T")
 
 SOLVED, SHORT, BAD_INPUT, NO_SOLUTION, INTERNAL = 0, 1, 2, 3, 70
 """Exit codes."""
@@ -121,6 +124,8 @@ def _run(options: argparse.Namespace) -> int:
             _check_writable(path)
             if path.exists() and path.samefile(options.file):
                 raise SceneError(f"{path}: is the scene itself, accepted: another file")
+    if options.json is not None and options.plot is not None and options.json.resolve() == options.plot.resolve():
+        raise SceneError(f"{options.plot}: found for --json and for --plot, accepted: two files")
     drawing = _drawing(options.plot, scene.analysis.type == "path")
 
     def told(solution: Solution | Course) -> None:
@@ -142,10 +147,15 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Solution | Course, list[Check]]:
-    """The answer of a scene and its comparisons; what is wrong with the scene is told with the file."""
+    """The answer of a scene and its comparisons."""
+    solution = _named(file, lambda: solve(scene, settings))
+    return solution, _named(file, lambda: check(scene, solution))
+
+
+def _named(file: Path, work: Callable[[], T]) -> T:
+    """What some work on a scene gives; what is wrong with the scene is told with the file."""
     try:
-        solution = solve(scene, settings)
-        return solution, check(scene, solution)
+        return work()
     except SceneError as error:
         raise SceneError(str(error), (str(file),)) from None
 
@@ -163,9 +173,14 @@ def _drawing(path: Path | None, chart: bool) -> Callable[[Any, Path], None] | No
 
 
 def _check_writable(path: Path) -> None:
-    folder = path.parent
-    plain = not path.is_symlink() and (path.is_file() or not path.exists())
-    if not plain or not folder.is_dir() or not os.access(folder, os.W_OK):
+    try:
+        plain = not path.is_symlink() and (path.is_file() or not path.exists())
+        # What permissions say is not all: some folders take no files from anybody.
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except (OSError, ValueError):
+        plain = False
+    if not plain:
         accepted = "a plain file in a folder that exists and can be written"
         raise SceneError(f"{path}: cannot be written; accepted: {accepted}")
 
@@ -179,7 +194,7 @@ def _write(path: Path, writer: Callable[[Path], Any]) -> None:
         writer(Path(name))
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, ArithmeticError) as error:
         raise SceneError(f"{path}: could not be written: {error}") from None
     finally:
         if name:
@@ -359,6 +374,7 @@ def _short(value: Any) -> str:
 
 def _info(options: argparse.Namespace) -> int:
     scene, settings = load(options.file), _settings(options)
+    _named(options.file, lambda: check_resistance(scene))
     mesh = pilot_of(scene, settings)
     model = assemble(scene, mesh, assembly=settings.assembly)
     print(scene.title or "untitled scene")

@@ -362,3 +362,17 @@ def elastica(alpha):
         low, high = (middle, high) if integrals(middle)[0] > np.sqrt(alpha) else (low, middle)
     length, lack, sine = integrals(0.5 * (low + high))
     return np.array([np.sqrt(2.0 * sine / alpha), 1.0 - lack / length])
+
+
+def textbook(length, ea, gj, ei2, ei3):
+    """The 12 x 12 stiffness of a straight Euler-Bernoulli beam along b1, three places, three rotations each end."""
+    k, n = np.zeros((12, 12)), length
+    for i, stiffness in ((0, ea / n), (3, gj / n)):
+        k[np.ix_([i, i + 6], [i, i + 6])] = stiffness * np.array([[1, -1], [-1, 1]])
+    for ei, place, turn, sign in ((ei3, 1, 5, 1.0), (ei2, 2, 4, -1.0)):
+        c = np.array([[12, 6 * n, -12, 6 * n], [6 * n, 4 * n**2, -6 * n, 2 * n**2],
+                      [-12, -6 * n, 12, -6 * n], [6 * n, 2 * n**2, -6 * n, 4 * n**2]]) * ei / n**3  # fmt: skip
+        s = np.diag([1, sign, 1, sign])
+        index = [place, turn, place + 6, turn + 6]
+        k[np.ix_(index, index)] = s @ c @ s
+    return k

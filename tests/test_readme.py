@@ -6,6 +6,7 @@ import sys
 import typing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sfetcas import Scene, solve
@@ -142,6 +143,28 @@ def test_scene_of_the_readme_is_solved_as_said():
     x, y, _ = solve(Scene.from_dict(blocks()[0])).last.position("tip")
     # the digits printed there; the accuracy asked for is 1e-6
     assert (x, y) == pytest.approx((0.44500, 0.81060), abs=1e-5)
+
+
+def programs():
+    return re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
+
+
+def test_there_are_programs():
+    assert len(programs()) == 3
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_program_of_the_readme_runs_as_it_stands(number, monkeypatch):
+    """Each by itself, imports and all; what a comment prints with dots is what the line gives, digit by digit."""
+    monkeypatch.chdir(README.parent)
+    text, names = programs()[number], {}
+    exec(compile(text, README.name, "exec"), names)
+    printed = re.findall(r"^(\S.*?)  # .*?(-?\d+\.\d+)\.\.\.(?:.*?(-?\d+\.\d+)\.\.\.)?", text, re.MULTILINE)
+    assert len(printed) == (1, 2, 0)[number]
+    for line, *digits in printed:
+        found = np.atleast_1d(eval(line, names))
+        for value, told in zip(found, filter(None, digits), strict=False):
+            assert f"{value:.12f}".startswith(told), line
 
 
 def test_system_of_the_readme_drives_its_joint():

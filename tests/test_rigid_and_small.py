@@ -8,11 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import SOFT, UNLIKE, arc_across, made, model_of
+from scenes import SOFT, UNLIKE, arc_across, made, model_of, textbook
 from systems import linked, linked_space, small_space
 
 import sfetcas
 from sfetcas.cli import main
+from sfetcas.description.matrices import read_matrix
 from sfetcas.equilibria.statics import solve_model
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics.fields import Fields
@@ -407,20 +408,6 @@ def test_deflection_across_a_straight_beam_is_right_to_the_third_order():
 # -- condensed matrices -------------------------------------------------------------------------------------
 
 
-def textbook(length, ea, gj, ei2, ei3):
-    """The 12 x 12 stiffness of a straight Euler-Bernoulli beam along b1, three places, three rotations each end."""
-    k, n = np.zeros((12, 12)), length
-    for i, stiffness in ((0, ea / n), (3, gj / n)):
-        k[np.ix_([i, i + 6], [i, i + 6])] = stiffness * np.array([[1, -1], [-1, 1]])
-    for ei, place, turn, sign in ((ei3, 1, 5, 1.0), (ei2, 2, 4, -1.0)):
-        c = np.array([[12, 6 * n, -12, 6 * n], [6 * n, 4 * n**2, -6 * n, 2 * n**2],
-                      [-12, -6 * n, 12, -6 * n], [6 * n, 2 * n**2, -6 * n, 4 * n**2]]) * ei / n**3  # fmt: skip
-        s = np.diag([1, sign, 1, sign])
-        index = [place, turn, place + 6, turn + 6]
-        k[np.ix_(index, index)] = s @ c @ s
-    return k
-
-
 def consistent_mass(length, rho):
     """Consistent mass of the same beam without rotary inertia."""
     m, n = np.zeros((12, 12)), length
@@ -554,6 +541,33 @@ def test_matrices_from_files_beside_the_scene(how, tmp_path, monkeypatch):
     np.testing.assert_array_equal(np.array(scene.members["m"].mass), m)
     monkeypatch.chdir(folder)
     assert made(table) == scene
+
+
+def fortran(text):
+    """Exponents as Fortran writes those of double precision."""
+    return re.sub(r"(\d)e([+-]?\d)", r"\1D\2", text)
+
+
+WRITTEN = {
+    "byte order mark": lambda text: "\ufeff" + text,
+    "Fortran": fortran,
+    "Fortran, small letters": lambda text: fortran(text).replace("D", "d"),
+    "upper case": str.upper,
+    "line ends of Windows": lambda text: text.replace("\n", "\r\n"),
+    "blank lines": lambda text: "\n" + text.replace("\n", "\n\n") + "  \n",
+    "comments between": lambda text: re.sub("\n", "\n  % 1.0 and 2.0\n%\n", text),
+    "a comment in another language": lambda text: text.replace("a comment", "Prüfmatrix, Länge 1 m"),
+}
+"""How programs write the same matrix."""
+
+
+@pytest.mark.parametrize("how", WRITTEN)
+@pytest.mark.parametrize(("layout", "symmetry"), FILES)
+def test_matrix_market_as_programs_write_it(how, layout, symmetry, tmp_path):
+    k = 1e-7 * matrix_of_unlike()
+    text = market(k, layout, symmetry)
+    (tmp_path / "k.mtx").write_bytes(WRITTEN[how](text).encode())
+    np.testing.assert_array_equal(read_matrix(tmp_path / "k.mtx"), k)
 
 
 BAD_FILES = {

@@ -221,8 +221,13 @@ def test_unknown_keys(place, sentence):
             "statics",
             "analysis.type: found 'statics', accepted: path, static; did you mean 'static'?",
         ),
-        ("analysis/accuracy", 0, "analysis.accuracy: found 0, accepted: a number above 0 and up to 0.1"),
-        ("analysis/accuracy", 0.2, "analysis.accuracy: found 0.2, accepted: a number above 0 and up to 0.1"),
+        ("analysis/accuracy", 0, "analysis.accuracy: found 0, accepted: from 1e-14, what rounding leaves, to 0.1"),
+        (
+            "analysis/accuracy",
+            1e-20,
+            "analysis.accuracy: found 1e-20, accepted: from 1e-14, what rounding leaves, to 0.1",
+        ),
+        ("analysis/accuracy", 0.2, "analysis.accuracy: found 0.2, accepted: from 1e-14, what rounding leaves, to 0.1"),
         ("analysis/steps", [], "analysis.steps: found an empty list, accepted: a list of numbers"),
         ("analysis/steps", 1.0, "analysis.steps: found 1.0, accepted: a list of numbers"),
         ("analysis/steps", [1, float("nan")], "analysis.steps: found nan, accepted: a finite number"),
@@ -423,20 +428,20 @@ def test_a_displacement_and_a_rotation_of_one_node_may_be_two_motions():
     [
         (
             {"nodes/A/support": "free"},
-            "nothing holds nodes A, B: free to move along x, y and to turn; add a support",
+            "free to move: nodes A, B moving along x, y and turning; neither stiffness nor a load holds it, add",
         ),
         (
             {"nodes/A/support": "free", **IN_SPACE},
-            "nothing holds nodes A, B: free to move along x, y, z and to turn",
+            "free to move: nodes A, B moving along x, y, z and turning; neither",
         ),
-        (GUIDED, "the supports of nodes A, B leave them free to move along [1, 0, 0]; add a support"),
+        (GUIDED, "free to move: nodes A, B moving along [1, 0]; neither stiffness nor a load holds it, add a support"),
         (
             {**GUIDED, "nodes/A/direction": [-3, 4]},
-            "the supports of nodes A, B leave them free to move along [0.6, -0.8",
+            "free to move: nodes A, B moving along [-0.6, 0.8]; neither",
         ),
         (
             {**GUIDED, **IN_SPACE, "nodes/B/support": "slider", "nodes/B/direction": [2, 0]},
-            "the supports of nodes A, B leave them free to move along [1, 0, 0]; add a support",
+            "free to move: nodes A, B moving along [1, 0, 0]; neither",
         ),
         (
             {
@@ -444,15 +449,15 @@ def test_a_displacement_and_a_rotation_of_one_node_may_be_two_motions():
                 "nodes/D": {"position": [1, 1]},
                 "members/more": {"nodes": ["C", "D"], "section": "strip"},
             },
-            "nothing holds nodes C, D: free to move along x",
+            "free to move: nodes C, D moving along x, y and turning; neither",
         ),
         (
             {**THIRD, "nodes/A/support": "free"},
-            "nothing holds nodes A, B, C: free to move along x, y and to turn",
+            "free to move: nodes A, B, C moving along x, y and turning; neither",
         ),
         (
             {**GUIDED, "motions/m": {"node": "A", "displacement": [0, 1]}},
-            "the supports of nodes A, B leave them free",
+            "free to move: nodes A, B moving along [1, 0]; neither",
         ),
     ],
 )

@@ -164,6 +164,12 @@ def test_element_and_number_asked_for_are_used_exactly(element, gauss):
     assert solution.status is Status.SOLVED  # no accuracy was asked for
 
 
+def test_the_finest_accuracy_accepted_is_reached():
+    solution = solve(made(cantilever((0, 30.0))), accuracy=1e-14)
+    assert solution.status is Status.SOLVED
+    assert solution.last.certificate.error_estimate <= 1e-14
+
+
 def test_accuracy_not_reached_on_a_given_mesh_is_told():
     solution = solve(made(cantilever((0, 30.0))), element="SFET2", elements=2, accuracy=1e-6)
     assert solution.status is Status.SHORT
@@ -192,7 +198,14 @@ def test_many_elements_are_estimated_from_half_of_them():
 
 @pytest.mark.parametrize(
     ("word", "value"),
-    [("accuracy", 0.0), ("accuracy", 0.2), ("element", "SFET1"), ("elements", 0), ("assembly", "both")],
+    [
+        ("accuracy", 0.0),
+        ("accuracy", 1e-20),
+        ("accuracy", 0.2),
+        ("element", "SFET1"),
+        ("elements", 0),
+        ("assembly", "both"),
+    ],
 )
 def test_settings_refuse_in_sentences(word, value):
     with pytest.raises(sfetcas.SceneError, match=f"{word}: found .*, accepted: "):

@@ -105,7 +105,7 @@ def _numbers_of(array: Any, path: Path) -> Floats:
 def _from_market(path: Path) -> Floats:
     """Matrix Market exchange format, coordinate or array, general or symmetric (Boisvert et al. 1996)."""
     try:
-        lines = path.read_text().splitlines()
+        lines = path.read_bytes().decode("utf-8-sig").strip().splitlines()
     except UnicodeDecodeError:
         raise ValueError(f"the file {path} is no text, accepted: Matrix Market, or .npz") from None
     head = lines[0].lower().split() if lines else []
@@ -115,7 +115,9 @@ def _from_market(path: Path) -> Floats:
     for found, accepted in zip(head[2:], kinds, strict=True):
         if found not in accepted:
             raise ValueError(f"the file {path} is {found}, accepted: {', '.join(accepted)}")
-    numbers = " ".join(line for line in lines[1:] if not line.startswith("%")).split()
+    text = " ".join(line for line in lines[1:] if not line.lstrip().startswith("%"))
+    # Fortran writes the exponent of double precision with a D.
+    numbers = text.replace("D", "e").replace("d", "e").split()
     try:
         return _market_entries(np.array(numbers, dtype=float), head[2], head[4])
     except (ValueError, IndexError):

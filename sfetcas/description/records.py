@@ -41,15 +41,19 @@ R = TypeVar("R", bound="Record")
 
 def say(value: object) -> str:
     """A found value, short enough for a sentence."""
-    text = repr(list(value) if isinstance(value, tuple) else value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return _short(repr(list(value) if isinstance(value, tuple) else value))
+
+
+def _short(word: str) -> str:
+    """A name, short enough for a list."""
+    return word if len(word) <= 60 else word[:57] + "..."
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """'; did you mean ...?' where one of the known words is near, else the list of them."""
     known = sorted(known)
     close = difflib.get_close_matches(word, known, n=1)
-    return f"did you mean {close[0]!r}?" if close else "accepted: " + ", ".join(known)
+    return f"did you mean {say(close[0])}?" if close else "accepted: " + ", ".join(map(_short, known))
 
 
 def unknown(word: str, known: Iterable[str], kind: str = "names") -> str:
@@ -57,9 +61,9 @@ def unknown(word: str, known: Iterable[str], kind: str = "names") -> str:
     known = sorted(known)
     if not known:
         return f"found {say(word)}, but the scene has no {kind}"
-    listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+    listed = ", ".join(map(_short, known[:12])) + (", ..." if len(known) > 12 else "")
     close = difflib.get_close_matches(word, known, n=1)
-    return f"found {say(word)}, accepted: {listed}" + (f"; did you mean {close[0]!r}?" if close else "")
+    return f"found {say(word)}, accepted: {listed}" + (f"; did you mean {say(close[0])}?" if close else "")
 
 
 def number(value: Any) -> float:

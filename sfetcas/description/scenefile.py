@@ -70,9 +70,15 @@ def parse(text: str, format: str, folder: Path | None = None) -> Scene:
 def _values(text: str, format: str) -> Any:
     """The tables of a text."""
     try:
-        return tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
+        values = tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
+        if "\\ud" in text.lower():
+            # Half of a pair stands for no character, and could neither be printed nor written.
+            json.dumps(values, ensure_ascii=False, default=str).encode()
+        return values
     except SceneError:
         raise
+    except UnicodeEncodeError as error:
+        raise SceneError(f"not read as JSON: found {error.object[error.start]!a}, half of a character") from None
     except ValueError as error:
         raise SceneError(f"not read as {format.upper()}: {error}") from None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from .records import say
 from .springs import Spring
 from .structure import SLIDING, Member, Node, unit
 
-__all__ = ["check_driven_joint", "check_floating", "check_motion", "check_motions_once", "drives"]
+__all__ = ["check_driven_joint", "check_floating", "check_motion", "check_motions_once", "drives", "free_to_move"]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -90,21 +90,26 @@ def check_floating(
         held = np.vstack([held, *(rows for name in part for rows in sprung[name])])
         free = free_directions(held, dimension)
         if len(free):
-            raise SceneError(_floating(part, held, free))
+            raise SceneError(_floating(part, held, free[:, : 2 if dimension == "plane" else 3]))
+
+
+def free_to_move(motion: str) -> str:
+    """The sentence that refuses a motion that nothing holds, whoever finds it."""
+    return f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
 
 
 def _floating(part: list[str], held: Floats, free: Floats) -> str:
-    listed = ", ".join(part[:6]) + (", ..." if len(part) > 6 else "")
+    nodes = f"node{'s' if len(part) > 1 else ''} {', '.join(part[:4])}"
+    nodes += f" and {len(part) - 4} more" if len(part) > 4 else ""
     if not len(held):
-        axes = "x, y" if len(free) == 2 else "x, y, z"
-        return f"nothing holds nodes {listed}: free to move along {axes} and to turn; add a support"
-    along = " and ".join(_rounded(direction) for direction in free)
-    return f"the supports of nodes {listed} leave them free to move along {along}; add a support"
+        return free_to_move(f"{nodes} moving along {', '.join('xyz'[: len(free)])} and turning")
+    return free_to_move(f"{nodes} moving along {' and '.join(map(_in_words, free))}")
 
 
-def _rounded(direction: Floats) -> str:
-    sign = np.sign(direction[np.argmax(np.abs(direction) > 1e-9)])
-    return "[" + ", ".join(f"{round(sign * entry, 4) + 0.0:g}" for entry in direction) + "]"
+def _in_words(direction: Floats | Sequence[float]) -> str:
+    """A direction in words, its largest component above zero, without the z that a plane scene leaves out."""
+    sign = np.sign(direction[int(np.argmax(np.abs(direction)))])
+    return f"[{', '.join(f'{sign * part + 0.0:.3g}' for part in direction)}]"
 
 
 def check_motions_once(motions: Mapping[str, Motion]) -> None:

@@ -10,12 +10,22 @@ from ..errors import SceneError
 from .later import Staged
 from .records import Fraction, Number, Numbers, number, say
 
-__all__ = ["Analysis", "Expect"]
+__all__ = ["Analysis", "Expect", "checked_accuracy"]
+
+FINEST = 1e-14
+"""Accuracy that can be asked for: rounding leaves 4e-16 to 5e-15 of the size between one mesh and the next."""
 
 
-def _accuracy(value: float) -> float:
-    if not 0.0 < value <= 0.1:
-        raise ValueError(f"found {value:g}, accepted: a number above 0 and up to 0.1")
+def checked_accuracy(value: float) -> float:
+    """An accuracy that can be reached.
+
+    Raises
+    ------
+    ValueError
+        It is below what rounding leaves, or coarse beyond use.
+    """
+    if not FINEST <= value <= 0.1:
+        raise ValueError(f"found {value:g}, accepted: from {FINEST:g}, what rounding leaves, to 0.1")
     return value
 
 
@@ -61,7 +71,7 @@ class Analysis(Staged):
     Parameters
     ----------
     type : static, or path: the equilibria from factor 0 on, through limit points
-    accuracy : wanted error of the positions relative to the size of the scene, up to 0.1
+    accuracy : wanted error of the positions relative to the size of the scene, 1e-14 to 0.1
     steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
     unstable : leave an unstable equilibrium for a stable one, or stay there
     equilibria : one, to which the loads lead when they grow together from zero, or all that a search finds
@@ -76,7 +86,7 @@ class Analysis(Staged):
     """
 
     type: Literal["static", "path"] = "static"
-    accuracy: Annotated[Number, AfterValidator(_accuracy)] = 1e-4
+    accuracy: Annotated[Number, AfterValidator(checked_accuracy)] = 1e-4
     steps: Numbers = (1.0,)
     unstable: Literal["leave", "stay"] = "leave"
     equilibria: Literal["one", "all"] = "one"

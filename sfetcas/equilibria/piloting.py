@@ -63,9 +63,8 @@ class Piloting(Meshing):
             free, taut = pilot.diagnosis, pilot.lacks_slack
         except np.linalg.LinAlgError:
             return error
-        details = [error.detail] if error.detail else []
-        if free.mobility:
-            details.append(f"free to move without load: {'; '.join(free.motions[:3])}")
+        details = [f"free to move: {'; '.join(free.motions[:3])}"] if free.mobility else []
+        details += [error.detail] if error.detail else []
         if taut and error.status is not Status.INFEASIBLE:
             rows = ", ".join(dict.fromkeys(free.redundant))
             details.append(f"{TAUT}: {rows}")

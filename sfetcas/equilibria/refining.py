@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other, largest_difference, roughness
@@ -39,6 +40,9 @@ DRIFT = 1.0
 
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
+
+MOST_TURNED = 1e8
+"""Largest angle of an answer, rad: rounding leaves 1e-8 of it."""
 
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
@@ -126,6 +130,7 @@ class Refining(Piloting):
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
+        _refuse_wound(prepared, found.corrected)
         if not found.kept:
             _refuse_free(prepared, found.corrected, stability)
         if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
@@ -156,6 +161,21 @@ class Refining(Piloting):
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
 
+def _refuse_wound(prepared: Prepared, found: Corrected) -> None:
+    """Refuse angles that count so many turns that rounding leaves little of where they point.
+
+    Raises
+    ------
+    SolveError
+        Says how far.
+    """
+    state, model = found.state, prepared.model
+    turned = np.abs(np.append(state.wound, 0.0) if model.space else state.q).max(initial=0.0)
+    if turned > MOST_TURNED:
+        detail = f"something turns by {turned:.1e} rad, of which rounding leaves no angle: next to nothing resists it"
+        raise SolveError(Status.FAILED, detail, state)
+
+
 def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> None:
     """Refuse a mechanism of which neither stiffness nor loads hold some motion.
 
@@ -168,9 +188,7 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
         return
     shape = np.concatenate([stability.shape, stability.travel])
     if moves_nodes(prepared.equations, shape, found.state):
-        motion = in_words(prepared.equations, shape)
-        message = f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
-        raise SceneError(message)
+        raise SceneError(free_to_move(in_words(prepared.equations, shape)))
 
 
 def _least_reactions(equations: Equations, state: State, loading: Loading, loose: Array) -> State:

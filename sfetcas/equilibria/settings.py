@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from ..description.task import checked_accuracy
 from ..errors import SceneError
 from ..mechanics.elements import ELEMENTS
 
@@ -40,8 +41,11 @@ class Settings:
     runs: int | None = None
 
     def __post_init__(self) -> None:
-        if self.accuracy is not None and not 0.0 < self.accuracy <= 0.1:
-            raise SceneError(f"accuracy: found {self.accuracy:g}, accepted: a number above 0 and up to 0.1")
+        if self.accuracy is not None:
+            try:
+                checked_accuracy(self.accuracy)
+            except ValueError as error:
+                raise SceneError(str(error), ("accuracy",)) from None
         if self.element is not None and self.element not in ELEMENTS:
             raise SceneError(f"element: found {self.element!r}, accepted: {', '.join(ELEMENTS)}")
         if self.elements is not None and not 1 <= self.elements <= 1_000_000:

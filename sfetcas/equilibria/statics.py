@@ -28,6 +28,7 @@ from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
+from ..solvers.unheld import refuse_unheld
 from .meshing import Found
 from .piloting import NO_ENERGY, NO_POTENTIAL
 from .refining import LEVELS, Refining
@@ -95,6 +96,7 @@ class _Run(Refining):
         last: tuple[float, Found] | None = None
         contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed) if self.scene.contacts else None
         for factor in self.scene.analysis.steps:
+            refuse_unheld(pilot, factor)
             try:
                 if contact is not None:
                     steps.append(self._in_contact(contact, pilot, factor))

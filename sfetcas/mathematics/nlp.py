@@ -230,6 +230,8 @@ class Ipopt:
             "calc_lam_x": False,
             "error_on_fail": False,
             "no_nlp_grad": True,
+            # What leaves the numbers on the way is in the status.
+            "show_eval_warnings": self.verbose,
         }
         return Solver("ipopt", {**options, "ipopt": ipopt}).prepare(nlp)
 

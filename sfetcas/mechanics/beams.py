@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..mathematics.arrays import Array
 from .elements import Element
 from .mesh import Mesh
 
-__all__ = ["Beams", "Scales", "beams_of", "scales_of"]
+__all__ = ["Beams", "Scales", "beams_of", "load_size", "scales_of"]
 
 
 @dataclass(frozen=True)
@@ -63,21 +64,23 @@ def scales_of(scene: Scene) -> Scales:
             found.append(float(turning) * scene.center_lines[name].length / length)
     found = found or [spring.stiffness for spring in scene.springs.values() if spring.type == "rotational"]
     found = found or [spring.stiffness * length**2 for spring in scene.springs.values()]
-    return Scales(length, max(found, default=0.0) or _load_size(scene, length) or 1.0)
+    return Scales(length, max(found, default=0.0) or load_size(scene, length) or 1.0)
 
 
-def _load_size(scene: Scene, length: float) -> float:
-    """Size of the loads as moments, N m, for scenes in which nothing is elastic."""
-    forces = [float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "force"]
-    moments = [float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "moment"]
-    spread = [float(np.linalg.norm(load.vector)) for load in scene.loads.values() if load.type == "distributed"]
+def load_size(scene: Scene, length: float) -> float:
+    """Size of the loads as moments, N m, over a length in m; zero where there are none."""
+    # No squares: a load may be as large as any number.
+    forces, moments, spread = (
+        [math.hypot(*load.vector) for load in scene.loads.values() if load.type == kind]
+        for kind in ("force", "moment", "distributed")
+    )
     masses = [node.mass for node in scene.nodes.values()]
     for name, member in scene.members.items():
         if member.section is not None:
             masses.append(
                 float(scene.sections[member.section].mass(np.array([0.5]))[0]) * scene.center_lines[name].length
             )
-    weight = 0.0 if scene.gravity is None else max(masses, default=0.0) * float(np.linalg.norm(scene.gravity))
+    weight = 0.0 if scene.gravity is None else max(masses, default=0.0) * math.hypot(*scene.gravity)
     return max([*(force * length for force in [*forces, weight]), *moments, *(q * length**2 for q in spread)])
 
 

@@ -12,6 +12,7 @@ Sizes are added up whatever their directions, as loads may turn.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +86,7 @@ class _Acting:
             self.at_nodes[self._number[node]] += size / len(ends)
 
     def _take(self, load: Load) -> None:
-        size = np.array([0.0, np.linalg.norm(load.vector)])
+        size = np.array([0.0, math.hypot(*load.vector)])
         if load.type != "moment":
             # Whole turns need few elements: moments count as they are given, forces with their factor.
             size = size[::-1] * self._share(load)

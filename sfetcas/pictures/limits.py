@@ -56,7 +56,7 @@ def _strokes(sketch: Sketch, line: Array, into: Array, name: str, level: float =
     at = (np.arange(count) + 0.5) / count * total
     reached = np.concatenate([[0.0], np.cumsum(lengths)])
     piece = np.clip(np.searchsorted(reached, at) - 1, 0, len(steps) - 1)
-    along = steps[piece] / lengths[piece, None]
+    along = steps[piece] / np.maximum(lengths[piece, None], np.finfo(float).tiny)
     feet = line[piece] + (at - reached[piece])[:, None] * along
     heads = feet + STROKE * size * math.sqrt(0.5) * (np.broadcast_to(into, line.shape)[piece] - along)
     strokes = broken(*np.stack([feet, heads], axis=1))

@@ -11,6 +11,7 @@ from .continuation import follow
 from .newton import loose_rows, rows_in
 from .prepared import Prepared
 from .tracing import Traced
+from .unheld import refuse_unheld
 
 __all__ = ["begin_path", "check_slack"]
 
@@ -49,6 +50,7 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
     model, equations = prepared.model, prepared.equations
     unloaded = model.loading(0.0, 0.0)
     state = equations.start(unloaded)
+    refuse_unheld(prepared, beside)
     moved = np.any(model.loading(beside).shift - model.loading(0.0).shift)
     if moved and prepared.lacks_slack:
         note = f"straight members have no slack: the path starts at factor {beside:g}, where they have bent"

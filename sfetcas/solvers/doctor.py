@@ -32,6 +32,9 @@ MOST = 40
 ITERATIONS = 4
 """Inverse iterations: each gains the ratio of the softest stiffness to the shift, seven digits."""
 
+MOVES = 1e-6
+"""What moves by less than this share of what moves most does not; the central difference leaves out 1e-10."""
+
 SHARE = 0.05
 """A member takes part in a motion when it turns by this share of the largest rotation."""
 
@@ -70,10 +73,9 @@ class Diagnosis:
         return f"{free}; {self.excess} redundant among {held}"
 
 
-def diagnose(equations: Equations, weight: Array) -> Diagnosis:
-    """Mobility and redundancy of a model at its undeformed state."""
+def diagnose(equations: Equations, motions: Array) -> Diagnosis:
+    """Mobility and redundancy of a model at its undeformed state, from its :func:`free_motions` there."""
     state = _undeformed(equations)
-    motions = free_motions(equations, weight, state)
     loose = loose_rows(equations, equations.at(state, equations.model.loading(0.0, 0.0)))
     names = tuple(equations.row_names[row] for row in rows_in(loose))
     words = tuple(in_words(equations, motion) for motion in motions.T)
@@ -87,13 +89,12 @@ def _undeformed(equations: Equations) -> State:
 
 
 def free_motions(equations: Equations, weight: Array, state: State) -> Array:
-    """Motions that strain nothing at a state: columns (unknowns, n), each with one unknown of its own."""
+    """Motions that strain nothing at an unstrained state: columns (unknowns, n), each with one unknown of its own."""
     n, turning = equations.unknowns, equations.turning_unknowns
     if n == 0:
         return np.zeros((0, 0))
     point = equations.at(state, equations.model.loading(0.0, 0.0))
-    coupling = (equations.row >= n) != (equations.column >= n)
-    stiffness = np.where(coupling, point.entries, equations.elastic_entries())
+    stiffness = point.entries
     metric = np.concatenate([weight, np.full(n - turning, float(weight.mean()) if turning else 1.0)])
     shifted = stiffness.copy()
     shifted[equations.diagonal[:n]] += 0.01 * SOFT * metric
@@ -143,19 +144,37 @@ def _told_apart(motions: Array) -> Array:
 
 
 def in_words(equations: Equations, motion: Array) -> str:
-    """Which members turn, and which nodes move, in a motion."""
+    """Which members turn, and which slide along their nodes, and which nodes move, in a motion."""
     model = equations.model
+    motion = np.where(np.abs(motion) > MOVES * np.abs(motion).max(initial=0.0), motion, 0.0)
     turned = np.where(equations.number >= 0, motion[equations.number], 0.0)
     sizes = np.linalg.norm(turned, axis=1)
     by_member = {name: float(sizes[list(ends)].max()) for name, ends in model.rotations.ends.items()}
     largest = max(by_member.values(), default=0.0)
     turning = [name for name, size in by_member.items() if size > SHARE * largest > 0.0]
-    travels = _node_travels(equations, motion)
-    moved = np.linalg.norm(travels, axis=1) > 1e-6 * max(largest, 1.0)
+    places = _travels(equations, motion, _undeformed(equations))
+    travels, least = places[: len(model.nodes)], MOVES * max(largest, 1.0)
+    moved = np.linalg.norm(travels, axis=1) > least
     moving = [name for name, moves in zip(model.nodes, moved, strict=True) if moves]
+    slid = _slid(equations, places)
+    sliding = [name for name, travel in slid.items() if np.linalg.norm(travel) > least]
     words = [f"{_listed('member', turning)} turning"] if turning else []
+    words += (
+        [f"{_listed('member', sliding)} sliding{_together(np.array([slid[n] for n in sliding]))}"] if sliding else []
+    )
     words += [f"{_listed('node', moving)} moving{_together(travels[moved])}"] if moving else []
     return " with ".join(words) or "a rotation that nothing is joined to"
+
+
+def _slid(equations: Equations, travels: Array) -> dict[str, Array]:
+    """How far the end of each member that slides along its node travels from it, the first end of two."""
+    model = equations.model
+    found: dict[str, Array] = {}
+    for (name, i), place in model.segments.ends.items():
+        node = model.scene.members[name].nodes[i]
+        if place != node:
+            found.setdefault(name, travels[model.segments.place(place)] - travels[model.segments.place(node)])
+    return found
 
 
 def _listed(kind: str, names: list[str]) -> str:
@@ -190,12 +209,17 @@ ALIKE = 1e-6
 def _node_travels(equations: Equations, motion: Array, state: State | None = None) -> Array:
     """Where each node travels per unit of a motion (nodes, axes), by a small step both ways."""
     state = _undeformed(equations) if state is None else state
+    return _travels(equations, motion, state)[: len(equations.model.nodes)]
+
+
+def _travels(equations: Equations, motion: Array, state: State) -> Array:
+    """The same of all places, the nodes first."""
     loading = equations.model.loading(0.0, 0.0)
     step = np.zeros(equations.total)
     step[: equations.unknowns] = STEP * motion
     ahead, behind = (equations.places(equations.moved(state, sign * step), loading) for sign in (1.0, -1.0))
     travel = (ahead - behind) / (2.0 * STEP)
-    return np.asarray(travel.reshape(-1, equations.model.element.axes)[: len(equations.model.nodes)])
+    return np.asarray(travel.reshape(-1, equations.model.element.axes))
 
 
 STEP = 1e-5

@@ -19,7 +19,7 @@ from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .divergence import TangentTest
-from .doctor import Diagnosis, contradiction, diagnose
+from .doctor import Diagnosis, contradiction, diagnose, free_motions
 from .downhill import flow
 from .guess import first_guess, lacks_slack, restore
 from .newton import Corrected, correct
@@ -64,7 +64,13 @@ class Prepared:
     @functools.cached_property
     def diagnosis(self) -> Diagnosis:
         """What the undeformed structure is free to do, and what its joints hold twice."""
-        return diagnose(self.equations, self._test.weight)
+        return diagnose(self.equations, self.motions)
+
+    @functools.cached_property
+    def motions(self) -> Array:
+        """What the undeformed structure is free to do, see :func:`~sfetcas.solvers.doctor.free_motions`."""
+        undeformed = self.equations.start(self.model.loading(0.0, 0.0))
+        return free_motions(self.equations, self._test.weight, undeformed)
 
     @functools.cached_property
     def lacks_slack(self) -> bool:

@@ -1,0 +1,171 @@
+"""Free motions along which loads do work without end: there is no equilibrium, and none is looked for.
+
+Two kinds can be known for sure before anything is solved.  A *travel* is a straight motion of displacements alone
+that strains nothing however far it goes, while the loads pull it on.  A *round* is the motion of a mechanism of
+mobility one that comes back to where it began: it is followed once around, unloaded, and the loads drive it on all
+the way, as a moment does with a crank that can turn round.  Weight cannot: what it gives on one half it takes on the
+other.  Where dead forces bend flexible members on the way the round says nothing, and the equilibrium is looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..description.supports import free_to_move
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from ..mechanics.loading import Loading
+from .doctor import free_motions, in_words
+from .prepared import Prepared
+
+__all__ = ["refuse_unheld"]
+
+STEP = 0.1
+"""Of the fastest rotation from state to state of a round, rad."""
+
+ROUNDS = 400
+"""States of a round at most: six turns of the fastest link."""
+
+DRIVEN = 1e-6
+"""A load that does less than this share of its largest work per radian does not drive."""
+
+NOTHING = 1e-9
+"""Share of the work of the loads that is no strain energy."""
+
+CORRECTIONS, SOFT, CLOSING = 12, 1e-3, 1e-11
+"""Newton steps to a state of a round at most; what keeps their matrix regular, beside stiffness and closings."""
+
+FAR = (1.0, 1e6)
+"""Travels, in lengths of the scene, over which nothing may be strained."""
+
+
+def refuse_unheld(prepared: Prepared, factor: float) -> None:
+    """Refuse a motion that is free and that the loads drive on without end.
+
+    Raises
+    ------
+    SceneError
+        Names the motion.
+    """
+    model = prepared.model
+    stopped = model.scene.contacts or any(spring.stop is not None for spring in model.scene.springs.values())
+    if stopped or model.scene.motions or not prepared.diagnosis.mobility:
+        return
+    loading, start = model.loading(factor), prepared.equations.start(model.loading(0.0, 0.0))
+    motions = prepared.motions
+    motion = _travel(prepared, loading, start, motions)
+    if motion is None and motions.shape[1] == 1 and _known(prepared, loading):
+        motion = _round(prepared, loading, start, motions[:, 0])
+    if motion is not None:
+        raise SceneError(free_to_move(in_words(prepared.equations, motion)))
+
+
+def _known(prepared: Prepared, loading: Loading) -> bool:
+    """Whether a round tells of the loads: they drive it, and bend nothing on the way that could hold them."""
+    drive = loading.moment.any() or loading.follows
+    flexible = any(member.type != "rigid" for member in prepared.model.scene.members.values())
+    dead = loading.force.any() or loading.pull.any() or any(load.any() for load in loading.loads)
+    return bool(drive and not (flexible and dead))
+
+
+def _pull(prepared: Prepared, state: State, loading: Loading) -> Array:
+    """What drives the unknowns at a state without reactions, (unknowns,)."""
+    point = prepared.equations.at(replace(state, lam=np.zeros_like(state.lam)), loading)
+    return -point.residual[: prepared.equations.unknowns]
+
+
+def _moved(prepared: Prepared, state: State, motion: Array) -> State:
+    equations = prepared.equations
+    return equations.moved(state, np.concatenate([motion, np.zeros(equations.total - len(motion))]))
+
+
+def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) -> Array | None:
+    """The motion of displacements alone that the loads drive furthest, where nothing ever holds it."""
+    equations = prepared.equations
+    unloaded, turning = prepared.model.loading(0.0, 0.0), equations.turning_unknowns
+    _, sizes, right = np.linalg.svd(np.linalg.qr(motions[:turning], mode="r"))
+    straight = motions @ right[np.append(sizes, np.zeros(len(right) - len(sizes))) < NOTHING].T
+    motion = straight @ (straight.T @ _pull(prepared, start, loading))
+    if not np.abs(motion).max(initial=0.0) > 0.0:
+        return None
+    motion /= np.abs(motion).max()
+    work = float(motion @ _pull(prepared, start, loading))
+    for way in FAR:
+        there = _moved(prepared, start, way * motion)
+        point = equations.at(there, unloaded)
+        held = np.abs(point.residual[: equations.unknowns]).max() > NOTHING * work
+        opened = np.abs(point.residual[equations.unknowns :]).max(initial=0.0) > NOTHING * way
+        driven = float(motion @ _pull(prepared, there, loading)) >= (1.0 - NOTHING) * work
+        if held or opened or point.strain > NOTHING * way * work or not driven:
+            return None
+    return motion
+
+
+def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) -> Array | None:
+    """The motion of a mechanism that comes back to where it began, where the loads drive it all the way."""
+    equations, unloaded = prepared.equations, prepared.model.loading(0.0, 0.0)
+    first = _of_unit_speed(equations.turning_unknowns, motion)
+    if first is None:
+        return None
+    speed, largest, work, furthest = first, 0.0, 0.0, 0.0
+    drive = float(speed @ _pull(prepared, start, loading))
+    speed = first = first * (1.0 if drive >= 0.0 else -1.0)
+    state = start
+    for _ in range(ROUNDS):
+        drive = float(speed @ _pull(prepared, state, loading))
+        largest = max(largest, drive)
+        work += STEP * drive
+        if not drive > DRIVEN * largest:
+            return None
+        before, state = state, _unstrained(prepared, _moved(prepared, state, STEP * speed), unloaded)
+        went = _apart(prepared, state, before)
+        # What resists draws back, and where the motion turns sharply a step leads elsewhere.
+        if not 0.5 * STEP < went < 0.5:
+            return None
+        free = free_motions(equations, prepared.weight, state)
+        # Where all links lie in one line there are two motions: on along the one that led there.
+        onward = _of_unit_speed(equations.turning_unknowns, free @ np.linalg.lstsq(free, speed, rcond=None)[0])
+        point = equations.at(state, unloaded)
+        gap = np.abs(point.residual[equations.unknowns :]).max(initial=0.0)
+        if onward is None or point.strain > NOTHING * work or gap > NOTHING:
+            return None
+        speed = onward
+        away = _apart(prepared, state, start)
+        furthest = max(furthest, away)
+        if furthest > 0.5 and away < 0.6 * went and float(speed @ first) > 0.0:
+            return first
+    return None
+
+
+def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
+    """The state without strain and gaps next to one, across what is free, by Newton steps without reactions."""
+    equations = prepared.equations
+    n, turning = equations.unknowns, equations.turning_unknowns
+    for _ in range(CORRECTIONS):
+        point = equations.at(state, unloaded)
+        entries = point.entries.copy()
+        # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
+        entries[equations.diagonal[:turning]] += SOFT * prepared.weight
+        entries[equations.diagonal[turning:n]] += SOFT * float(prepared.weight.mean())
+        entries[equations.diagonal[n:]] -= CLOSING
+        equations.solver.factor(entries)
+        step = equations.solver.solve(-point.residual)[:n]
+        state = _moved(prepared, state, step)
+        if np.abs(step).max(initial=0.0) < NOTHING:
+            break
+    return state
+
+
+def _of_unit_speed(turning: int, motion: Array) -> Array | None:
+    """The motion with a fastest rotation of one; None of one that turns nothing."""
+    fastest = float(np.abs(motion[:turning]).max(initial=0.0))
+    return motion / fastest if fastest > NOTHING * np.abs(motion).max(initial=0.0) else None
+
+
+def _apart(prepared: Prepared, a: State, b: State) -> float:
+    """Largest difference of two states, whole turns left out, rad or lengths of the scene."""
+    turned = prepared.distance(a, b) if prepared.model.space else np.abs(np.exp(1j * a.q) - np.exp(1j * b.q))
+    return float(max(np.max(turned, initial=0.0), np.abs(a.y - b.y).max(initial=0.0)))
