@@ -90,11 +90,8 @@ def trace(
 
     At the knots of histories the curve has a corner: it is followed from one to the next.
     """
-    traced, usual, curve = (
-        Traced([start], [], "range"),
-        start.inertia.zero,
-        curve.firmer() if start.inertia.zero else curve,
-    )
+    traced, usual = Traced([start], [], "range"), start.inertia.zero
+    curve = curve.firmer() if usual else curve
     stops = [span[0], *knots, span[1]]
     while traced.end == "range":
         now = traced.points[-1]
