@@ -586,7 +586,7 @@ def test_chart_marks_what_is_unstable_and_where(lee_path):
 
 def test_chart_of_motions_shows_a_reaction():
     found = table("twisted_rod_clamped", range=[0, 5])
-    course, _ = chart(solve(made(found))).axes
+    course, *_ = chart(solve(made(found))).axes
     assert course.get_xlabel() == "factor"
     assert course.get_ylabel() == "moment at last about x, N m"
     line = course.get_lines()[0]
