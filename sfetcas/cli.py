@@ -224,8 +224,9 @@ def _report(solution: Solution | Course, seconds: float) -> None:
 
 
 def _report_path(path: Course) -> None:
-    for branch in path.branches:
-        name = f"branch at bifurcation {branch.bifurcation}, side {branch.side:+d}" if branch.bifurcation else "path"
+    counts = {"limit point": 0, "bifurcation": 0}
+    for number, branch in enumerate(path.branches):
+        name = f"branch {number} at bifurcation {branch.bifurcation}, side {branch.side:+d}" if number else "path"
         low, high = branch.factors.min(), branch.factors.max()
         print(f"{name}: {counted(len(branch.points), 'point')}, factors {low:.6g} to {high:.6g}; {branch.end}")
         for stable, first, last in branch.stretches():
@@ -235,21 +236,27 @@ def _report_path(path: Course) -> None:
             kind = {"True": "stable", "False": "unstable", "not defined": "stability not defined"}.get(
                 str(stable), "neutral"
             )
-            print(f"  {kind} from factor {ends[0]} to {ends[1]}" if len(ends) > 1 else f"  {kind} at factor {ends[0]}")
-        _report_events(branch)
+            where = f"from factor {ends[0]} to {ends[1]}" if len(ends) > 1 else f"at factor {ends[0]}"
+            # A closed branch ends where it begins.
+            print(
+                f"  {kind} {'all along' if len(ends) == 1 and (first, last) == (0, len(branch.points) - 1) else where}"
+            )
+        _report_events(branch, counts)
     if path.error_estimate is not None:
         print(f"  estimated error along it {path.error_estimate:.1e}")
     for note in path.notes:
         print(f"  note: {note}")
 
 
-def _report_events(branch: Branch) -> None:
+def _report_events(branch: Branch, counts: dict[str, int]) -> None:
+    """Limit points and bifurcations of a branch, numbered on from those of the branches before, as in ``expect``."""
     for kind, entries in (("limit point", branch.limit_points), ("bifurcation", branch.bifurcations)):
-        for i, entry in enumerate(entries, start=1):
+        for entry in entries:
+            counts[kind] += 1
             error = entry.certificate.error_estimate
             said = "" if error is None else f", estimated error {error:.1e}"
             ways = f", {counted(entry.certificate.negative, *WAYS)}" if entry.certificate.negative else ""
-            print(f"  {kind} {i}: factor {entry.factor:.12g}{ways}{said}")
+            print(f"  {kind} {counts[kind]}: factor {entry.factor:.12g}{ways}{said}")
             for note in entry.notes:
                 print(f"    note: {note}")
 
@@ -257,6 +264,15 @@ def _report_events(branch: Branch) -> None:
 def _places(solution: Solution | Course) -> list[str]:
     """Which of several equilibria of its factor each entry is, in words; empty where one was asked for."""
     factors = [step.factor for step in solution.steps]
+    if isinstance(solution, Course):
+        named = [f", on branch {i}" if i else ", on the path" for i, b in enumerate(solution.branches) for _ in b.steps]
+        numbers = [factors[: i + 1].count(f) for i, f in enumerate(factors)]
+        several = len(solution.branches) > 1
+        return [
+            (f", crossing {number} of {factors.count(factor)}" if factors.count(factor) > 1 else "")
+            + (name if several else "")
+            for name, number, factor in zip(named, numbers, factors, strict=True)
+        ]
     if solution.scene.analysis.equilibria == "one":
         return [""] * len(factors)
     return [f", equilibrium {factors[: i + 1].count(f)} of {factors.count(f)}" for i, f in enumerate(factors)]

@@ -1,18 +1,25 @@
 """Pictures of what limits motion, and of several equilibria: drawn where they are, told apart, and told of."""
 
+import itertools
+
 import numpy as np
 import pytest
 import scenes
 from matplotlib.collections import Collection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
+from matplotlib.text import Text
+from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from sfetcas import load, solve
+from sfetcas import Scene, load, solve
 from sfetcas.description.contacts import Contact
 from sfetcas.description.obstacles import obstacle
+from sfetcas.mathematics import quaternion
 from sfetcas.pictures.charts import chart
+from sfetcas.pictures.glyphs import sketch_all
 from sfetcas.pictures.plotting import picture
+from sfetcas.pictures.sketch import Sketch, course_of, view_of
 
 ALL = "problems/cantilever_inclined_force_all_equilibria.toml"
 
@@ -23,6 +30,14 @@ def hung(contact, dimension="plane"):
     table = scenes.cantilever((0, 0), dimension=dimension, loads=loads, contacts={"stop": contact})
     table["sections"] = {name: {"EI2": 0.1, "EI3": 0.1, "GJ": 0.1} for name in table["sections"]}
     return solve(scenes.made(table))
+
+
+def sketched(solution):
+    """What a picture of the last step shows, before it is drawn."""
+    course = course_of(solution.scene, solution.steps, "none")
+    sketch = Sketch(solution.scene, solution.last, course, view_of(solution.last.model.space, course.last))
+    sketch_all(sketch)
+    return sketch
 
 
 def named(figure, name, kind):
@@ -274,6 +289,64 @@ def test_many_steps_have_one_entry_for_each_stability():
     ]
 
 
+# -- many labels, universal joints ----------------------------------------------------------------
+
+
+def comb(teeth, spacing):
+    """Cantilevers side by side, each with a force of its own: a label for each force, reaction and moment."""
+    nodes, members, loads = {}, {}, {}
+    for i in range(teeth):
+        nodes |= {
+            f"a{i}": {"position": [i * spacing, 0], "support": "clamped"},
+            f"b{i}": {"position": [i * spacing, 1]},
+        }
+        members[f"m{i}"] = {"nodes": [f"a{i}", f"b{i}"], "section": "s"}
+        loads[f"f{i}"] = {"type": "force", "node": f"b{i}", "value": [0.1 + 0.0137 * i, 0]}
+    table = {"sections": {"s": {"EI3": 1.0}}, "nodes": nodes, "members": members, "loads": loads}
+    return solve(scenes.made(table))
+
+
+def test_labels_that_would_overlap_are_left_out_and_counted():
+    figure = picture(solution := comb(24, 0.04))
+    said = [text for text in figure.findobj(Text) if (text.get_gid() or "").startswith(("load", "reaction"))]
+    (note,) = named(figure, "left-out", Text)
+    asked = {(label.text, label.colour) for label in sketched(solution).labels}
+    assert 0 < int(note.get_text().split()[0]) == len(asked) - len(said)
+    # The largest load, reaction and moment are told.
+    force, moment = solution.scene.loads["f23"].vector[0], abs(solution.last.reaction("a23")[1][2])
+    assert {f"{force:.3g} N", f"{moment:.3g} N m"} <= {text.get_text() for text in said}
+    boxes = [text.get_window_extent() for text in said]
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+    assert [text.get_text() for text in named(picture(comb(2, 1.0)), "left-out", Text)] == [""]
+
+
+def test_universal_joints_are_a_cross_of_their_two_axes():
+    """As both sides carry them: the first as the first member, the second as the other."""
+    table = {
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8}},
+        "nodes": {
+            "a": {"position": [0, 0, 0], "support": "clamped"},
+            "b": {"position": [1, 0, 0], "joint": "universal", "axis": [0, 0, 1], "axis2": [0, 1, 0]},
+            "c": {"position": [1.8, 0.3, 0.4], "joint": "hinge", "axis": [0, 0, 1]},
+            "d": {"position": [2.4, 0, 0], "support": "clamped"},
+        },
+        "members": {f"m{i}": {"nodes": pair, "section": "s"} for i, pair in enumerate(("ab", "bc", "cd"))},
+        "loads": {"f": {"type": "force", "node": "b", "value": [0, 0.3, -0.5]}},
+    }
+    table["members"] = {name: {**member, "nodes": list(member["nodes"])} for name, member in table["members"].items()}
+    solution = solve(scenes.made(table))
+    sketch = sketched(solution)
+    marks = {name: [mark for mark in sketch.marks if mark.name == f"joint-{name}"] for name in ("b", "c")}
+    assert [mark.kind for mark in marks["c"]] == ["dot"]
+    assert [mark.kind for mark in marks["b"]] == ["dot", "line", "line"]
+    for mark, member, axis, end in zip(marks["b"][1:], ("m0", "m1"), ([0, 0, 1], [0, 1, 0]), (1.0, 0.0), strict=True):
+        turned = quaternion.rotate(solution.last.along(member, end)["quaternion"][0], np.array(axis, float))
+        along = mark.points[1] - mark.points[0]
+        assert along / np.linalg.norm(along) == pytest.approx(turned, abs=1e-12)
+        # The unit of the drawing is the metre here.
+        assert mark.points.mean(axis=0) == pytest.approx(solution.last.position("b"), abs=1e-12)
+
+
 # -- charts of paths ------------------------------------------------------------------------------
 
 
@@ -298,6 +371,36 @@ def test_branches_to_both_sides_are_seen_apart():
     assert course.get_xlabel() == "displacement of tip in y, m"
     said = [text.get_text() for text in shapes.get_legend().get_texts()]
     assert said == ["undeformed", "factor 23, branch 1", "factor 23, branch 2"]
+
+
+def test_charts_draw_what_holds_the_structure():
+    """At the places that supports have at the end of the path: one of the edges' beam slides with its middle."""
+    path = solve(load("problems/knife_edges_limit_load.toml"))
+    _, shapes = chart(path).axes
+    drawn = [artist for artist in shapes.get_children() if (artist.get_gid() or "").startswith(("support", "contact"))]
+    names = {artist.get_gid() for artist in drawn}
+    held = {f"support-{name}" for name, node in path.scene.nodes.items() if node.support != "free"}
+    assert names == held | {f"contact-{name}" for name in path.scene.contacts}
+    pin = next(line for line in shapes.get_lines() if line.get_gid() in held and line.get_marker() == "o")
+    assert pin.get_xydata()[0] == pytest.approx(path.positions("middle")[-1][:2], abs=1e-12)
+    assert not any("load" in (artist.get_gid() or "") for artist in shapes.get_children())
+
+
+def test_charts_in_space_show_what_buckles_sideways():
+    found = load("problems/strip_lateral_buckling.toml").to_dict()
+    found["analysis"] |= {"branches": 1, "accuracy": 1e-3}
+    figure = chart(solve(Scene.from_dict({**found, "expect": []})))
+    course, _, shapes = figure.axes
+    assert course.get_xlabel() == "displacement of tip in z, m"
+    drawn = {line.get_label(): np.stack(line.get_data_3d(), axis=1) for line in shapes.get_lines()}
+    one, other = (drawn[f"factor 6, branch {number}"] for number in (1, 2))
+    assert one == pytest.approx(other * [1.0, 1.0, -1.0], abs=1e-6)
+    seen = [np.stack(proj3d.proj_transform(*line.T, shapes.get_proj())[:2], axis=1) for line in (one, other)]
+    across = np.ptp(np.vstack(seen), axis=0)
+    # The tips stand apart by a large part of the picture.
+    assert np.linalg.norm(seen[0][-1] - seen[1][-1]) > 0.5 * across.max()
+    # The axes reach over the whole figure, and hide nothing of the chart beside them.
+    assert not shapes.patch.get_visible()
 
 
 def test_rounding_does_not_fill_a_chart():

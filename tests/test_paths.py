@@ -560,7 +560,9 @@ def test_command_line_tells_of_the_path(tmp_path, capsys):
     assert "path: " in said
     assert "stable from factor 0 to 2.4674011" in said
     assert "bifurcation 1: factor 2.467401100" in said
-    assert "branch at bifurcation 1, side -1" in said
+    assert "branch 2 at bifurcation 1, side -1" in said
+    assert "factor 2.50539, crossing 1 of 3, on the path" in said
+    assert "factor 2.50539, crossing 3 of 3, on branch 2" in said
     assert "the factor leaves the range at 23" in said
     assert "FAILED" not in said
     assert json.loads(answer.read_text())["bifurcations"][0]["factor"] == pytest.approx(np.pi**2 / 4.0)
@@ -584,7 +586,7 @@ def test_chart_marks_what_is_unstable_and_where(lee_path):
 
 def test_chart_of_motions_shows_a_reaction():
     found = table("twisted_rod_clamped", range=[0, 5])
-    course, _ = chart(solve(made(found))).axes
+    course, *_ = chart(solve(made(found))).axes
     assert course.get_xlabel() == "factor"
     assert course.get_ylabel() == "moment at last about x, N m"
     line = course.get_lines()[0]
@@ -698,12 +700,47 @@ def test_branch_that_is_a_loop_is_followed_once():
     }
     path = solve(made(table))
     first = path.bifurcations[0].factor
-    for branch in path.branches[1:]:
-        assert branch.end == "it closes on itself"
-        assert branch.factors.max() <= first * (1.0 + 1e-6)  # the loop hangs from the bifurcation
-        # Back at the bifurcation the arch stands upright again: within a step of where the loop began.
-        assert abs(branch.factors[-1] - first) < 0.05 * first
-        assert len(branch.bifurcations) == 1
+    _, loop = path.branches
+    assert any("bifurcation 1 to the side -1: branch 1 leads along there" in note for note in path.notes)
+    assert loop.end == "it closes on itself"
+    assert loop.factors.max() <= first * (1.0 + 1e-6)  # the loop hangs from the bifurcation
+    assert loop.factors[-1] == loop.factors[0]
+    assert path.positions("t", 1)[-1] == pytest.approx(path.positions("t", 1)[0], abs=0.0)
+    # At its lowest point it crosses, without a change of stability, a symmetric path that is not followed.
+    assert [entry.factor for entry in loop.bifurcations] == pytest.approx([loop.factors.min()], rel=1e-12)
+    assert loop.limit_points == ()
+    assert len({entry.factor for entry in path.limit_points + path.bifurcations}) == 3
+
+
+def test_branch_between_two_bifurcations_is_listed_once():
+    """A shallow arch between springs snaps; its leaning branch joins the two bifurcations of the path."""
+    guide = {"support": "slider", "direction": [1, 0], "rotation": "ball"}
+    arc, spring = {"type": "arc", "angle": -0.394791}, {"stiffness": 1000, "direction": [1, 0]}
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"a": {"position": [-1, 0], **guide}, "t": {"position": [0, 0.2]}, "b": {"position": [1, 0], **guide}},
+        "members": {
+            "l": {"nodes": ["a", "t"], "section": "s", "shape": arc},
+            "r": {"nodes": ["t", "b"], "section": "s", "shape": arc},
+        },
+        "springs": {end: {"type": "translational", "node": end, **spring} for end in ("a", "b")},
+        "loads": {"f": {"type": "force", "node": "t", "value": [0, -1]}},
+        "analysis": {"type": "path", "range": [-60, 60], "branches": 2, "steps": [0.5], "accuracy": 1e-4},
+    }
+    path = solve(made(table))
+    assert len(path.branches) == 2
+    assert [len(path.limit_points), len(path.bifurcations)] == [2, 2]
+    assert path.branches[1].limit_points + path.branches[1].bifurcations == ()
+    # The branch hangs between the two: nothing of it has a factor beyond theirs.
+    ends = sorted(entry.factor for entry in path.bifurcations)
+    found = path.branches[1].factors
+    assert [found.min(), found.max()] == pytest.approx(ends, rel=2e-3)
+    # It leans to both sides at one factor; the symmetric path has the factor three times.
+    leaning = [float(step.position("t")[0]) for step in path.branches[1].steps]
+    assert len(path.main.steps) == 3
+    assert len(leaning) == 2
+    assert sum(leaning) == pytest.approx(0.0, abs=1e-6)
+    assert abs(leaning[0]) > 1e-3
 
 
 @pytest.mark.parametrize("ratio", [900.0, 1e4])

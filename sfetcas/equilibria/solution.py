@@ -21,7 +21,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.stability import Stability
 
-__all__ = ["Certificate", "Equilibrium", "Solution", "at_factor", "equilibrium"]
+__all__ = ["Certificate", "Equilibrium", "Posture", "Solution", "at_factor", "equilibrium"]
 
 MOST_PLACES = 400
 """Places listed along a member at most; with more elements only their ends, thinned out."""
@@ -63,33 +63,23 @@ class Certificate:
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """One equilibrium, made by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
+class Posture:
+    """A state of a model by name: positions, section forces, reactions.
 
     Attributes
     ----------
     factor : float
         Factor of the loads and motions.
     model : Model
-        Discretisation that the answer is on.
+        Discretisation that the state is on.
     state, loading
         Unknowns and loads, dimensionless.
-    certificate : Certificate
-    notes : tuple of str
-        What a reader should know: an unstable state that was left, reactions that are not unique.
-    iterations : int
-        Iterations of IPOPT.
     """
 
     factor: float
     model: Model
     state: State
     loading: Loading
-    certificate: Certificate
-    notes: tuple[str, ...]
-    iterations: int
-    strain: float
-    potential: float
     fields: Fields = field(repr=False)
 
     def position(self, node: str) -> Array:
@@ -140,13 +130,6 @@ class Equilibrium:
         return places
 
     @functools.cached_property
-    def energy(self) -> dict[str, float]:
-        """Elastic energy, potential of the loads, and their sum, N m; zero for the undeformed scene."""
-        unit = self.model.scales.moment
-        elastic, total = self.strain * unit, self.potential * unit
-        return {"elastic": elastic, "loads": total - elastic, "total": total}
-
-    @functools.cached_property
     def contacts(self) -> dict[str, dict[str, Any]]:
         """Of each obstacle ``force`` (3,) N on the member, ``at``, ``gap`` m, ``member``; lists where several touch.
 
@@ -166,6 +149,33 @@ class Equilibrium:
         if name not in names:
             raise SceneError(f"found {kind} {name!r}; {nearest(name, names)}")
         return name
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium(Posture):
+    """One equilibrium, made by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
+
+    Attributes
+    ----------
+    certificate : Certificate
+    notes : tuple of str
+        What a reader should know: an unstable state that was left, reactions that are not unique.
+    iterations : int
+        Iterations of IPOPT.
+    """
+
+    certificate: Certificate
+    notes: tuple[str, ...]
+    iterations: int
+    strain: float
+    potential: float
+
+    @functools.cached_property
+    def energy(self) -> dict[str, float]:
+        """Elastic energy, potential of the loads, and their sum, N m; zero for the undeformed scene."""
+        unit = self.model.scales.moment
+        elastic, total = self.strain * unit, self.potential * unit
+        return {"elastic": elastic, "loads": total - elastic, "total": total}
 
     def to_dict(self) -> dict[str, Any]:
         """As an entry of ``steps`` in the JSON answer."""

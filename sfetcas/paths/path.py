@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibria.solution import Equilibrium
+from ..equilibria.solution import Equilibrium, Posture
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
@@ -163,6 +163,11 @@ class Path:
     def fields(self, point: PathPoint) -> Fields:
         """Everything by name at a point."""
         return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
+
+    def posture(self, point: PathPoint) -> Posture:
+        """The same as of an equilibrium, but for what certifies it."""
+        fields = self.fields(point)
+        return Posture(point.factor, fields.model, point.state, point.loading, fields)
 
     def positions(self, node: str, branch: int = 0) -> Array:
         """Positions of a node along the path or a branch, (points, 3) m."""

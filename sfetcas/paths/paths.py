@@ -28,7 +28,7 @@ from ..solvers.beginning import begin_path, check_slack
 from ..solvers.critical import Event, at_factors, shapes_at
 from ..solvers.newton import Corrected, relative_residual
 from ..solvers.prepared import Prepared
-from ..solvers.tracing import Traced, switched, trace
+from ..solvers.tracing import Traced, passes, switched, trace, without
 from .contact_path import follow_in_contact
 from .path import NO_POTENTIAL, Branch, Path, PathPoint
 
@@ -259,22 +259,39 @@ class _Run:
         bends = [event for event in main.traced.events if event.kind == "bifurcation"]
         for number, event in enumerate(bends[: self.analysis.branches], start=1):
             for side in (1, -1):
-                traced = self.branch(curve, event, side, 1, self.analysis.points)
-                if traced is None:
-                    level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
-                else:
-                    level.stretches.append(_Stretch(traced, number, side))
+                self._add_branch(level, event, number, side)
         level.stretches = [self.stretch(part, curve) for part in level.stretches]
         return level
+
+    def _add_branch(self, level: _Level, event: Event, number: int, side: int) -> None:
+        """Follow the branch at a bifurcation to one side, unless a stretch that was followed leads along there."""
+        first = switched(level.curve, event, shapes_at(level.curve, event)[:, 0], side)
+        if first is None:
+            level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
+            return
+        along = next((part for part in level.stretches if passes(level.curve, part.traced, first)), None)
+        if along is not None:
+            told = f"branch {level.stretches.index(along)}" if along.bifurcation else "the path itself"
+            level.notes += (f"bifurcation {number} to the side {side}: {told} leads along there and is listed once",)
+            return
+        known = [standing for part in level.stretches for standing in part.of_kind("bifurcation")]
+        traced = trace(level.curve, first, self.span, self.analysis.points, self.knots)
+        level.stretches.append(_Stretch(without(traced, known), number, side))
 
     def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
         """The branch at a bifurcation to one side; None where none is found."""
         first = switched(curve, event, shapes_at(curve, event)[:, shape - 1], side)
-        return None if first is None else trace(curve, first, self.span, points, self.knots)
+        if first is None:
+            return None
+        return without(trace(curve, first, self.span, points, self.knots), [event.standing])
 
     def stretch(self, part: _Stretch, curve: Curve) -> _Stretch:
         """The same with the crossings of the factors asked for."""
-        return replace(part, crossings=at_factors(curve, part.traced.points, self.analysis.steps))
+        points = part.traced.points
+        crossings = at_factors(curve, points, self.analysis.steps)
+        # A closed curve ends where it begins.
+        again = part.traced.end == "closed" and points[-1] in crossings
+        return replace(part, crossings=crossings[:-1] if again else crossings)
 
     # -- errors ---------------------------------------------------------------------------------
 

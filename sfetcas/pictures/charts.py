@@ -2,7 +2,8 @@
 
 Stable stretches are drawn solid, unstable ones dashed; limit points are circles, bifurcations squares, and dots in
 the colours of the shapes say where these are.  Where only motions are prescribed, the largest reaction at a moved
-node stands over the factor instead.
+node stands over the factor instead.  Supports, joints, springs and obstacles are drawn with the shape at the end of
+the path, as in pictures of answers; loads are not, as they grow along the way.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from matplotlib.lines import Line2D
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..paths.path import Branch, Path
+from .glyphs import sketch_holds
 from .looks import dashes_of
-from .sheet import DOTTED
-from .sketch import REST
+from .sheet import DOTTED, DPI, Sheet, axes_on
+from .sketch import REST, Course, Sketch, course_of, view_of
 
 __all__ = ["ENDINGS", "chart", "save_chart"]
 
@@ -55,20 +57,20 @@ def save_chart(path: Path, file: str | os.PathLike[str]) -> None:
     ending = File(file).suffix.lower()
     if ending not in ENDINGS:
         raise SceneError(f"found the ending {ending!r} of a picture, accepted: {', '.join(ENDINGS)}")
-    chart(path).savefig(file, dpi=150)
+    chart(path).savefig(file, dpi=DPI)
 
 
 def chart(path: Path) -> Figure:
     """The chart of a path with its branches, and shapes at some of its points; a figure of 10 x 5 inch."""
-    figure = Figure(figsize=(10.0, 5.0), layout="constrained")
+    figure = Figure(figsize=(10.0, 5.0), dpi=DPI, layout="constrained")
     left, right = figure.subplots(1, 2)
     quantity = _telling(path)
     shapes = _shapes(path)
     _draw_course(left, path, quantity)
     for shape in shapes:
         _draw_dot(left, shape, quantity, path)
-    _draw_shapes(right, path, shapes)
     figure.suptitle(path.scene.title, parse_math=False)
+    _draw_shapes(right, path, shapes)
     return figure
 
 
@@ -160,6 +162,8 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity) -> None:
     axes.set_xlabel(names[0], parse_math=False)
     axes.set_ylabel(names[1], parse_math=False)
     axes.grid(color="#EBEBEB", linewidth=0.6)
+    # More numbers like -0.0075 would run into each other.
+    axes.locator_params(axis="x", nbins=6)
     axes.legend(handles=list(_legend(path)), fontsize=8)
 
 
@@ -184,11 +188,10 @@ def _legend(path: Path) -> Iterator[Line2D]:
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """A deformed shape: of which branch and point, its lines (n, 3) m, and how it looks."""
+    """A deformed shape: of which branch and point, and how it looks."""
 
     branch: int
     index: int
-    lines: list[Array]
     colour: str
     label: str
     dashes: Any
@@ -203,15 +206,15 @@ def _shapes(path: Path) -> list[_Shape]:
     seen, found = [rest], list[_Shape]()
     for branch, index in chosen:
         point = path.branches[branch].points[index]
-        lines = [path.fields(point).along(name, SAMPLES)["position"] for name in path.model.members]
-        size = float(np.ptp(np.vstack([*seen, *lines]), axis=0).max())
-        if min(float(np.abs(np.vstack(lines) - other).max()) for other in seen) > ALIKE * size:
-            seen.append(np.vstack(lines))
+        line = np.vstack([path.fields(point).along(name, SAMPLES)["position"] for name in path.model.members])
+        size = float(np.ptp(np.vstack([*seen, line]), axis=0).max())
+        if min(float(np.abs(line - other).max()) for other in seen) > ALIKE * size:
+            seen.append(line)
             colour = SHADES[round(index * len(SHADES) / (count - 1)) - 1] if branch == 0 else _colour(branch)
             state = "" if point.stable is True else f", {dict(KINDS)[point.stable]}"
             where = f", branch {branch}" if branch else ""
             label = f"factor {point.factor:.4g}{where}{state}"
-            found.append(_Shape(branch, index, lines, colour, label, dashes_of(point.stable)))
+            found.append(_Shape(branch, index, colour, label, dashes_of(point.stable)))
     return found
 
 
@@ -226,24 +229,34 @@ def _draw_dot(axes: Axes, shape: _Shape, quantity: _Quantity, path: Path) -> Non
     axes.plot(*place, "o", color=shape.colour, markersize=5, zorder=3, gid="shape")
 
 
-def _draw_shapes(axes: Axes, path: Path, shapes: list[_Shape]) -> None:
-    rest = [line.positions(SAMPLES) for line in path.scene.center_lines.values()]
-    used = _directions(np.vstack([*rest, *(line for shape in shapes for line in shape.lines)]))
-    for i, line in enumerate(rest):
-        label = ("undeformed" if shapes else "undeformed; all shapes look like it") if i == 0 else None
-        axes.plot(*line[:, used].T, color=REST, linewidth=1.2, linestyle=DOTTED, label=label, gid="undeformed")
-    for shape in shapes:
-        for i, line in enumerate(shape.lines):
-            style: dict[str, Any] = {"color": shape.colour, "linestyle": shape.dashes, "linewidth": 1.6, "gid": "shape"}
-            axes.plot(*line[:, used].T, label=shape.label if i == 0 else None, **style)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"{'xyz'[used[0]]}, m")
-    axes.set_ylabel(f"{'xyz'[used[1]]}, m")
+def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
+    """The shapes over the undeformed one, with what holds them as at the end of the path."""
+    points = [*(path.branches[shape.branch].points[shape.index] for shape in shapes), path.points[-1]]
+    course = course_of(path.scene, [path.posture(point) for point in points], "none")
+    view = view_of(path.model.space, [course.everything])
+    sketch = Sketch(path.scene, path.posture(path.points[-1]), course, view)
+    sketch_holds(sketch)
+    assert isinstance(paper.figure, Figure)
+    axes = axes_on(paper.figure, paper, sketch)
+    _draw_lines(axes, course, shapes)
     columns = min(3, 1 + len(shapes) // 5)
-    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=columns, frameon=False)
+    below = -0.13 if axes is paper else 0.0
+    handles, _ = axes.get_legend_handles_labels()
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, below)}
+    paper.legend(handles=handles, fontsize=8, ncols=columns, frameon=False, **place)
+    Sheet(paper.figure, axes, paper, sketch).finish(loaded=False)
 
 
-def _directions(points: Array) -> list[int]:
-    """The two fixed axes along which the shapes are seen best: the plane, or those of the largest extents."""
-    extents = np.ptp(points, axis=0)
-    return sorted(np.argsort(-extents, kind="stable")[:2].tolist()) if extents[2] > 0.0 else [0, 1]
+def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
+    """Undeformed and deformed lines, with entries for the legend."""
+    text = "undeformed" if shapes else "undeformed; all shapes look like it"
+    looks: list[tuple[list[Array], str, dict[str, Any]]] = [
+        (course.rest, text, {"color": REST, "linewidth": 1.2, "linestyle": DOTTED, "gid": "undeformed"})
+    ]
+    for shape, lines in zip(shapes, course.earlier, strict=True):
+        style = {"color": shape.colour, "linestyle": shape.dashes, "linewidth": 1.6, "gid": "shape"}
+        looks.append((lines, shape.label, style))
+    for lines, label, style in looks:
+        for i, line in enumerate(lines):
+            seen = line if hasattr(axes, "get_zlim") else line[:, :2]
+            axes.plot(*seen.T, label=label if i == 0 else None, scalex=False, scaley=False, **style)

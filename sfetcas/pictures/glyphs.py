@@ -17,7 +17,7 @@ from ..description.obstacles import obstacle
 from ..description.sections import evaluate
 from ..description.springs import Spring
 from ..description.structure import SLIDING, Node, unit
-from ..equilibria.solution import Equilibrium
+from ..equilibria.solution import Posture
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
@@ -27,7 +27,6 @@ from .sketch import (
     REACTION,
     Ink,
     Sketch,
-    amount,
     broken,
     dense,
     flat_unit,
@@ -36,7 +35,7 @@ from .sketch import (
     tangents_of,
 )
 
-__all__ = ["sketch_all"]
+__all__ = ["sketch_all", "sketch_holds"]
 
 ARROW = 0.12
 """Length of the longest arrow over the size of the picture; the other constants are meant like this."""
@@ -54,18 +53,8 @@ TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
 
 def sketch_all(sketch: Sketch) -> None:
     """Sketch everything but the centre lines; what comes first has the free choice of place."""
+    sketch_holds(sketch)
     scene, largest = sketch.scene, _largest_force(sketch)
-    for name, contact in scene.contacts.items():
-        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
-    for name, node in scene.nodes.items():
-        _sketch_support(sketch, name, node)
-        if node.joint != "rigid":
-            sketch.dot(sketch.at(name), f"joint-{name}")
-    _sketch_releases(sketch)
-    sketch_slots(sketch)
-    for name, spring in scene.springs.items():
-        (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
-        sketch_stops(sketch, name, spring)
     for name, motion in scene.motions.items():
         _sketch_motion(sketch, name, motion)
     for name, load in scene.loads.items():
@@ -77,7 +66,26 @@ def sketch_all(sketch: Sketch) -> None:
         _sketch_pushes(sketch, name, largest)
 
 
-def _factor(step: Equilibrium, history: str | None) -> float:
+def sketch_holds(sketch: Sketch) -> None:
+    """Sketch what holds the structure and joins its members: obstacles, supports, joints, springs."""
+    scene = sketch.scene
+    for name, contact in scene.contacts.items():
+        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
+    for name, node in scene.nodes.items():
+        _sketch_support(sketch, name, node)
+        if node.joint != "rigid":
+            sketch.dot(sketch.at(name), f"joint-{name}")
+        if node.joint == "universal":
+            first, *others = (member for member, found in scene.members.items() if name in found.nodes)
+            _sketch_cross(sketch, f"joint-{name}", sketch.at(name), name, (first, others[0]))
+    _sketch_releases(sketch)
+    sketch_slots(sketch)
+    for name, spring in scene.springs.items():
+        (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
+        sketch_stops(sketch, name, spring)
+
+
+def _factor(step: Posture, history: str | None) -> float:
     return step.factor if history is None else step.model.scene.histories[history].factor(step.factor)
 
 
@@ -199,9 +207,23 @@ def _sketch_releases(sketch: Sketch) -> None:
     """A small circle in the member, just beside the node."""
     for name, line in zip(sketch.course.members, sketch.course.last, strict=True):
         for end, points in zip((0, 1), (line, line[::-1]), strict=True):
-            if sketch.scene.members[name].release[-end] not in ("rigid", *SLIDING):
+            member = sketch.scene.members[name]
+            if member.release[-end] not in ("rigid", *SLIDING):
                 beside = np.linalg.norm(points - points[0], axis=1) > 0.02 * sketch.size
-                sketch.dot(points[int(np.argmax(beside))], f"joint-{name}")
+                place = points[int(np.argmax(beside))]
+                sketch.dot(place, f"joint-{name}")
+                if member.release[-end] == "universal":
+                    node = member.nodes[-end]
+                    _sketch_cross(sketch, f"joint-{name}", place, node, (node, name))
+
+
+def _sketch_cross(sketch: Sketch, name: str, place: Array, node: str, sides: tuple[str, str]) -> None:
+    """The two axes of a universal joint, each as its side carries it, over the circle of the joint."""
+    found = sketch.scene.nodes[node]
+    for side, axis in zip(sides, (found.axis, found.axis2), strict=True):
+        assert axis is not None
+        along = SYMBOL * sketch.size * quaternion.rotate(turned_party(sketch, side, node), np.array(unit(axis)))
+        sketch.line(place + np.array([-along, along]), name, width=1.2, level=8.5)
 
 
 # Springs
@@ -266,12 +288,11 @@ def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
     ink = Ink(f"motion-{name}", MOTION, 1.4, dotted=True)
     if motion.displacement is not None and motion.between is not None:
         # How far one side slides along the other, not where both go.
-        sketch.label(amount(norm(factor * np.array(motion.displacement)), "m"), new, np.array([0.0, 1.0]), ink)
+        sketch.tell(norm(factor * np.array(motion.displacement)), "m", new, np.array([0.0, 1.0]), ink)
     elif motion.displacement is not None and norm(new - old) > 0.02 * sketch.size:
         sketch.arrow(np.array([old, new]), ink)
         away = flat_unit(left_of(sketch.view.flat(new - old) / norm(new - old)), (0.0, 1.0))
-        text = amount(norm(new - old) * sketch.course.unit, "m")
-        sketch.label(text, 0.5 * (old + new), away, ink)
+        sketch.tell(norm(new - old) * sketch.course.unit, "m", 0.5 * (old + new), away, ink)
     if motion.rotation is not None:
         turn = motion.rotation
         about = np.array(unit(node.axis)) if node.turn == "hinge" else np.array([0.0, 0.0, 1.0])
@@ -349,7 +370,7 @@ def _sketch_force(
     points, free = min(ways, key=lambda way: _hidden(sketch, way[0], point))
     sketch.arrow(points, ink)
     away = flat_unit(sketch.view.flat(points[free] - point) / length, (0.0, 1.0))
-    sketch.label(amount(norm(value), "N"), points[free], away, ink)
+    sketch.tell(norm(value), "N", points[free], away, ink)
 
 
 def _hidden(sketch: Sketch, points: Array, point: Array) -> int:
@@ -371,7 +392,7 @@ def _sketch_turn(sketch: Sketch, point: Array, along: Array, vector: Array, lett
     angle = np.radians(np.linspace(50.0, 310.0, 60))[:, None]
     sketch.arrow(point + radius * sketch.size * (np.cos(angle) * one + np.sin(angle) * two), ink)
     away = flat_unit(-sketch.view.flat(one), (0.0, 1.0))
-    sketch.label(amount(size, letters), point, away, ink, gap=radius)
+    sketch.tell(size, letters, point, away, ink, gap=radius)
 
 
 def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> None:
@@ -396,7 +417,7 @@ def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> 
             sketch.arrow(np.array([ends[i], places[i]]), ink)
     top = _label_place(np.abs(profile))
     away = flat_unit(sketch.view.flat(ends[top] - places[top]) / (0.6 * ARROW * sketch.size), (0.0, 1.0))
-    sketch.label(amount(peak * norm(value), "N/m"), ends[top], away, ink)
+    sketch.tell(peak * norm(value), "N/m", ends[top], away, ink)
 
 
 def _label_place(profile: Array) -> int:

@@ -47,7 +47,7 @@ from .sketch import (
     thinned,
 )
 
-__all__ = ["DPI", "Colour", "Sheet", "sheet_of"]
+__all__ = ["DOTTED", "DPI", "Colour", "Sheet", "axes_on", "sheet_of"]
 
 Colour = Literal["moment", "magnitude", "none"]
 DOTTED = (0, (1, 2))
@@ -55,6 +55,8 @@ DOTTED = (0, (1, 2))
 WIDTH, HEIGHT, DPI = 7.0, 5.0, 150
 MANY = 14
 """Labels; of more than that, those with the same text as another are left out."""
+MOST_HIDDEN = 25.0
+"""What a label may hide where there are too many: about half its width of a line in colour."""
 FONT = 9.0
 """Height of labels, points."""
 
@@ -69,9 +71,7 @@ def sheet_of(sketch: Sketch, looks: Sequence[Look], colour: Colour) -> Sheet:
     """
     figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
     paper = figure.add_subplot()
-    axes = paper if sketch.view.angles is None else _space_axes(figure, paper, sketch)
-    if axes is paper:
-        _fill_plane(axes, sketch)
+    axes = axes_on(figure, paper, sketch)
     lines, values = _add_lines(axes, sketch, looks)
     if values is not None:
         _add_bar(figure, paper, lines, values, sketch, colour)
@@ -84,6 +84,14 @@ def sheet_of(sketch: Sketch, looks: Sequence[Look], colour: Colour) -> Sheet:
             handles=handles, loc="outside lower center", ncols=min(4, len(handles)), fontsize=8, frameon=False
         )
     return Sheet(figure, axes, paper, sketch)
+
+
+def axes_on(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
+    """Axes for the lines of a sketch: those that are given, or in space others below them."""
+    if sketch.view.angles is not None:
+        return _space_axes(figure, paper, sketch)
+    _fill_plane(paper, sketch)
+    return paper
 
 
 def _title(text: str) -> str:
@@ -112,6 +120,8 @@ def _space_axes(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
     """Axes in space below the paper, on which marks and labels are drawn."""
     assert sketch.view.angles is not None
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
+    # They are as large as the figure: what else is in it shall be seen through them.
+    axes.patch.set_visible(False)
     paper.set_axis_off()
     paper.set_zorder(axes.get_zorder() + 1)
     axes.set_proj_type("ortho")
@@ -250,19 +260,31 @@ class Sheet:
     sketch: Sketch
     zoom: float = 1.0
 
-    def finish(self) -> None:
-        """Fit the axes to all that is drawn, and draw it."""
+    def finish(self, *, loaded: bool = True) -> None:
+        """Fit the axes to all that is drawn, and draw it; ``loaded``: with gravity."""
         for _ in range(4 if self.axes is self.paper else 6):
             self.figure.draw_without_rendering()
             self._fit()
         self.figure.draw_without_rendering()
         if self.axes is not self.paper:
             self._hide_colliding()
+        left_out = len(self._labels()) - len(self._placed([]))
+        if left_out:
+            self._tell_left_out(left_out)
+            self.figure.draw_without_rendering()
+            self._fit()
+            self.figure.draw_without_rendering()
         for mark in self.sketch.marks:
             self._draw(mark)
-        gravity = self._gravity()
-        for label, box in self._placed(gravity):
+        gravity = self._gravity() if loaded else []
+        placed = self._placed(gravity)
+        self._tell_left_out(len(self._labels()) - len(placed))
+        for label, box in placed:
             self._write(box.centre, label.text, label.colour, label.name)
+
+    def _tell_left_out(self, count: int) -> None:
+        text = f"{count} values are not written for lack of room; the largest are" if count else ""
+        self.paper.set_title(text, fontsize=8, color=SUPPORT, gid="left-out")
 
     def pixels(self, points: Array) -> Array:
         """Places (n, 2) on the sheet of points (n, 3) in drawn units."""
@@ -461,43 +483,83 @@ class Sheet:
             shown += own
 
     def _placed(self, taken: Sequence[_Box], *, framed: bool = True) -> list[tuple[Label, _Box]]:
-        """The labels in turn where they hide least, and within the frame where there is one; of many alike one."""
+        """The labels where they hide least, and within the frame where there is one.
+
+        Where some would overlap the largest values come first, and what still meets others is left out.
+        """
         cell = self.paper.get_window_extent()
-        frame = (
-            np.array([cell.min, cell.max]) if framed and self.axes is self.paper else np.array([[-np.inf], [np.inf]])
-        )
-        labels, crowd, found = self.sketch.labels, self._crowd(), []
-        boxes = [*taken, *self._writings()]
-        if len(labels) > MANY:
-            labels = list({(label.text, label.colour): label for label in reversed(labels)}.values())[::-1]
+        inside = framed and self.axes is self.paper
+        frame = np.array([cell.min, cell.max]) if inside else np.array([[-np.inf], [np.inf]])
+        labels, crowd, boxes = self._labels(), self._crowd(), [*taken, *self._writings()]
+        tried = self._tried(labels, crowd, boxes, frame)
+        if any(met for _, _, met in tried):
+            largest: dict[str, float] = {}
+            for label in labels:
+                largest[label.unit] = max(label.value, largest.get(label.unit, 1e-300))
+            # What has no value, as the number of an equilibrium, is never left out.
+            order = sorted(labels, key=lambda label: -label.value / largest[label.unit] if label.unit else -math.inf)
+            tried = self._tried(order, crowd, boxes, frame, thin=True)
+        return [(label, box) for label, box, _ in tried]
+
+    def _tried(
+        self,
+        labels: Sequence[Label],
+        crowd: tuple[Array, Array],
+        taken: Sequence[_Box],
+        frame: Array,
+        *,
+        thin: bool = False,
+    ) -> list[tuple[Label, _Box, bool]]:
+        """Labels in turn with their best places, and whether they meet others there.
+
+        ``thin``: only those that do not, hide little and stand beside their anchors, and the first of each kind.
+        """
+        found, boxes, kinds = list[tuple[Label, _Box, bool]](), list(taken), set[tuple[str, str]]()
         for label in labels:
-            choices = [
-                (cost + self._cost(box, crowd, boxes, frame), i, box)
-                for i, (cost, box) in enumerate(self._choices(label))
-            ]
-            box = min(choices)[2]
-            boxes.append(box)
-            found.append((label, box))
+            half = self._half(label.text)
+            may_go = thin and bool(label.unit) and (label.unit, label.colour) in kinds
+            kinds.add((label.unit, label.colour))
+            choices = list(self._choices(label, half, rings=1 if may_go else 3))
+            centres = np.array([centre for _, centre in choices])
+            hidden, met, outside = self._costs(centres, half, crowd, boxes, frame)
+            best = int(np.argmin(np.array([cost for cost, _ in choices]) + hidden + 80.0 * met + 40.0 * outside))
+            if not (may_go and (met[best] or hidden[best] > MOST_HIDDEN)):
+                boxes.append(_Box(centres[best], half))
+                found.append((label, boxes[-1], bool(met[best])))
         return found
 
-    def _cost(self, box: _Box, crowd: tuple[Array, Array], boxes: Sequence[_Box], frame: Array) -> float:
-        low, high = box.corners
-        outside = bool((low < frame[0]).any() or (high > frame[1]).any())
-        met = sum(box.meets(other) for other in boxes)
-        return float(crowd[1][box.holds(crowd[0])].sum()) + 80.0 * met + 40.0 * outside
+    def _labels(self) -> list[Label]:
+        """The labels that are asked for; of many alike one."""
+        labels = self.sketch.labels
+        if len(labels) <= MANY:
+            return labels
+        return list({(label.text, label.colour): label for label in reversed(labels)}.values())[::-1]
 
-    def _choices(self, label: Label) -> Iterator[tuple[float, _Box]]:
+    @staticmethod
+    def _costs(
+        centres: Array, half: Array, crowd: tuple[Array, Array], boxes: Sequence[_Box], frame: Array
+    ) -> tuple[Array, Array, Array]:
+        """Of boxes at places (k, 2): how bad what they hide is, how many others they meet, which are outside."""
+        low, high = centres - half, centres + half
+        points, prices = crowd
+        near = ((points >= low.min(axis=0)) & (points <= high.max(axis=0))).all(axis=1)
+        inside = (np.abs(points[near] - centres[:, None]) < half).all(axis=2)
+        others = np.array([[box.centre, box.half] for box in boxes]).reshape(-1, 2, 2)
+        met = (np.abs(centres[:, None] - others[:, 0]) < half + others[:, 1]).all(axis=2).sum(axis=1)
+        return inside @ prices[near], met, ((low < frame[0]) | (high > frame[1])).any(axis=1)
+
+    def _choices(self, label: Label, half: Array, rings: int) -> Iterator[tuple[float, Array]]:
         """Places round the anchor, the preferred ones first and cheap."""
-        point, half = self._point(), self._half(label.text)
+        point = self._point()
         anchor, clear = self.pixels(label.anchor[None, :])[0], label.gap * self._size()
         preferred = math.atan2(label.away[1], label.away[0])
-        for ring in (0, 1, 2):
+        for ring in range(rings):
             for turn in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6):
                 angle = preferred + turn * math.pi / 6.0
                 towards = np.array([math.cos(angle), math.sin(angle)])
                 reach = float(np.abs(towards) @ half) * (1.0 - 0.25 * abs(math.sin(2.0 * angle)))
                 gap = clear + (2.0 + 9.0 * ring) * point
-                yield 0.3 * abs(turn) + 4.0 * ring, _Box(anchor + (reach + gap) * towards, half)
+                yield 0.3 * abs(turn) + 4.0 * ring, anchor + (reach + gap) * towards
 
     def _half(self, text: str) -> Array:
         return np.array([0.5 * _text_width(text) + 1.0, 0.7 * FONT]) * self._point()

@@ -9,13 +9,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from ..description.scene import Scene
-from ..equilibria.solution import Equilibrium
+from ..equilibria.solution import Posture
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 
@@ -33,7 +33,6 @@ __all__ = [
     "Mark",
     "Sketch",
     "View",
-    "amount",
     "broken",
     "course_of",
     "dense",
@@ -111,7 +110,7 @@ class Course:
         return np.vstack([*self.rest, *self.last, *(line for lines in self.earlier for line in lines)])
 
 
-def course_of(scene: Scene, steps: Sequence[Equilibrium], colour: str) -> Course:
+def course_of(scene: Scene, steps: Sequence[Posture], colour: str) -> Course:
     """Sampled centre lines of the undeformed scene and of equilibria, the last with values to colour by."""
     names = tuple(scene.members)
     last = {name: steps[-1].along(name, _samples(steps[-1], name)) for name in names}
@@ -127,7 +126,7 @@ def course_of(scene: Scene, steps: Sequence[Equilibrium], colour: str) -> Course
     return Course(unit, letter, names, scaled[0], scaled[1], scaled[2:], values)
 
 
-def _samples(step: Equilibrium, member: str) -> Array:
+def _samples(step: Posture, member: str) -> Array:
     """Fractions of the length where a member is drawn: at least 101, a step turning by 0.05 rad at most."""
     line = step.model.scene.center_lines[member]
     tangents = tangents_of(step, member, step.model.along(member))
@@ -136,13 +135,13 @@ def _samples(step: Equilibrium, member: str) -> Array:
     return np.linspace(0.0, 1.0, 1 + min(20_000, max(100, math.ceil(max(turning, line.turning) / 0.05))))
 
 
-def tangents_of(step: Equilibrium, member: str, x: Array) -> Array:
+def tangents_of(step: Posture, member: str, x: Array) -> Array:
     """Unit tangents (n, 3) at fractions (n,) of the length of a deformed member, fixed axes."""
     rest = step.model.scene.center_lines[member].tangents(x)
     return quaternion.rotate(step.along(member, x)["quaternion"], rest)
 
 
-def _bending(step: Equilibrium, member: str, fields: dict[str, Array], colour: str) -> Array:
+def _bending(step: Posture, member: str, fields: dict[str, Array], colour: str) -> Array:
     """Bending moment (n,) in N m: about z with its sign, or the magnitude of what is across the tangent."""
     moment = fields["moment"]
     if not step.model.space:
@@ -152,7 +151,7 @@ def _bending(step: Equilibrium, member: str, fields: dict[str, Array], colour: s
     return np.asarray(np.linalg.norm(moment - twist[:, None] * tangents, axis=1))
 
 
-def _noise(step: Equilibrium, fields: Iterable[dict[str, Array]]) -> float:
+def _noise(step: Posture, fields: Iterable[dict[str, Array]]) -> float:
     """Moments up to this many N m are rounding."""
     scales = step.model.scales
     largest = max(float(np.linalg.norm(field["force"], axis=1).max()) for field in fields)
@@ -239,7 +238,10 @@ class Mark:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Label:
-    """A text beside an anchor (3,), in some direction ``away`` (2,) by preference, at least ``gap`` off."""
+    """A text beside an anchor (3,), in some direction ``away`` (2,) by preference, at least ``gap`` off.
+
+    It may be left out where others in the same ``unit`` have larger values.
+    """
 
     anchor: Array
     away: Array
@@ -247,6 +249,8 @@ class Label:
     colour: str
     name: str
     gap: float = 0.0
+    value: float = math.inf
+    unit: str = ""
 
 
 @dataclass(eq=False)
@@ -254,7 +258,7 @@ class Sketch:
     """Marks and labels of one equilibrium, and what they must not hide."""
 
     scene: Scene
-    step: Equilibrium
+    step: Posture
     course: Course
     view: View
     marks: list[Mark] = field(default_factory=list)
@@ -307,6 +311,11 @@ class Sketch:
         """Ask for a text."""
         label = Label(anchor=anchor, away=away, text=text, colour=ink.colour, name=ink.name, gap=gap)
         self.labels.append(label)
+
+    def tell(self, value: float, unit: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
+        """Ask for a value with its unit, which may be left out where larger ones take the place."""
+        self.label(amount(value, unit), anchor, away, ink, gap)
+        self.labels[-1] = replace(self.labels[-1], value=abs(value), unit=unit)
 
     def leaving(self, node: str) -> Array:
         """Unit tangents (k, 3) of the members that end at a node, out of it."""

@@ -20,6 +20,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
+from .deflation import turned_between
 from .newton import DUAL, PROXIMAL, ROUNDING, relative_residual
 from .prepared import Prepared
 from .stability import LIGHT, Inertia
@@ -147,6 +148,12 @@ class Curve:
         """The direction with length one."""
         length = np.sqrt(self.inner(direction, direction))
         return Tangent(direction.z / length, direction.factor / length)
+
+    def way(self, a: Standing, b: Standing) -> float:
+        """How far the second point lies ahead of the first, along the tangent there."""
+        apart = np.zeros(self.equations.total)
+        apart[: self._turning] = turned_between(self.equations, b.state, a.state)
+        return self.inner(Tangent(apart, b.factor - a.factor), a.tangent)
 
     # -- derivative by the factor ---------------------------------------------------------------
 

@@ -7,6 +7,7 @@ then it may have jumped over a fold or to another branch.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..mechanics.equations import State
 from .arclength import Curve, Standing, Tangent
 from .critical import Event, events_between
 
-__all__ = ["Traced", "switched", "trace"]
+__all__ = ["Traced", "passes", "switched", "trace", "without"]
 
 TURNING = 0.25
 """Angle between the tangents of neighbouring points, rad, that steps aim at."""
@@ -39,6 +40,9 @@ SHORTEST = 1e-7
 FINE = 1e-4
 """Below this length a step may meet several eigenvalues at once."""
 
+TOUCH = 3.0 * FINE
+"""Where an eigenvalue only touches zero, its sign may be seen to change and change back within this length."""
+
 FIRST = 0.1
 """Length of the first step, rad or shares of the unit."""
 
@@ -47,6 +51,18 @@ MOST_AT_ONCE = 6
 
 EXPECTED = 3
 """Newton iterations of a step that is as long as it should be."""
+
+LOOP = 8
+"""Points before a curve may close: fewer make no loop."""
+
+SAME = 1e-5
+"""Points that differ by less, rad or shares of the factor, are one: Newton's method leaves far less."""
+
+WALKS = 6
+"""Steps of Newton's method along a curve to the place next to a point."""
+
+MEETING = 1e-3
+"""Bifurcations on two curves are one within this, rad: rounding moves them along the shape that is open there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +75,7 @@ class Traced:
         In their order, limit and bifurcation points among them.
     events : list of Event
     end : str
-        Why it ends: ``range``, ``points``, or ``lost``.
+        Why it ends: ``range``, ``points``, ``closed`` (the last point is the first one again) or ``lost``.
     """
 
     points: list[Standing]
@@ -74,14 +90,15 @@ def trace(
 
     At the knots of histories the curve has a corner: it is followed from one to the next.
     """
-    traced, curve = Traced([start], [], "range"), curve.firmer() if start.inertia.zero else curve
+    traced, usual = Traced([start], [], "range"), start.inertia.zero
+    curve = curve.firmer() if usual else curve
     stops = [span[0], *knots, span[1]]
     while traced.end == "range":
         now = traced.points[-1]
         pieces = [(a, b) for a, b in zip(stops, stops[1:], strict=False) if a <= now.factor <= b]
         ahead = [(a, b) for a, b in pieces if now.factor != (b if now.tangent.factor > 0.0 else a)]
         if not ahead:
-            return traced
+            break
         here = curve.within(ahead[0]) if curve.model.scene.histories else curve
         if here is not curve:
             along = Tangent(np.zeros_like(now.tangent.z), now.tangent.factor)
@@ -89,7 +106,69 @@ def trace(
         stride = (span[1] - span[0]) / SHARE
         part = _piece(here, now, ahead[0], stride, count - len(traced.points) + len(traced.events))
         traced = Traced(traced.points + part.points[1:], traced.events + part.events, part.end)
-    return traced
+    return _with_crossed_folds(traced, usual)
+
+
+def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
+    """The same where folds of the factor at which no eigenvalue changes its sign are bifurcations.
+
+    Another curve crosses there, of which this one is the branch to both sides.  The eigenvalue only touches zero, so
+    its sign may be seen to change and change back beside the fold.
+    """
+    events = {id(event.standing): event for event in traced.events}
+    points, firm = [traced.points[0]], 0
+    for i, point in enumerate(traced.points[1:], start=1):
+        if id(point) in events or (point.inertia.zero > usual and i + 1 < len(traced.points)):
+            continue
+        between = traced.points[firm + 1 : i]
+        met = [events[id(p)] for p in between if id(p) in events]
+        folds = [event for event in met if event.kind == "limit"]
+        even = (point.inertia.negative - traced.points[firm].inertia.negative) % 2 == 0
+        if folds and even and met[-1].standing.arc - met[0].standing.arc < TOUCH:
+            for event in met:
+                del events[id(event.standing)]
+            between = [folds[0].standing]
+            events[id(between[0])] = Event("bifurcation", between[0])
+        points += [*between, point]
+        firm = i
+    order = [events[id(point)] for point in points if id(point) in events]
+    return Traced(points, order, traced.end)
+
+
+def without(traced: Traced, known: Sequence[Standing]) -> Traced:
+    """The same without the bifurcations at points that are known already."""
+
+    def is_known(event: Event) -> bool:
+        return event.kind == "bifurcation" and any(_meets(event.standing, other) for other in known)
+
+    repeated = {id(event.standing) for event in traced.events if is_known(event)}
+    points = [point for point in traced.points if id(point) not in repeated]
+    return Traced(points, [event for event in traced.events if id(event.standing) not in repeated], traced.end)
+
+
+def _meets(a: Standing, b: Standing) -> bool:
+    level = abs(a.factor - b.factor) <= SAME * max(abs(a.factor), abs(b.factor))
+    return level and a.prepared.distance(a.state, b.state) <= MEETING
+
+
+def passes(curve: Curve, traced: Traced, point: Standing) -> bool:
+    """Whether a stretch leads through an equilibrium, in either direction."""
+    near = min(traced.points, key=lambda p: _apart(curve, p, point))
+    ahead = curve.way(near, point)
+    beyond = (near is traced.points[0] and ahead < 0.0) or (near is traced.points[-1] and ahead > 0.0)
+    if beyond and traced.end != "closed":
+        return False
+    for _ in range(WALKS):
+        way = curve.way(near, point)
+        there = curve.corrected(*curve.predicted(near, way), near.tangent)
+        if there is None or _apart(curve, there, point) >= _apart(curve, near, point):
+            break
+        near = there
+    return _apart(curve, near, point) < SAME
+
+
+def _apart(curve: Curve, a: Standing, b: Standing) -> float:
+    return curve.prepared.distance(a.state, b.state) + abs(a.factor - b.factor) / curve.unit
 
 
 def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: float, more: int) -> Traced:
@@ -103,13 +182,14 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
         if step is None:
             return Traced(points, events, "lost")
         there, used, left = step
-        met = events_between(curve, now, there)
-        events += met
-        points += [*(event.standing for event in met), there]
-        if left:
-            return Traced(points, events, "range")
-        if len(points) > LOOP and _closes(curve, start, now, there):
-            return Traced(points, events, "closed")
+        closed = not left and len(points) >= LOOP and _closes(curve, start, now, there)
+        ends = _to_start(curve, start, now, there) if closed else [there]
+        for end in ends:
+            met = events_between(curve, points[-1], end)
+            events += met
+            points += [*(event.standing for event in met), end]
+        if left or closed:
+            return Traced(points, events, "range" if left else "closed")
         length = used * _growth(curve, now, there)
         before, now = now, there
     return Traced(points, events, "points")
@@ -123,8 +203,12 @@ def _closes(curve: Curve, start: Standing, now: Standing, there: Standing) -> bo
     return near and level and curve.inner(start.tangent, there.tangent) > 0.9
 
 
-LOOP = 8
-"""Points before a curve may close: fewer make no loop."""
+def _to_start(curve: Curve, start: Standing, now: Standing, there: Standing) -> list[Standing]:
+    """The last points of a curve that closes: the start again, after the point that came near it if that is before."""
+    way = curve.way(there, start)
+    if way > 0.0:
+        return [there, replace(start, arc=there.arc + way)]
+    return [replace(start, arc=now.arc + curve.way(now, start))]
 
 
 def _longest(curve: Curve, now: Standing, stride: float) -> float:
