@@ -313,11 +313,12 @@ def test_switch_takes_a_whole_path():
         switch(solve(arch()))
 
 
-def test_a_stretch_at_one_factor_is_told_with_one_number(tmp_path, capsys):
-    # Branches of this arch meet others at limit points: there they are neutral, at one factor.
+def test_a_closed_branch_is_told_once_and_no_stretch_of_it_at_one_factor(tmp_path, capsys):
+    # The branch meets its mirror image at its lowest factor, where both sides are unstable: no stretch of its own.
     file = tmp_path / "arch.json"
     file.write_text(json.dumps(arch_table(type="path", range=[-150, 200], branches=1)))
     main(["run", str(file)])
     said = capsys.readouterr().out
-    assert "neutral at factor -35.37" in said
+    assert said.count("it closes on itself") == 1
+    assert said.count("factor -35.3757438") == 1
     assert not re.search(r"from factor (\S+) to \1$", said, re.MULTILINE)

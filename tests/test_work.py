@@ -158,6 +158,69 @@ def test_follower_is_the_dead_force_of_its_last_direction(scene):
     assert one.certificate.stable == "not defined"
 
 
+def slack():
+    """A bar that hangs by a ball from a clamped one, a follower at its end: it has no place of its own without loads."""
+    return {
+        "dimension": "space",
+        "gravity": [0, 0, -1],
+        "sections": {"s": {**UNLIKE, "rhoA": 0.5}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0, 0.1], "joint": "ball"},
+            "C": {"position": [1.7, 0.2, 0]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}, "n": {"nodes": ["B", "C"], "section": "s"}},
+        "springs": {
+            "k": {"type": "translational", "node": "C", "stiffness": 2.0, "anchor": [1.7, 1.2, 0.3], "length": 0.5}
+        },
+        "loads": {"F": {"type": "force", "node": "C", "value": [0.3, 0.2, 0.1], "frame": "follower"}},
+    }
+
+
+def test_what_hangs_slack_goes_where_its_followers_carry_it():
+    """There the follower may be dead: that scene has an energy, and the same state is a minimum of it."""
+    one = solved(slack())
+    two = solved(dead(slack(), one))
+    assert one.certificate.stable == "not defined"
+    for node in one.model.nodes:
+        np.testing.assert_allclose(two.position(node), one.position(node), atol=5e-8)  # two meshes, each to 1e-8
+
+
+def test_spins_that_next_to_nothing_resists_are_found():
+    """Bars between balls on springs: IPOPT creeps along the valley of their spins, and forces balance all the same."""
+    rng = np.random.default_rng(3)
+    places = {"b": [1, 0, 0], "c": [1.4, 0.1, 0.2], "d": [1.9, 0, 0]}
+    springs = {}
+    for name, place in places.items():
+        stiffness = float(rng.uniform(1, 4))
+        anchor = (np.array(place) + rng.uniform(-1, 1, 3)).tolist()
+        springs[name] = {"type": "translational", "node": name, "stiffness": stiffness, "anchor": anchor, "length": 1.0}
+    table = {
+        "dimension": "space",
+        "gravity": [0, 0, -1],
+        "sections": {"s": {"EI2": 1.3, "EI3": 0.7, "GJ": 1.55, "rhoA": 0.1}},
+        "nodes": {
+            "a": {"position": [0, 0, 0], "support": "clamped"},
+            **{n: {"position": p} for n, p in places.items()},
+        },
+        "members": {p + q: {"nodes": [p, q], "section": "s"} for p, q in ("ab", "bc", "cd")},
+        "springs": springs,
+        "loads": {n: {"type": "force", "node": n, "value": rng.uniform(-1, 1, 3).tolist()} for n in ("d", "c")},
+    }
+    for name in "bc":
+        table["nodes"][name]["joint"] = "ball"
+    step = solved(table)
+    assert step.certificate.stable is True
+    assert step.certificate.residual < 1e-9
+    total = step.reaction("a")[0] + sum(np.array(load["value"]) for load in table["loads"].values())
+    for name, spring in springs.items():
+        pull = np.array(spring["anchor"]) - step.position(name)
+        total = total + spring["stiffness"] * pull * (1.0 - spring["length"] / np.linalg.norm(pull))
+    course = [[0, 0, 0], *places.values()]
+    length = sum(np.linalg.norm(np.subtract(p, q)) for p, q in zip(course, course[1:]))
+    np.testing.assert_allclose(total, [0.0, 0.0, 0.1 * length], atol=1e-7)  # ten times the accuracy of positions
+
+
 def test_follower_where_two_members_meet_and_inside_a_member_are_one():
     inside = pushed()
     inside["loads"] = {"f": {"type": "force", "member": "m", "at": 0.5, "value": [1.0, 4.0], "frame": "follower"}}

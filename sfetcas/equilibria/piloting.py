@@ -28,6 +28,14 @@ NO_POTENTIAL = (
     f"{NO_ENERGY}; the static tangent is regular all the way from zero load, and flutter would only show in dynamics"
 )
 
+CARRIED = (
+    "the loads could not be followed from zero; this is where the whole of them carries the undeformed state, "
+    "and there may be others"
+)
+
+MOST_CARRIED = 600
+"""Unknowns: each step where loads carry a state needs all eigenvalues of a tangent, a second at most."""
+
 TAUT = (
     "straight between places that come no closer, where an inextensible member cannot bend and takes any force; "
     "let one end slide"
@@ -91,12 +99,12 @@ class Piloting(Meshing):
 
     def _only_grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         """Loads that cannot be minimised: the state that they lead to from zero, stable or not."""
-        found = self._grown(pilot, factor, last)
+        found = self._grown(pilot, factor, last) or self._carried(pilot, factor)
         if found is None:
             detail = "the loads could not be followed from zero, and without a potential there is no other way"
             raise SolveError(Status.FAILED, detail)
         if not pilot.model.conservative:
-            found.notes += (NO_POTENTIAL,)
+            found.notes += (NO_ENERGY if CARRIED in found.notes else NO_POTENTIAL,)
         return found
 
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
@@ -106,6 +114,29 @@ class Piloting(Meshing):
         except SolveError as error:
             return None, error
         return Found(pilot, corrected, pilot.stability(corrected), iterations=iterations), None
+
+    def _carried(self, pilot: Prepared, factor: float) -> Found | None:
+        """Where the loads carry the undeformed state: slack has no place of its own from which to follow them.
+
+        A small share of them first, as they grow; then all of them, which is one of the equilibria.
+        """
+        if self.scene.histories or pilot.equations.unknowns > MOST_CARRIED:
+            return None
+        zero = pilot.equations.start(pilot.model.loading(0.0, 0.0))
+        for share, notes in ((0.01, ()), (1.0, (CARRIED,))):
+            begin = share * factor
+            there = pilot.downhill(zero, pilot.model.loading(begin))
+            if there is None:
+                continue
+            found = self._followed(
+                pilot,
+                lambda t, begin=begin: pilot.model.loading(begin + t * (factor - begin)),
+                there.state,
+                (begin, factor),
+            )
+            if found is not None:
+                return replace(found, notes=(*notes, *found.notes))
+        return None
 
     def _accepted(self, pilot: Prepared, alone: Found | None, failure: SolveError | None, loading: Loading) -> Found:
         """What IPOPT found, an unstable state left if that is wanted."""

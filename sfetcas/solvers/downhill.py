@@ -28,8 +28,11 @@ ARRIVED = 1e-5
 MOST = 200
 """Steps at most: leaving a nearly neutral state takes some ten, the way from one shape to another some thirty."""
 
-FIRMER, SMALL = 4.0, 1e-3
-"""Growth of ``s`` until a step is short enough, and the least that it begins with, in units of force."""
+FIRMER, SMALL = 4.0, 1e-9
+"""Growth of ``s`` until a step is short enough, and the least that it begins with, in units of force.
+
+A spin of a member between balls is resisted by 1e-7 of its bending: a firmer beginning would creep along it.
+"""
 
 
 def flow(equations: Equations, state: State, loading: Loading, test: Callable[[Point], Stability]) -> State | None:

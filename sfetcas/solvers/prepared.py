@@ -34,6 +34,9 @@ MOST_COUNTED = 600
 SOLVED = 1e-9
 """Relative residual after the last Newton steps that is taken for an equilibrium; usual are 1e-13 to 1e-16."""
 
+STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
+"""Where IPOPT gets no nearer, as in the valley of a spin that next to nothing resists, Newton's method goes on."""
+
 ESCAPES = 8
 """Unstable equilibria that are left in a row before giving up."""
 
@@ -95,7 +98,7 @@ class Prepared:
 
     @functools.lru_cache(maxsize=8)  # noqa: B019 - lives as long as the model
     def _solvers(self, scale: float) -> Callable[..., NLPResult]:
-        return Ipopt(objective_scale=1.0 / scale).prepare(self._problem.nlp)
+        return Ipopt(objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
 
     def guess(self, loading: Loading) -> tuple[State, float]:
         """A state to start from, and the gap of its closings."""
@@ -187,6 +190,9 @@ class Prepared:
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)
+        if not polished.residual <= SOLVED and result.status not in (Status.INFEASIBLE, Status.UNBOUNDED):
+            # Quaternions leave a long valley by short steps only, rotations by long ones.
+            polished = self.downhill(trial, loading) or polished
         # What falls without end has no finite residual, which no comparison would find too large.
         if not polished.converged and not polished.residual <= SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
@@ -197,6 +203,15 @@ class Prepared:
             detail += f"; {told}" if told else ""
             raise SolveError(status, detail, trial)
         return polished, result.iterations
+
+    def downhill(self, state: State, loading: Loading) -> Corrected | None:
+        """The equilibrium below a state, or where its forces carry it without an energy; None where they do not rest.
+
+        Its tangent has no eigenvalue below zero.
+        """
+        there = flow(self.equations, state, loading, lambda point: self._tester.test(point))
+        found = None if there is None else self.correct(there, loading)
+        return found if found is not None and found.converged else None
 
     def leave(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:
         """Leave an unstable equilibrium along its escape shape to a stable or neutral one.
@@ -228,9 +243,8 @@ class Prepared:
         """The equilibrium below a state."""
         if self.model.minimisable:
             return self.minimise(loading, state)[0]
-        there = flow(self.equations, state, loading, lambda point: self._tester.test(point))
-        found = None if there is None else self.correct(there, loading)
-        if found is None or not found.converged:
+        found = self.downhill(state, loading)
+        if found is None:
             raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
         return found
 
