@@ -159,7 +159,7 @@ def test_follower_is_the_dead_force_of_its_last_direction(scene):
 
 
 def slack():
-    """A bar that hangs by a ball from a clamped one, a follower at its end: it has no place of its own without loads."""
+    """A bar hung by a ball from a clamped one, a follower at its end: without loads it has no place of its own."""
     return {
         "dimension": "space",
         "gravity": [0, 0, -1],
