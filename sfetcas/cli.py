@@ -24,7 +24,7 @@ from .equilibria.solution import Equilibrium, Solution
 from .equilibria.statics import Settings, pilot_of
 from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
-from .mechanics.model import assemble
+from .mechanics.model import Model, assemble
 from .mechanics.resistance import check_resistance
 from .paths.path import Branch
 from .paths.path import Path as Course
@@ -212,7 +212,7 @@ def _report(solution: Solution | Course, seconds: float) -> None:
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(
-        f"  {counted(model.mesh.elements, 'element')} {model.element.name}, {counted(model.unknowns, 'unknown')}, "
+        f"  {counted(_flexible(model), 'element')} {model.element.name}, {counted(model.unknowns, 'unknown')}, "
         f"{model.assembly} assembly"
     )
     if isinstance(solution, Course):
@@ -388,6 +388,11 @@ def _short(value: Any) -> str:
     return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
+def _flexible(model: Model) -> int:
+    """Elements of flexible members: a rigid or small one is cut into none."""
+    return sum(len(model.mesh.cuts[n]) - 1 for n, member in model.scene.members.items() if member.type == "flexible")
+
+
 def _info(options: argparse.Namespace) -> int:
     scene, settings = load(options.file), _settings(options)
     _named(options.file, lambda: check_resistance(scene))
@@ -395,7 +400,7 @@ def _info(options: argparse.Namespace) -> int:
     model = assemble(scene, mesh, assembly=settings.assembly)
     print(scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(f"  begins with {counted(mesh.elements, 'element')} {model.element.name}; {model.assembly} assembly")
+    print(f"  begins with {counted(_flexible(model), 'element')} {model.element.name}; {model.assembly} assembly")
     for block in model.blocks:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")

@@ -109,6 +109,15 @@ def test_info_shows_what_rigid_links_cost(tmp_path, capsys):
     assert unknowns
     assert 100 < int(unknowns.group(1)) < 150
     assert "member link7: rigid, length" in shown
+    # What bends is cut into elements, and forty motions are enough to know that nothing holds the links.
+    elements = re.search(r"begins with (\d+) elements", shown)
+    assert elements
+    assert int(elements.group(1)) == int(re.search(r"(\d+) elements, length", shown).group(1))
+    told = next(line for line in shown.splitlines() if "mobility" in line)
+    assert told.startswith("  mobility 40 or more: ")
+    assert told.endswith(" more")
+    motions = told.split(": ", 1)[1].split("; ")
+    assert len(set(motions)) == len(motions)
 
 
 def test_hundred_links_hang_straight_down():

@@ -71,7 +71,7 @@ class Piloting(Meshing):
             free, taut = pilot.diagnosis, pilot.lacks_slack
         except np.linalg.LinAlgError:
             return error
-        details = [f"free to move: {'; '.join(free.motions[:3])}"] if free.mobility else []
+        details = [f"free to move: {free.told(3)}"] if free.mobility else []
         details += [error.detail] if error.detail else []
         if taut and error.status is not Status.INFEASIBLE:
             rows = ", ".join(dict.fromkeys(free.redundant))

@@ -66,11 +66,18 @@ class Diagnosis:
     @property
     def sentence(self) -> str:
         """One sentence for a report."""
-        free = f"mobility {self.mobility}" + (f": {'; '.join(self.motions[:4])}" if self.motions else "")
+        least = " or more" if self.mobility == MOST else ""
+        free = f"mobility {self.mobility}{least}" + (f": {self.told(4)}" if self.motions else "")
         if not self.excess:
             return free
         held = ", ".join(dict.fromkeys(self.redundant))
         return f"{free}; {self.excess} redundant among {held}"
+
+    def told(self, most: int) -> str:
+        """The motions in words, each sentence once; how many are left out."""
+        said = list(dict.fromkeys(self.motions))[:most]
+        more = len(self.motions) - sum(motion in said for motion in self.motions)
+        return "; ".join([*said, *([f"and {more} more"] if more else [])])
 
 
 def diagnose(equations: Equations, motions: Array) -> Diagnosis:
