@@ -112,7 +112,12 @@ class Posture:
 
     def along(self, member: str, at: Any) -> dict[str, Array]:
         """Fields of a member at fractions of its length, see :meth:`Fields.along`; quaternions added."""
-        found = self.fields.along(self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at))
+        name, places = self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at)
+        outside = [place for place in places if not 0.0 <= place <= 1.0]
+        if outside or not len(places):
+            what = f"{outside[0]:g}" if outside else "none"
+            raise SceneError(f"along {name!r}: found {what}, accepted: fractions of the length, from 0 to 1")
+        found = self.fields.along(name, places)
         rotation = found.pop("rotation")
         found["quaternion"] = self._as_quaternions(rotation)
         if not self.model.space:
@@ -147,7 +152,8 @@ class Posture:
     @staticmethod
     def _known(name: str, names: tuple[str, ...], kind: str) -> str:
         if name not in names:
-            raise SceneError(f"found {kind} {name!r}; {nearest(name, names)}")
+            told = nearest(name, names) if names else f"the scene has no {kind}"
+            raise SceneError(f"found {kind} {name!r}; {told}")
         return name
 
 
