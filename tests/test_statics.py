@@ -7,7 +7,7 @@ import pytest
 from scenes import SOFT, UNLIKE, ZOO, arch, bend_45, cantilever, elastica, guided, helix, made, model_of
 
 import sfetcas
-from sfetcas import SolveError, Status, benchmark
+from sfetcas import SceneError, SolveError, Status, benchmark
 from sfetcas.cli import main
 from sfetcas.equilibria import meshing
 from sfetcas.equilibria.statics import Settings, pilot_of, solve, solve_model
@@ -550,3 +550,41 @@ def test_taut_member_that_joints_would_bend_is_named():
     }
     with pytest.raises(sfetcas.SolveError, match=r"inextensible member .*closing of b, x"):
         sfetcas.solve(made(table))
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])
+def test_straight_bars_held_twice_carry_the_least_forces_and_stay_where_they_are(factor):
+    """A node on three bars from the ground: of their forces one combination is free, which nothing applies."""
+    places = {"A": [0.0, 0.0], "B": [0.2, 0.0], "D": [0.1, 0.0]}
+    scene = {
+        "sections": {"s": {"EI3": 0.01}},
+        "nodes": {name: {"position": place, "support": "hinge"} for name, place in places.items()}
+        | {"C": {"position": [0.1, 0.1]}},
+        "members": {name: {"nodes": [name, "C"], "section": "s"} for name in places},
+        "loads": {"f": {"type": "force", "node": "C", "value": [0.3 * factor, -factor]}},
+    }
+    step = solve(made(scene)).last
+    ways = np.array([np.subtract([0.1, 0.1], place) for place in places.values()])
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    least = ways * (np.linalg.pinv(ways.T) @ [-0.3 * factor, factor])[:, None]
+    # By hand in bars; multipliers of straight members are balanced to rounding.
+    for name, force in zip(places, least, strict=True):
+        np.testing.assert_allclose(step.reaction(name)[0][:2], force, atol=1e-9 * factor)
+    # Hinged bars buckle at 4.9 N and more: none is near, and nothing is left.
+    assert step.certificate.stable is True
+    assert len(step.notes) == 1
+    assert "the smallest are given" in step.notes[0]
+    np.testing.assert_allclose(step.position("C"), [0.1, 0.1, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("at", [1.5, [0.5, -1e-3], np.nan, []])
+def test_a_place_beyond_the_ends_of_a_member_is_refused(at):
+    step = solve(made(cantilever())).last
+    with pytest.raises(SceneError, match="accepted: fractions of the length, from 0 to 1"):
+        step.along("m", at)
+
+
+def test_a_name_where_the_scene_has_none_is_refused_in_a_whole_sentence():
+    step = solve(made(cantilever())).last
+    with pytest.raises(SceneError, match="found spring 'x'; the scene has no spring"):
+        step.spring("x")

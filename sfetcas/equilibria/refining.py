@@ -243,11 +243,15 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
+    which = "the smallest are given"
     if residual <= SOLVED:
         corrected = replace(corrected, state=state, point=point, residual=residual)
     elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > CARRIED * loads > 0.0:
         raise _stretched(equations, loose, corrected)
-    note = f"reactions are not unique, the smallest are given; redundant: {_named_in(equations, loose)}"
+    else:
+        # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
+        which = "one set of many is given"
+    note = f"reactions are not unique, {which}; redundant: {_named_in(equations, loose)}"
     return replace(found, corrected=corrected, notes=(*found.notes, note))
 
 

@@ -22,7 +22,7 @@ from .divergence import TangentTest
 from .doctor import Diagnosis, contradiction, diagnose, free_motions
 from .downhill import flow
 from .guess import first_guess, lacks_slack, restore
-from .newton import Corrected, correct
+from .newton import Corrected, correct, loose_rows
 from .problem import EquilibriumProblem
 from .stability import Inertia, Stability, StabilityTest
 
@@ -36,6 +36,9 @@ SOLVED = 1e-9
 
 STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
 """Where IPOPT gets no nearer, as in the valley of a spin that next to nothing resists, Newton's method goes on."""
+
+SAME = 1e-3
+"""Two states nearer than this, rad, are the same but for what a prestress bends."""
 
 ESCAPES = 8
 """Unstable equilibria that are left in a row before giving up."""
@@ -202,7 +205,22 @@ class Prepared:
             told = contradiction(self.equations, trial, loading) if status is Status.INFEASIBLE else ""
             detail += f"; {told}" if told else ""
             raise SolveError(status, detail, trial)
-        return polished, result.iterations
+        return self._without_prestress(polished, loading), result.iterations
+
+    def _without_prestress(self, found: Corrected, loading: Loading) -> Corrected:
+        """The same equilibrium with the least multipliers where closings are redundant.
+
+        Of these IPOPT leaves what happens to come out, up to what buckles members: with such a prestress, which
+        nobody applied, what is stable would look unstable.
+        """
+        loose = loose_rows(self.equations, found.point)
+        if not loose.size:
+            return found
+        # Where Newton's method began the members may have been bent, and no closing redundant.
+        self.equations.redundant = True
+        lam = found.state.lam - loose @ (loose.T @ found.state.lam)
+        least = self.correct(replace(found.state, lam=lam), loading)
+        return least if least.converged and self.distance(least.state, found.state) < SAME else found
 
     def downhill(self, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium below a state, or where its forces carry it without an energy; None where they do not rest.
