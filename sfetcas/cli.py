@@ -212,7 +212,7 @@ def _report(solution: Solution | Course, seconds: float) -> None:
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(
-        f"  {counted(_flexible(model), 'element')} {model.element.name}, {counted(model.unknowns, 'unknown')}, "
+        f"  {_flexible(model)}, {counted(model.unknowns, 'unknown')}, "
         f"{model.assembly} assembly"
     )
     if isinstance(solution, Course):
@@ -388,9 +388,11 @@ def _short(value: Any) -> str:
     return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
-def _flexible(model: Model) -> int:
-    """Elements of flexible members: a rigid or small one is cut into none."""
-    return sum(len(model.mesh.cuts[n]) - 1 for n, member in model.scene.members.items() if member.type == "flexible")
+def _flexible(model: Model) -> str:
+    """The elements of flexible members: a rigid or small one is cut into none."""
+    cuts, members = model.mesh.cuts, model.scene.members
+    count = sum(len(cuts[name]) - 1 for name, member in members.items() if member.type == "flexible")
+    return f"{counted(count, 'element')} {model.element.name}" if count else "no flexible member"
 
 
 def _info(options: argparse.Namespace) -> int:
@@ -400,7 +402,7 @@ def _info(options: argparse.Namespace) -> int:
     model = assemble(scene, mesh, assembly=settings.assembly)
     print(scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(f"  begins with {counted(_flexible(model), 'element')} {model.element.name}; {model.assembly} assembly")
+    print(f"  begins with {_flexible(model)}; {model.assembly} assembly")
     for block in model.blocks:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")
