@@ -193,3 +193,23 @@ def test_stretch_that_cushions_show_in_two_pieces_is_one():
     step = solve(made(table)).last
     assert step.certificate.stable is True
     assert smallest_gap(step) > -1e-5  # the accuracy
+
+
+@pytest.mark.parametrize("height", [0.02, 0.05, 0.1])
+def test_a_link_that_falls_a_little_does_not_turn_over(height):
+    """Hinged to a short way above the floor it comes to lie beyond the hinge; on soft cushions it turns over easily."""
+    table = {
+        "sections": {"s": {"EI3": 1.0, "rhoA": 2.0}},
+        "nodes": {
+            "A": {"position": [0, 0.05], "support": "clamped"},
+            "B": {"position": [0.6, 0.03], "joint": "hinge"},
+            "C": {"position": [1.4, height]},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}, "n": {"nodes": ["B", "C"], "section": "s"}},
+        "gravity": [0, -5],
+        "contacts": {"floor": {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}},
+    }
+    step = solve(made(table)).last
+    length = float(np.hypot(0.8, height - 0.03))
+    # It lies straight: its end is its length beyond the hinge, to the accuracy of 1e-4.
+    np.testing.assert_allclose(step.position("C") - step.position("B"), [length, 0.0, 0.0], atol=2e-4)

@@ -102,6 +102,27 @@ def test_a_spring_that_winds_up_holds_a_crank():
     assert sfetcas.solve(made(table)).last.angle("A") == pytest.approx(20.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("rise", [1e-2, 1e-3, 2e-4, 1e-4])
+def test_a_spring_holds_a_toggle_close_to_its_dead_point(rise):
+    """By the square of the rise: next to nothing, but the closed form is met."""
+    table = {
+        "nodes": {
+            "A": {"position": [0, 0], "support": "hinge"},
+            "B": {"position": [1, rise], "joint": "hinge"},
+            "C": {"position": [2, 0], "support": "slider", "direction": [1, 0], "rotation": "ball"},
+        },
+        "members": {name: {"nodes": list(name), "type": "rigid"} for name in ("AB", "BC")},
+        "springs": {"k": {"type": "translational", "node": "C", "direction": [1, 0], "stiffness": 1.0}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, 0.3 * rise**3]}},
+    }
+    height = sfetcas.solve(made(table), accuracy=1e-10).last.position("B")[1]
+    # At a height y the end travels by 2 sqrt(1 + rise^2 - y^2) - 2, times -2 y over the root for each height.
+    root = math.sqrt(1.0 + rise**2 - height**2)
+    force = 4.0 * (rise**2 - height**2) / (root + 1.0) * -height / root
+    # Rounding of the places, 1e-16, over what the rise squared leaves of it.
+    assert force == pytest.approx(0.3 * rise**3, rel=1e-13 / rise**2)
+
+
 # -- sliding ----------------------------------------------------------------------------------------------------
 
 

@@ -186,6 +186,34 @@ def test_what_hangs_slack_goes_where_its_followers_carry_it():
         np.testing.assert_allclose(two.position(node), one.position(node), atol=5e-8)  # two meshes, each to 1e-8
 
 
+@pytest.mark.parametrize("height", [-0.9, 0.5, 0.99])
+def test_followers_do_not_put_a_pendulum_upside_down(height):
+    """A unit mass under a follower of a tenth of its weight: it hangs aside, from wherever it begins."""
+    beside = float(np.sqrt(1.0 - height**2))
+    table = {
+        "gravity": [0, -1],
+        "nodes": {
+            "A": {"position": [0, 0], "support": "hinge"},
+            "B": {"position": [beside, height], "mass": 1.0},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "type": "rigid"}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, 0.1], "frame": "follower"}},
+    }
+    # The lever of the follower is that of the undeformed scene; rigid: right to rounding, what Newton's method leaves.
+    aside = 0.1 * beside
+    np.testing.assert_allclose(solved(table).position("B"), [aside, -np.sqrt(1.0 - aside**2), 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("dead", "diverged"), [(2.4, False), (2.5, True)])
+def test_a_column_beyond_divergence_is_told_as_such(dead, diverged):
+    """A dead force beyond pi^2/4 = 2.467 beside next to nothing that follows."""
+    table = cantilever((-dead, 0.0))
+    table["loads"]["follows"] = {"type": "force", "node": "B", "value": [-1e-6, 0.0], "frame": "follower"}
+    told = " ".join(solved(table).notes)
+    assert ("real eigenvalues of the static tangent are below zero" in told) is diverged
+    assert ("the static tangent is regular all the way" in told) is not diverged
+
+
 def test_spins_that_next_to_nothing_resists_are_found():
     """Bars between balls on springs: IPOPT creeps along the valley of their spins, and forces balance all the same."""
     rng = np.random.default_rng(3)

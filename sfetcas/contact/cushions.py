@@ -223,15 +223,20 @@ class Cushions:
 
     def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium near a state; downhill from there where Newton's method does not find it, if not far."""
+
+        def near(found: Corrected) -> bool:
+            there = found.state
+            return prepared.distance(state, there) < NEARBY and self._passes(prepared, state, there, loading)
+
+        # The first step may be long: what lies on soft cushions turns over with little resistance.
         found = prepared.correct(state, loading, iterations=25, most=0.8)
-        if found.converged:
+        if found.converged and near(found):
             return found
         try:
             found = prepared.minimise(loading, state)[0]
         except SolveError:
             return None
-        near = prepared.distance(state, found.state) < NEARBY and self._passes(prepared, state, found.state, loading)
-        return found if near else None
+        return found if near(found) else None
 
     # -- where cushions stand -------------------------------------------------------------------
 

@@ -28,6 +28,11 @@ NO_POTENTIAL = (
     f"{NO_ENERGY}; the static tangent is regular all the way from zero load, and flutter would only show in dynamics"
 )
 
+DIVERGED = (
+    f"{NO_ENERGY}; real eigenvalues of the static tangent are below zero: it was singular on the way from zero load, "
+    "and other equilibria branch off there, which a path shows"
+)
+
 CARRIED = (
     "the loads could not be followed from zero; this is where the whole of them carries the undeformed state, "
     "and there may be others"
@@ -99,12 +104,18 @@ class Piloting(Meshing):
 
     def _only_grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         """Loads that cannot be minimised: the state that they lead to from zero, stable or not."""
-        found = self._grown(pilot, factor, last) or self._carried(pilot, factor)
+        found = self._onward(pilot, factor, last)
+        ways = [self._carried, self._grown_from_zero]
+        # A mechanism has no place of its own without loads: growing from zero they put it anywhere, also upside down.
+        for way in ways if pilot.diagnosis.mobility else ways[::-1]:
+            found = found or way(pilot, factor)
         if found is None:
             detail = "the loads could not be followed from zero, and without a potential there is no other way"
             raise SolveError(Status.FAILED, detail)
         if not pilot.model.conservative:
-            found.notes += (NO_ENERGY if CARRIED in found.notes else NO_POTENTIAL,)
+            diverged = pilot.diverged(found.corrected)
+            regular = diverged == 0 and CARRIED not in found.notes
+            found.notes += (NO_POTENTIAL if regular else DIVERGED if diverged else NO_ENERGY,)
         return found
 
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
@@ -152,11 +163,17 @@ class Piloting(Meshing):
 
     def _grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
         """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
+        return self._onward(pilot, factor, last) or self._grown_from_zero(pilot, factor)
+
+    def _onward(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
+        """The state that the loads lead to from the last factor, where that lies on the way from zero."""
+        if last is None or last[0] * (factor - last[0]) < 0.0:
+            return None
+        return self._through(pilot, last[0], factor, last[1].corrected.state)
+
+    def _grown_from_zero(self, pilot: Prepared, factor: float) -> Found | None:
+        """The state that the loads lead to from zero."""
         model = pilot.model
-        if last is not None and last[0] * (factor - last[0]) >= 0.0:
-            found = self._through(pilot, last[0], factor, last[1].corrected.state)
-            if found is not None:
-                return found
         zero = pilot.equations.start(model.loading(0.0, 0.0))
         if pilot.lacks_slack:
             # Straight members without slack: no way leads from here but the one that motions make.

@@ -44,6 +44,9 @@ MOST_ELEMENTS = 20_000
 MOST_TURNED = 1e8
 """Largest angle of an answer, rad: rounding leaves 1e-8 of it."""
 
+HELD = 2e-9
+"""Eigenvalues above this, in those of the softest member, hold a mechanism, if barely: rounding leaves about 1e-9."""
+
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
@@ -184,7 +187,8 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
     SceneError
         Names the motion.
     """
-    if stability.stable != "neutral" or not prepared.diagnosis.mobility:
+    softest = float(prepared.weight.max(initial=1.0) / prepared.equations.mass.max(initial=1.0))
+    if stability.stable != "neutral" or not prepared.diagnosis.mobility or stability.smallest > HELD * softest:
         return
     shape = np.concatenate([stability.shape, stability.travel])
     if moves_nodes(prepared.equations, shape, found.state):

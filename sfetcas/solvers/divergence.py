@@ -102,6 +102,34 @@ class TangentTest:
         nearest = values[np.argsort(np.abs(values.real))[:count]]
         return bool((np.abs(nearest.imag) <= SINGULAR).all())
 
+    def falling(self, point: Point) -> Stability:
+        """As :meth:`test`, but without a potential by the real parts of the eigenvalues: what a flow runs away from."""
+        if self._symmetric:
+            return self.test(point)
+        equations = self._equations
+        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
+        tangent, limit, _ = self._tangent(point)
+        values = self._eigenvalues(tangent)
+        negative = int((values.real < -limit).sum())
+        if not negative:
+            return Stability("not defined", 0, 0.0, np.zeros(turning), nothing)
+        values, vectors = np.linalg.eig(tangent)
+        lowest = int(np.argmin(values.real))
+        shape = vectors[:, lowest] / self._root
+        quotient = float(values[lowest].real) / self._size(shape)
+        return Stability("not defined", negative, quotient, shape.real[:turning], shape.real[turning:])
+
+    def below(self, point: Point) -> int:
+        """Number of real eigenvalues below zero: where there are some the tangent was singular on the way there."""
+        tangent, limit, _ = self._tangent(point)
+        values = self._eigenvalues(tangent)
+        return int(((values.real < -limit) & (np.abs(values.imag) <= limit)).sum())
+
+    def _size(self, shape: Array) -> float:
+        """Integral of the square of a shape."""
+        nothing = np.full(self._equations.displacement_unknowns, LIGHT)
+        return float((np.concatenate([self._equations.mass, nothing]) * np.abs(shape) ** 2).sum())
+
     def test(self, point: Point) -> Stability:
         """Inertia, smallest eigenvalue and escape shape where the loads have a potential; "not defined" elsewhere."""
         equations = self._equations
@@ -113,8 +141,7 @@ class TangentTest:
             return Stability(True, 0, np.inf, np.zeros(turning), nothing)
         values, vectors = np.linalg.eigh(tangent)
         shape = vectors[:, 0] / self._root
-        masses = np.concatenate([equations.mass, np.full(len(nothing), LIGHT)])
-        quotient = float(values[0]) / float(shape @ (masses * shape))
+        quotient = float(values[0]) / self._size(shape)
         shape = shape / shape[np.argmax(np.abs(shape[:turning]))]
         negative = int((values < -limit).sum())
         stable: bool | str = False if negative else bool(values[0] > limit) or "neutral"

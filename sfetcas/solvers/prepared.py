@@ -150,6 +150,10 @@ class Prepared:
             else self._tangent.inertia(found.point).negative
         )
 
+    def diverged(self, found: Corrected) -> int | None:
+        """Real eigenvalues of the tangent below zero, loads without potential; None where it is too large for them."""
+        return self._tangent.below(found.point) if self.equations.unknowns <= MOST_COUNTED else None
+
     @property
     def leaves(self) -> bool:
         """Whether unstable states can be left: there is an energy and, where its value is not known, not too much."""
@@ -225,9 +229,10 @@ class Prepared:
     def downhill(self, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium below a state, or where its forces carry it without an energy; None where they do not rest.
 
-        Its tangent has no eigenvalue below zero.
+        Its tangent has no eigenvalue with a real part below zero.
         """
-        there = flow(self.equations, state, loading, lambda point: self._tester.test(point))
+        test = self._test.test if self.model.has_potential else self._tangent.falling
+        there = flow(self.equations, state, loading, test)
         found = None if there is None else self.correct(there, loading)
         return found if found is not None and found.converged else None
 
