@@ -211,10 +211,7 @@ def _report(solution: Solution | Course, seconds: float) -> None:
     model = solution.last.model
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(
-        f"  {_flexible(model)}, {counted(model.unknowns, 'unknown')}, "
-        f"{model.assembly} assembly"
-    )
+    print(f"  {_flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
     if isinstance(solution, Course):
         _report_path(solution)
     for step, place in zip(solution.steps, _places(solution), strict=True):

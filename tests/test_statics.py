@@ -577,6 +577,73 @@ def test_straight_bars_held_twice_carry_the_least_forces_and_stay_where_they_are
     np.testing.assert_allclose(step.position("C"), [0.1, 0.1, 0.0], atol=1e-12)
 
 
+def root(function, low, high):
+    """Where a rising function vanishes."""
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if function(middle) < 0.0 else (low, middle)
+    return low
+
+
+def test_cable_hangs_as_a_catenary_and_says_that_it_was_not_followed():
+    """From an arch turned over it cannot be followed: EI is 1e-12 of its weight times the span cubed."""
+    half = 0.5 * 1.001
+    angle = root(lambda a: a / (2.0 * np.sin(a / 2.0)) - 1.001, 1e-3, 1.0)
+    table = {
+        "gravity": [0, -9.81],
+        "sections": {"s": {"EI3": 1e-11, "rhoA": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0], "support": "hinge"}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": -angle}}},
+    }
+    step = solve(made(table)).last
+    reach = root(lambda c: half - c * np.sinh(0.5 / c), 0.1, 100.0)
+    sag = reach * (np.cosh(0.5 / reach) - 1.0)
+    # Bending counts over sqrt(EI / H) = 1e-6 of the span at both ends.
+    assert step.along("m", 0.5)["position"][0, 1] == pytest.approx(-sag, rel=1e-5)
+    assert any("could not be followed from zero" in note for note in step.notes)
+
+
+@pytest.mark.parametrize("load", [1e-3, 3.0])
+@pytest.mark.parametrize("count", [3, 5])
+def test_lattice_of_straight_bars_carries_the_least_reactions(count, load):
+    """Straight bars carry axial forces only: of all that balance at the nodes those with the least reactions."""
+    grid = [(i, j) for i in range(count) for j in range(count)]
+    name = {place: "n{}{}".format(*place) for place in grid}
+    pairs = [
+        ((i, j), (i + di, j + dj)) for i, j in grid for di, dj in ((1, 0), (0, 1), (1, 1)) if (i + di, j + dj) in name
+    ]
+    nodes = {name[p]: {"position": [0.1 * p[0], 0.1 * p[1]]} for p in grid}
+    held = [name[i, 0] for i in range(count)]
+    for node in held:
+        nodes[node]["support"] = "hinge"
+    corner = name[count - 1, count - 1]
+    table = {
+        "sections": {"s": {"EI3": 0.01}},
+        "nodes": nodes,
+        "members": {name[a] + name[b]: {"nodes": [name[a], name[b]], "section": "s"} for a, b in pairs},
+        "loads": {"F": {"type": "force", "node": corner, "value": [load, -load]}},
+    }
+    step = solve(made(table)).last
+    assert step.certificate.stable is True
+    assert "the smallest are given" in step.notes[0]
+    # Each column: what a tension of one in a bar does to the nodes.
+    number = {name[p]: k for k, p in enumerate(grid)}
+    pulls = np.zeros((2 * len(grid), len(pairs)))
+    for k, (a, b) in enumerate(pairs):
+        way = np.subtract(b, a) / np.linalg.norm(np.subtract(b, a))
+        pulls[2 * number[name[a]] : 2 * number[name[a]] + 2, k] = way
+        pulls[2 * number[name[b]] : 2 * number[name[b]] + 2, k] = -way
+    ground = np.concatenate([[2 * number[node], 2 * number[node] + 1] for node in held])
+    free = np.setdiff1d(np.arange(len(pulls)), ground)
+    applied = np.zeros(len(pulls))
+    applied[2 * number[corner] : 2 * number[corner] + 2] = [load, -load]
+    bars = np.linalg.lstsq(pulls[free], -applied[free], rcond=None)[0]
+    null = np.linalg.svd(pulls[free])[2][np.linalg.matrix_rank(pulls[free]) :].T
+    least = bars - null @ np.linalg.lstsq(pulls[ground] @ null, pulls[ground] @ bars, rcond=None)[0]
+    found = np.concatenate([step.reaction(node)[0][:2] for node in held])
+    np.testing.assert_allclose(found, -pulls[ground] @ least, atol=1e-7 * load)  # rounding of the multipliers
+
+
 @pytest.mark.parametrize("at", [1.5, [0.5, -1e-3], np.nan, []])
 def test_a_place_beyond_the_ends_of_a_member_is_refused(at):
     step = solve(made(cantilever())).last

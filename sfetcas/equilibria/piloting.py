@@ -38,6 +38,10 @@ CARRIED = (
     "and there may be others"
 )
 
+NEAREST = (
+    "the loads could not be followed from zero; this is the minimum nearest to the start guess, and there may be others"
+)
+
 MOST_CARRIED = 600
 """Unknowns: each step where loads carry a state needs all eigenvalues of a tangent, a second at most."""
 
@@ -92,7 +96,9 @@ class Piloting(Meshing):
             return self._accepted(pilot, alone, failure, loading)
         reached = self._grown(pilot, factor, last)
         if reached is None:
-            return self._accepted(pilot, alone, failure, loading)
+            found = self._accepted(pilot, alone, failure, loading)
+            # From straight members without slack no way leads: that the loads are not followed is no finding.
+            return found if pilot.lacks_slack else replace(found, notes=(NEAREST, *found.notes))
         if alone is not None:
             reached.iterations = alone.iterations
             apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3

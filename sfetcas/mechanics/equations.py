@@ -30,6 +30,9 @@ from .work import Work
 
 __all__ = ["Equations", "Point", "State"]
 
+UNLOADED = 1e-6
+"""Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
+
 
 @dataclass(frozen=True)
 class State:
@@ -283,7 +286,8 @@ class Equations:
             displacement = slice(self.turning_unknowns, self.unknowns)
             residual[displacement] = positions.W.T @ lam - positions.Y.T @ force
             sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
-            scale[displacement] += sums + 1e-12
+            # A node at which next to nothing acts is judged by a millionth of what acts elsewhere.
+            scale[displacement] += sums + UNLOADED * sums.max(initial=0.0) + 1e-12
         residual[self.unknowns : self.unknowns + len(gap)] = gap
 
         parts = [stiffness.ravel(), *self._closing_parts(spin), positions.W.value, positions.W.value]
