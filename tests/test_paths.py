@@ -763,3 +763,12 @@ def test_strips_as_thin_as_leaf_springs_are_followed_in_space(ratio):
         np.testing.assert_allclose(ours.position("t"), theirs.position("t"), atol=2e-6)
         assert ours.certificate.stable is theirs.certificate.stable is True
     assert not any("jumped" in note for step in found.steps for note in step.notes)
+
+
+def test_what_is_printed_is_short():
+    path = solve(load(PROBLEMS / "lee_frame.toml"))
+    step = path.steps[0]
+    assert repr(step).startswith("Equilibrium(factor=")
+    # No arrays and no scene: some numbers and notes each.
+    assert len(repr(step)) < 600
+    assert len(repr(path)) < 600 * (1 + len(path.steps) + len(path.limit_points))

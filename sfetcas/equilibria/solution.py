@@ -77,9 +77,9 @@ class Posture:
     """
 
     factor: float
-    model: Model
-    state: State
-    loading: Loading
+    model: Model = field(repr=False)
+    state: State = field(repr=False)
+    loading: Loading = field(repr=False)
     fields: Fields = field(repr=False)
 
     def position(self, node: str) -> Array:
@@ -231,7 +231,7 @@ class Solution:
         Where a step failed: which, and what was tried.
     """
 
-    scene: Any
+    scene: Any = field(repr=False)
     status: Status
     steps: tuple[Equilibrium, ...]
     seconds: Mapping[str, float]

@@ -73,7 +73,7 @@ class Branch:
         From which bifurcation of the path it starts (0: it is the path itself), and to which side, 1 or -1.
     """
 
-    points: tuple[PathPoint, ...]
+    points: tuple[PathPoint, ...] = field(repr=False)
     steps: tuple[Equilibrium, ...]
     limit_points: tuple[Equilibrium, ...]
     bifurcations: tuple[Equilibrium, ...]
@@ -120,7 +120,7 @@ class Path:
         Time spent on models and on solving.
     """
 
-    scene: Any
+    scene: Any = field(repr=False)
     status: Status
     prepared: Prepared = field(repr=False)
     branches: tuple[Branch, ...]
