@@ -438,7 +438,7 @@ def test_slider_across_a_straight_member_is_refused():
         "b": sfetcas.Node(position=[1, 0], support="slider", direction=[0, 1]),
     }
     force = sfetcas.Load(type="force", node="b", value=[0, -1])
-    with pytest.raises(SolveError, match="fully stretched"):
+    with pytest.raises(SolveError, match=r"no finite force holds the members .fully stretched"):
         solve(_strip(nodes, {"beam": ["a", "b"]}, loads={"f": force}))
 
 

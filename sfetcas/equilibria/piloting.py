@@ -82,7 +82,7 @@ class Piloting(Meshing):
             return error
         details = [f"free to move: {free.told(3)}"] if free.mobility else []
         details += [error.detail] if error.detail else []
-        if taut and error.status is not Status.INFEASIBLE:
+        if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
             rows = ", ".join(dict.fromkeys(free.redundant))
             details.append(f"{TAUT}: {rows}")
         return SolveError(error.status, "; ".join(details), error.last)

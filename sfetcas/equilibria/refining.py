@@ -275,7 +275,7 @@ def _grow(equations: Equations, point: Point, nearly: Array) -> bool:
 def _stretched(equations: Equations, loose: Array, corrected: Corrected) -> SolveError:
     """What is said of members that no finite force holds straight."""
     detail = "fully stretched between held points, where an inextensible member takes any force: "
-    return SolveError(Status.INFEASIBLE, detail + _named_in(equations, loose), corrected.state)
+    return SolveError(Status.STRETCHED, detail + _named_in(equations, loose), corrected.state)
 
 
 def _named_in(equations: Equations, loose: Array) -> str:

@@ -93,4 +93,4 @@ def check_slack(curve: Curve, traced: Traced) -> None:
     if loose.size and loads > 0.0 and np.abs(last.state.lam).max() > TAUT * loads:
         names = ", ".join(equations.row_names[row] for row in rows_in(loose))
         detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
-        raise SolveError(Status.INFEASIBLE, detail, last.state)
+        raise SolveError(Status.STRETCHED, detail, last.state)
