@@ -832,3 +832,27 @@ def test_spring_turns_about_the_axis_of_its_hinge():
         sfetcas.SceneError, match=r"^springs\.s\.axis: found \[0.0, 0.0, 1.0\], accepted: along the axis"
     ):
         made(table)
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize(("given", "bending"), [("section", 3.0), ("matrix", 1.0)])
+def test_a_pull_that_small_members_do_not_feel_across_is_told(space, given, bending):
+    """At a tenth of 12 EI / L^2 a note begins; it is the force along the bar that counts, wherever that points."""
+    member = {"nodes": ["A", "B"], "type": "small"}
+    member |= (
+        {"section": "s"} if given == "section" else {"stiffness": textbook_cantilever(1e7)["members"]["m"]["stiffness"]}
+    )
+    table = {
+        "dimension": "space" if space else "plane",
+        "sections": {"s": {"EI2": bending, "EI3": bending, "GJ": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [0.6, 0.8], "support": "slider", "direction": [0.6, 0.8]},
+        },
+        "members": {"m": member},
+    }
+    for part, told in ((0.09, False), (0.11, True), (-0.11, True)):
+        force = 12.0 * bending * part * np.array([0.6, 0.8])
+        table["loads"] = {"F": {"type": "force", "node": "B", "value": force.tolist()}}
+        notes = sfetcas.solve(made(table)).last.notes
+        assert any(f"carries {abs(part):.2g} of 12 EI / L^2" in note for note in notes) is told

@@ -16,7 +16,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from ..mechanics.balance import SpringState
 from ..mechanics.equations import Equations, Point, State
-from ..mechanics.fields import Fields
+from ..mechanics.fields import SMALL_PULL, Fields
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.stability import Stability
@@ -321,15 +321,30 @@ def equilibrium(
 
 
 def _not_small(fields: Fields) -> tuple[str, ...]:
-    """A note where small members bend so far that linear elasticity is wrong, which no error estimate sees."""
-    members = fields.model.scene.members
-    bent = {name: fields.bent(name) for name, member in members.items() if member.type == "small"}
-    far = sorted((name for name in bent if bent[name] > SMALL), key=lambda name: -bent[name])
-    if not far:
-        return ()
-    others = f", as {counted(len(far) - 1, 'other', 'others')} do" if far[1:] else ""
-    found = f"the small member {far[0]!r} bends by {bent[far[0]]:.2g} of its length or rad{others}"
-    return (f"{found}: its linear elasticity is for a few percent, and the error estimate does not tell",)
+    """Notes where small members bend or are pulled beyond linear elasticity, which no error estimate sees."""
+    small = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
+    told = "the error estimate does not tell"
+    notes = []
+    for measure, limit, words in (
+        (
+            fields.bent,
+            SMALL,
+            f"bends by {{:.2g}} of its length or rad{{}}: its linear elasticity is for a few percent, and {told}",
+        ),
+        (
+            fields.pulled,
+            SMALL_PULL,
+            f"carries {{:.2g}} of 12 EI / L^2 along it{{}}: what that does across it is left out, and {told}",
+        ),
+    ):
+        found = {name: measure(name) for name in small}
+        far = sorted((name for name in small if found[name] > limit), key=lambda name: -found[name])
+        if far:
+            others = f", as {counted(len(far) - 1, 'other', 'others')} do" if far[1:] else ""
+            notes.append(f"the small member {far[0]!r} {words.format(found[far[0]], others)}")
+            # Each is told once.
+            small = [name for name in small if name not in far]
+    return tuple(notes)
 
 
 SMALL = 0.1

@@ -22,7 +22,11 @@ from .equations import Equations, State
 from .loading import Loading
 from .mesh import Touch
 
-__all__ = ["Fields", "rotations_along", "transferred"]
+__all__ = ["SMALL_PULL", "Fields", "rotations_along", "transferred"]
+
+
+SMALL_PULL = 0.1
+"""Axial force over ``12 EI / L^2`` up to which a small member is one: by as much it is too soft or too stiff across."""
 
 
 class Fields:
@@ -391,6 +395,29 @@ class Fields:
         spins = 2.0 * quaternion.multiply(turned, quaternion.conjugate(mean))[:, 1:]
         size = np.linalg.norm(rest - rest[0], axis=1).max()
         return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
+
+    def pulled(self, member: str) -> float:
+        """Axial force of a small member with two ends over what displaces these across by its length, ``12 EI / L^2``.
+
+        Linear elasticity leaves out what such a force does across the member: of this share of its stiffness.
+        """
+        record = self.model.scene.members[member]
+        if len(record.nodes) != 2:
+            return 0.0
+        one, two = (np.array(self.model.scene.nodes[name].position, dtype=float) for name in record.nodes)
+        length = float(np.linalg.norm(two - one))
+        if record.stiffness is not None:
+            across = np.asarray(record.stiffness)[7:9, 7:9]
+            firm = length * float(np.linalg.eigvalsh(across)[0] if self.model.space else across[0, 0])
+        else:
+            bending = self.model.scene.sections[str(record.section)].stiffness(np.array([0.5]))[0, 1:]
+            firm = 12.0 * float(np.nanmin(bending) if self.model.space else bending[1]) / length**2
+        most = float(np.abs(self.state.lam).max(initial=0.0) + np.abs(self._loading.force).sum())
+        if most * self.model.scales.force <= SMALL_PULL * firm:
+            return 0.0
+        ends = self._along_body(member, np.array([0.0, 1.0]))
+        chord = np.diff(ends["position"], axis=0)[0]
+        return float(np.abs(ends["force"] @ chord).max()) / float(np.linalg.norm(chord)) / firm
 
     def _start_forces(self, part: slice) -> Array:
         """Internal force at the start of each of consecutive elements, (elements, axes)."""
