@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..description.obstacles import members_of, nearest, obstacle, takes_part
+from ..description.obstacles import members_of, nearest
 from ..description.scene import Scene
+from ..description.supports import along
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import largest_difference, roughness
@@ -16,7 +17,6 @@ from ..mechanics.balance import three
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import JUMPED, near_factor
-from ..solvers.doctor import along
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
 from .cushions import Cushions
@@ -182,10 +182,6 @@ class ContactRun:
                 found += self._lying(contact, member, x, gaps)
         return tuple(found)
 
-    def _takes_part(self, contact: str, node: str) -> bool:
-        stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
-        return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
-
     def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
         """Places and stretches of the undeformed member at no distance."""
         near = np.abs(gaps) < INSIDE * self.scene.size
@@ -194,7 +190,7 @@ class ContactRun:
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             low, high = float(x[a]), float(x[b - 1])
             if b - a == 1:
-                if 0.0 < low < 1.0 or self._takes_part(contact, nodes[int(low)]):
+                if 0.0 < low < 1.0 or self.reviser.takes_part(contact, nodes[int(low)]):
                     yield Touch(contact, member, low)
                 continue
             yield Touch(contact, member, low, high)

@@ -21,7 +21,7 @@ from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Cushion, Mesh, Touch
 from ..mechanics.model import Model
-from ..solvers.continuation import follow
+from ..solvers.continuation import between, follow
 from ..solvers.newton import Corrected, descend
 from ..solvers.prepared import Prepared
 from .settling import Held
@@ -145,7 +145,7 @@ class Cushions:
                 return None
             state = began
         for a, b in zip((first, *factors[1:]), factors[1:], strict=False):
-            reached = self._followed(prepared, _between(model, a, b), state)
+            reached = self._followed(prepared, between(model, a, b), state)
             if reached is None:
                 return None
             self.left += [a + part * (b - a) for part in self._parts]
@@ -263,10 +263,10 @@ class Cushions:
         for contact in self.obstacles:
             seen: set[str] = set()
             for member in members_of(self.scene.contacts[contact], self.scene.members):
-                cuts, nodes = mesh.cuts[member], self.scene.members[member].nodes
+                cuts, record = mesh.cuts[member], self.scene.members[member]
                 edge = float(np.diff(cuts).max()) * self.scene.center_lines[member].length
                 for at in cuts.tolist():
-                    node = nodes[int(at)] if at in (0.0, 1.0) else ""
+                    node = record.node_at(at)
                     if node and (node in seen or not self._takes_part(node, contact)):
                         continue
                     seen |= {node} if node else set()
@@ -301,7 +301,8 @@ class Cushions:
                 for member in members_of(self.scene.contacts[contact], self.scene.members)
                 for run in self._runs(held, contact, member, pushed)
             ]
-            lying = {self._node(run, x) for run in runs if run.to is not None for x in run.places}
+            members = self.scene.members
+            lying = {members[run.member].node_at(x) for run in runs if run.to is not None for x in run.places}
             # A place beside a node counts the push on the node too: the farthest from it stands for all of them.
             beside = [(run, *self._beside(held, run)) for run in runs]
             for run, near, _ in sorted(beside, key=lambda entry: -entry[2]):
@@ -311,10 +312,6 @@ class Cushions:
                 found.append(replace(run, way=self._way(touched, run)))
         return tuple(found)
 
-    def _node(self, touch: Touch, x: float) -> str | None:
-        """The node at a place of a touch."""
-        return self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
-
     def _beside(self, held: Held, touch: Touch) -> tuple[str | None, float]:
         """The node within one element of a place, and how far it is, m."""
         member, cuts = self.scene.members[touch.member], held.mesh.cuts[touch.member]
@@ -323,14 +320,14 @@ class Cushions:
             return member.nodes[0], touch.at * length
         if member.type != "rigid" and touch.at >= cuts[-2]:
             return member.nodes[-1], (1.0 - touch.at) * length
-        return self._node(touch, touch.at), 0.0
+        return member.node_at(touch.at), 0.0
 
     def _runs(self, held: Held, contact: str, member: str, pushed: Mapping[Cushion, float]) -> Iterator[Touch]:
         """Places of a member next to each other that are pushed; a node counts for each member that ends there.
 
         An end that a support holds on the obstacle has no cushion, and goes with what is beside it.
         """
-        at_nodes = {self._node(Touch(c.contact, c.member, c.at), c.at): push for c, push in pushed.items()}
+        at_nodes = {self.scene.members[c.member].node_at(c.at): push for c, push in pushed.items()}
         inner = {c.at: push for c, push in pushed.items() if c.member == member}
         cuts = held.mesh.cuts[member]
         nodes = self.scene.members[member].nodes
@@ -401,7 +398,3 @@ class Cushions:
         stop = touched.obstacles[touch.contact]
         point, tangent = touched.fields.positions(touch.member, x)[0], touched.fields.tangents(touch.member, x)[0]
         return float(np.sign(stop.curvature(point, tangent))) or 1.0
-
-
-def _between(model: Model, a: float, b: float) -> Callable[[float], Loading]:
-    return lambda t: model.loading(a + t * (b - a))

@@ -90,7 +90,7 @@ class Reviser:
             return _numbered((*rest, moved(touch, k, end)))
         others = [n for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
         sharp = self.scene.contacts[touch.contact].type in ("point", "line")
-        if not self._takes_part(touch.contact, node) or (sharp and not others):
+        if not self.takes_part(touch.contact, node) or (sharp and not others):
             return _numbered(rest)
         back = node in tried.crossed
         tried.crossed.add(node)
@@ -119,7 +119,7 @@ class Reviser:
         touch, end = touches[i], float(round(touches[i].places[ran.place]))
         node = self.scene.members[touch.member].nodes[int(end)]
         flat = self.scene.contacts[touch.contact].type not in ("point", "line") and not self._stiff(touch.member)
-        if ran.collapsed or touch.to is not None or not flat or not self._takes_part(touch.contact, node):
+        if ran.collapsed or touch.to is not None or not flat or not self.takes_part(touch.contact, node):
             return None
         low, high = sorted((touch.at, end))
         return _numbered((*touches[:i], replace(touch, at=low, to=high), *touches[i + 1 :])) if low < high else None
@@ -139,7 +139,8 @@ class Reviser:
                 detail += f"{self.scene.contacts[touch.contact].type} in space, accepted: stretches on planes"
                 raise SolveError(Status.FAILED, detail)
 
-    def _takes_part(self, contact: str, node: str) -> bool:
+    def takes_part(self, contact: str, node: str) -> bool:
+        """Whether an obstacle can push a node."""
         stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
         return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
 
@@ -151,8 +152,8 @@ class Reviser:
         found, stops = [], obstacles_of(model)
         for touch in touches:
             for k, x in enumerate(touch.places if touch.to is not None else ()):
-                node = self.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else ""
-                if not node or self._takes_part(touch.contact, node):
+                node = self.scene.members[touch.member].node_at(x)
+                if not node or self.takes_part(touch.contact, node):
                     continue
                 place = np.asarray(self.scene.nodes[node].position, dtype=float)
                 place = place + np.pad(shift[model.nodes.index(node)], (0, 3 - model.element.axes))

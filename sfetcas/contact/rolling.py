@@ -52,8 +52,9 @@ def _rolled(held: Held) -> Iterator[tuple[int, Array, float]]:
             cut = int(np.argmin(np.abs(held.mesh.cuts[touch.member] - touch.at)))
             turn = int(model.chain(touch.member)[cut * held.mesh.order])
             yield from _resisting(held, turn, touch, touched.gap_curvature(touch), touched.push(touch))
-    for contact, node in sorted({(t.contact, _node(held, t)) for t in flat if _node(held, t)}):
-        touches = [t for t in flat if (t.contact, _node(held, t)) == (contact, node)]
+    nodes = {id(t): model.scene.members[t.member].node_at(t.at) for t in flat}
+    for contact, node in sorted({(t.contact, node) for t in flat if (node := nodes[id(t)])}):
+        touches = [t for t in flat if (t.contact, nodes[id(t)]) == (contact, node)]
         sides = _smooth(held, touches[0], node)
         turn_of_node = model.rotations.node_turn[node]
         if sides and turn_of_node is not None:
@@ -86,9 +87,3 @@ def _smooth(held: Held, touch: Touch, node: str) -> list[Touch]:
     out = [(1.0 - 2.0 * side.at) * tangent for side, tangent in zip(sides, tangents, strict=True)]
     along = np.linalg.norm(out[0] + out[1]) < LEVEL and abs(float(out[0] @ normal)) < LEVEL
     return sides if along else []
-
-
-def _node(held: Held, touch: Touch) -> str:
-    """The node where a touch is at one place, the end of its member; else nothing."""
-    nodes = held.prepared.model.scene.members[touch.member].nodes
-    return nodes[int(touch.at)] if touch.to is None and touch.at in (0.0, 1.0) else ""

@@ -184,15 +184,17 @@ class Touched:
     def _other_pushes(self, node: str, contact: str) -> Array:
         """Force (3,) of all obstacles but one that touch a node by itself, N."""
         others = [t for t in self.model.mesh.touches if t.contact != contact and t.to is None]
-        return sum((self.force(t) for t in others if self._node_at(t, t.at) == node), np.zeros(3))
+        return sum(
+            (self.force(t) for t in others if self.model.scene.members[t.member].node_at(t.at) == node), np.zeros(3)
+        )
 
     def goes_on(self, touch: Touch, at: float) -> bool:
         """Whether another stretch of the same obstacle begins where a stretch reaches the end of its member."""
         node = self.model.scene.members[touch.member].nodes[int(at)]
         for other in self.model.mesh.touches:
             if other is not touch and other.contact == touch.contact and other.to is not None:
-                nodes = self.model.scene.members[other.member].nodes
-                if any(x in (0.0, 1.0) and nodes[int(x)] == node for x in other.places):
+                member = self.model.scene.members[other.member]
+                if any(member.node_at(x) == node for x in other.places):
                     return True
         return False
 
@@ -202,12 +204,8 @@ class Touched:
         if not self.takes_part(touch.contact, node) or not self.goes_on(touch, at):
             return np.zeros(3)
         here = [t for t in self.model.mesh.touches if t.contact == touch.contact and t.to is not None]
-        first = next(t for t in here if any(self._node_at(t, x) == node for x in t.places))
+        first = next(t for t in here if any(self.model.scene.members[t.member].node_at(x) == node for x in t.places))
         return self.left_over(node, touch.contact)[1] if first is touch else np.zeros(3)
-
-    def _node_at(self, touch: Touch, x: float) -> str | None:
-        """The node at a place of a touch; None within its member."""
-        return self.model.scene.members[touch.member].nodes[int(x)] if x in (0.0, 1.0) else None
 
     def _load_between(self, member: str, begin: float, end: float) -> Array:
         """Distributed load between two places, N."""
@@ -242,7 +240,7 @@ class Touched:
         """The end of a stretch at a node that the obstacle would have to pull or to clamp; None where there is none."""
         model = self.model
         for at in touch.places if touch.to is not None else ():
-            node = model.scene.members[touch.member].nodes[int(at)] if at in (0.0, 1.0) else ""
+            node = model.scene.members[touch.member].node_at(at)
             if not node or not self.takes_part(touch.contact, node) or self.goes_on(touch, at):
                 continue
             axis = self.fields.pressed_moments(touch, np.array([at]))[1][0]

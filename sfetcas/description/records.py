@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar
 
@@ -26,6 +26,7 @@ __all__ = [
     "Turn",
     "Vector",
     "counted",
+    "enumerated",
     "listed",
     "nearest",
     "number",
@@ -54,6 +55,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
     known = sorted(known)
     close = difflib.get_close_matches(word, known, n=1)
     return f"did you mean {say(close[0])}?" if close else "accepted: " + ", ".join(map(_short, known))
+
+
+def enumerated(names: Sequence[str], kind: str = "") -> str:
+    """The first four of some names, and how many more there are; ``kind``, in the plural where need be, before them."""
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    before = f"{kind}{'s' if len(names) > 1 else ''} " if kind else ""
+    return f"{before}{', '.join(names[:4])}{more}"
 
 
 def unknown(word: str, known: Iterable[str], kind: str = "names") -> str:

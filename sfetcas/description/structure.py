@@ -173,6 +173,10 @@ class Member(Staged):
     stiffness: Stiffness | None = None
     mass: Mass | None = None
 
+    def node_at(self, x: float) -> str | None:
+        """The node at an end of a flexible or rigid member, at the fraction 0 or 1 of its length; None within it."""
+        return self.nodes[int(x)] if x in (0.0, 1.0) else None
+
     @model_validator(mode="before")
     @classmethod
     def _released(cls, values: Any) -> Any:

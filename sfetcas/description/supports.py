@@ -9,11 +9,20 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .loads import Motion
-from .records import say
+from .records import enumerated, say
 from .springs import Spring
 from .structure import SLIDING, Member, Node, unit
 
-__all__ = ["check_driven_joint", "check_floating", "check_motion", "check_motions_once", "drives", "free_to_move"]
+__all__ = [
+    "along",
+    "check_driven_joint",
+    "check_floating",
+    "check_motion",
+    "check_motions_once",
+    "drives",
+    "free_to_move",
+    "upwards",
+]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -98,18 +107,21 @@ def free_to_move(motion: str) -> str:
     return f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
 
 
+def along(direction: Floats | Sequence[float]) -> str:
+    """A direction in words."""
+    return f"[{', '.join(f'{part + 0.0:.3g}' for part in direction)}]"
+
+
+def upwards(direction: Floats) -> Floats:
+    """The same direction with its largest component above zero."""
+    return np.asarray(direction * np.sign(direction[int(np.argmax(np.abs(direction)))]))
+
+
 def _floating(part: list[str], held: Floats, free: Floats) -> str:
-    nodes = f"node{'s' if len(part) > 1 else ''} {', '.join(part[:4])}"
-    nodes += f" and {len(part) - 4} more" if len(part) > 4 else ""
+    nodes = enumerated(part, "node")
     if not len(held):
         return free_to_move(f"{nodes} moving along {', '.join('xyz'[: len(free)])} and turning")
-    return free_to_move(f"{nodes} moving along {' and '.join(map(_in_words, free))}")
-
-
-def _in_words(direction: Floats | Sequence[float]) -> str:
-    """A direction in words, its largest component above zero, without the z that a plane scene leaves out."""
-    sign = np.sign(direction[int(np.argmax(np.abs(direction)))])
-    return f"[{', '.join(f'{sign * part + 0.0:.3g}' for part in direction)}]"
+    return free_to_move(f"{nodes} moving along {' and '.join(along(upwards(direction)) for direction in free)}")
 
 
 def check_motions_once(motions: Mapping[str, Motion]) -> None:

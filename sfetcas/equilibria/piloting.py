@@ -12,7 +12,7 @@ from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
-from ..solvers.continuation import JUMPED, follow, near_factor
+from ..solvers.continuation import JUMPED, between, follow, near_factor
 from ..solvers.prepared import Prepared
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .settings import Settings
@@ -41,9 +41,6 @@ CARRIED = (
 NEAREST = (
     "the loads could not be followed from zero; this is the minimum nearest to the start guess, and there may be others"
 )
-
-MOST_CARRIED = 600
-"""Unknowns: each step where loads carry a state needs all eigenvalues of a tangent, a second at most."""
 
 TAUT = (
     "straight between places that come no closer, where an inextensible member cannot bend and takes any force; "
@@ -137,7 +134,8 @@ class Piloting(Meshing):
 
         A small share of them first, as they grow; then all of them, which is one of the equilibria.
         """
-        if self.scene.histories or pilot.equations.unknowns > MOST_CARRIED:
+        # Each step of these needs the eigenvalues.
+        if self.scene.histories or not pilot.countable:
             return None
         zero = pilot.equations.start(pilot.model.loading(0.0, 0.0))
         for share, notes in ((0.01, ()), (1.0, (CARRIED,))):
@@ -145,12 +143,7 @@ class Piloting(Meshing):
             there = pilot.downhill(zero, pilot.model.loading(begin))
             if there is None:
                 continue
-            found = self._followed(
-                pilot,
-                lambda t, begin=begin: pilot.model.loading(begin + t * (factor - begin)),
-                there.state,
-                (begin, factor),
-            )
+            found = self._followed(pilot, between(pilot.model, begin, factor), there.state, (begin, factor))
             if found is not None:
                 return replace(found, notes=(*notes, *found.notes))
         return None
@@ -204,7 +197,7 @@ class Piloting(Meshing):
         stops = [begin, *sorted(knots, reverse=end < begin), end]
         found: Found | None = None
         for a, b in zip(stops, stops[1:], strict=False):
-            part = self._followed(pilot, lambda t, a=a, b=b: pilot.model.loading(a + t * (b - a)), state, (a, b))
+            part = self._followed(pilot, between(pilot.model, a, b), state, (a, b))
             if part is None:
                 return None
             found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
@@ -222,8 +215,7 @@ class Piloting(Meshing):
                 state = pilot.leave(state, bent.stability, pilot.model.loading(begin))[0].state
             except SolveError:
                 return None
-        way = (begin, factor)
-        return self._followed(pilot, lambda t: pilot.model.loading(begin + t * (factor - begin)), state, way)
+        return self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor))
 
     def _followed(self, pilot: Prepared, way: Any, state: State, factors: tuple[float, float] | None) -> Found | None:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""

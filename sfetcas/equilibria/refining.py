@@ -50,7 +50,7 @@ HELD = 2e-9
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
-CARRIED = 0.01
+UNBALANCED = 0.01
 """Share of the loads that is out of balance without redundant multipliers: these carry it on next to nothing."""
 
 NEARLY = 1e-3
@@ -250,7 +250,7 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     which = "the smallest are given"
     if residual <= SOLVED:
         corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > CARRIED * loads > 0.0:
+    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > UNBALANCED * loads > 0.0:
         raise _stretched(equations, loose, corrected)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.

@@ -16,7 +16,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from ..mechanics.balance import SpringState
 from ..mechanics.equations import Equations, Point, State
-from ..mechanics.fields import SMALL_PULL, Fields
+from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.stability import Stability
@@ -320,6 +320,13 @@ def equilibrium(
     )
 
 
+SMALL = 0.1
+"""Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""
+
+SMALL_PULL = 0.1
+"""Axial force over ``12 EI / L^2`` up to which a small member is one: by as much it is too soft or too stiff across."""
+
+
 def _not_small(fields: Fields) -> tuple[str, ...]:
     """Notes where small members bend or are pulled beyond linear elasticity, which no error estimate sees."""
     small = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
@@ -345,7 +352,3 @@ def _not_small(fields: Fields) -> tuple[str, ...]:
             # Each is told once.
             small = [name for name in small if name not in far]
     return tuple(notes)
-
-
-SMALL = 0.1
-"""Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""

@@ -22,11 +22,7 @@ from .equations import Equations, State
 from .loading import Loading
 from .mesh import Touch
 
-__all__ = ["SMALL_PULL", "Fields", "rotations_along", "transferred"]
-
-
-SMALL_PULL = 0.1
-"""Axial force over ``12 EI / L^2`` up to which a small member is one: by as much it is too soft or too stiff across."""
+__all__ = ["Fields", "rotations_along", "transferred"]
 
 
 class Fields:
@@ -376,14 +372,19 @@ class Fields:
         scaled = {"force": force * model.scales.force, "moment": moment * model.scales.moment}
         return {"position": position, "rotation": rotation, **scaled, "curvature": line.curvatures(x)}
 
+    def _ends(self, member: str) -> tuple[Array, Array]:
+        """Where the nodes of a small member were, and where they are, (n, 3) m."""
+        model = self.model
+        names = model.scene.members[member].nodes
+        rest = np.array([model.scene.nodes[name].position for name in names], dtype=float)
+        places = [model.segments.place(model.segments.ends[member, i]) for i in range(len(names))]
+        return rest, rest + _three(self._nodal[places]) * model.scales.length
+
     def bent(self, member: str) -> float:
         """Largest displacement, over the size, and rotation of the nodes of a small member, seen from its frame."""
         model = self.model
-        names, turns = model.scene.members[member].nodes, list(model.rotations.ends[member])
-        rest = np.array([model.scene.nodes[name].position for name in names])
-        places = [model.segments.place(model.segments.ends[member, i]) for i in range(len(names))]
-        now = rest + _three(self._nodal[places]) * model.scales.length
-        turned = self.state.q[turns]
+        rest, now = self._ends(member)
+        turned = self.state.q[list(model.rotations.ends[member])]
         if not model.space:
             # From the mean angle: quaternions of angles that differ by turns would not tell their mean.
             mean = quaternion.from_rotation_vector(np.array([0.0, 0.0, turned.mean()]))
@@ -401,23 +402,19 @@ class Fields:
 
         Linear elasticity leaves out what such a force does across the member: of this share of its stiffness.
         """
-        record = self.model.scene.members[member]
+        model, record = self.model, self.model.scene.members[member]
         if len(record.nodes) != 2:
             return 0.0
-        one, two = (np.array(self.model.scene.nodes[name].position, dtype=float) for name in record.nodes)
-        length = float(np.linalg.norm(two - one))
+        rest, now = self._ends(member)
+        length, chord = float(np.linalg.norm(rest[1] - rest[0])), now[1] - now[0]
         if record.stiffness is not None:
             across = np.asarray(record.stiffness)[7:9, 7:9]
-            firm = length * float(np.linalg.eigvalsh(across)[0] if self.model.space else across[0, 0])
+            firm = length * float(np.linalg.eigvalsh(across)[0] if model.space else across[0, 0])
         else:
-            bending = self.model.scene.sections[str(record.section)].stiffness(np.array([0.5]))[0, 1:]
-            firm = 12.0 * float(np.nanmin(bending) if self.model.space else bending[1]) / length**2
-        most = float(np.abs(self.state.lam).max(initial=0.0) + np.abs(self._loading.force).sum())
-        if most * self.model.scales.force <= SMALL_PULL * firm:
-            return 0.0
-        ends = self._along_body(member, np.array([0.0, 1.0]))
-        chord = np.diff(ends["position"], axis=0)[0]
-        return float(np.abs(ends["force"] @ chord).max()) / float(np.linalg.norm(chord)) / firm
+            bending = model.scene.sections[str(record.section)].stiffness(np.array([0.5]))[0, 1:]
+            firm = 12.0 * float(np.nanmin(bending) if model.space else bending[1]) / length**2
+        forces = np.array([force for force, _ in self.balance.body_ends(member)]) * model.scales.force
+        return float(np.abs(forces @ chord).max() / np.linalg.norm(chord)) / firm
 
     def _start_forces(self, part: slice) -> Array:
         """Internal force at the start of each of consecutive elements, (elements, axes)."""

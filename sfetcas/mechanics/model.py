@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..description.records import counted
+from ..description.records import counted, enumerated
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics import quaternion
@@ -258,10 +258,6 @@ def assemble(
     )
 
 
-def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-
-
 def _blocks(model: Model) -> tuple[Block, ...]:
     """What the model consists of, and why."""
     kind = model.rotations.kind
@@ -285,5 +281,5 @@ def _blocks(model: Model) -> tuple[Block, ...]:
     for group in model.connections:
         if group.rows:
             name = type(group.kind).__name__.lower()
-            blocks.append(Block(f"{name} rows", len(group.rows), f"{_listed(group.names)}"))
+            blocks.append(Block(f"{name} rows", len(group.rows), enumerated(group.names)))
     return tuple(blocks)

@@ -16,10 +16,11 @@ import numpy as np
 from ..errors import SolveError
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
+from ..mechanics.model import Model
 from .newton import Corrected
 from .prepared import Prepared
 
-__all__ = ["JUMPED", "Followed", "follow", "near_factor"]
+__all__ = ["JUMPED", "Followed", "between", "follow", "near_factor"]
 
 STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
@@ -63,6 +64,11 @@ class Followed:
     state: State
     reached: bool
     left: tuple[float, ...]
+
+
+def between(model: Model, begin: float, end: float) -> Callable[[float], Loading]:
+    """The way from one factor to another."""
+    return lambda t: model.loading(begin + t * (end - begin))
 
 
 def near_factor(factor: float) -> str:

@@ -11,17 +11,18 @@ Source: Maxwell 1864 and Calladine 1978 (counting), here by rank; theory of mech
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..description.records import enumerated
+from ..description.supports import along, upwards
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from .newton import loose_rows, rows_in
 
-__all__ = ["Diagnosis", "along", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
+__all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
 SOFT = 1e-7
 """Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing."""
@@ -165,11 +166,11 @@ def in_words(equations: Equations, motion: Array) -> str:
     moving = [name for name, moves in zip(model.nodes, moved, strict=True) if moves]
     slid = _slid(equations, places)
     sliding = [name for name, travel in slid.items() if np.linalg.norm(travel) > least]
-    words = [f"{_listed('member', turning)} turning"] if turning else []
+    words = [f"{enumerated(turning, 'member')} turning"] if turning else []
     words += (
-        [f"{_listed('member', sliding)} sliding{_together(np.array([slid[n] for n in sliding]))}"] if sliding else []
+        [f"{enumerated(sliding, 'member')} sliding{_together(np.array([slid[n] for n in sliding]))}"] if sliding else []
     )
-    words += [f"{_listed('node', moving)} moving{_together(travels[moved])}"] if moving else []
+    words += [f"{enumerated(moving, 'node')} moving{_together(travels[moved])}"] if moving else []
     return " with ".join(words) or "a rotation that nothing is joined to"
 
 
@@ -184,29 +185,19 @@ def _slid(equations: Equations, travels: Array) -> dict[str, Array]:
     return found
 
 
-def _listed(kind: str, names: list[str]) -> str:
-    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
-    return f"{kind}{'s' if len(names) > 1 else ''} {', '.join(names[:4])}{more}"
-
-
 def _alike(travels: Array) -> Array | None:
     """The direction of nodes that travel alike, its largest component above zero; None of others."""
     size = float(np.linalg.norm(travels[0]))
     if np.abs(travels - travels[0]).max() > ALIKE * size or size < ALIKE:
         return None
     direction = np.where(np.abs(travels[0]) > ALIKE * size, travels[0] / size, 0.0)
-    return np.asarray(direction * np.sign(direction[np.argmax(np.abs(direction))]))
+    return upwards(direction)
 
 
 def _together(travels: Array) -> str:
     """The direction in words, where all travel alike."""
     direction = _alike(travels)
     return "" if direction is None else f" along {along(direction)}"
-
-
-def along(direction: Sequence[float] | Array) -> str:
-    """A direction in words."""
-    return f"[{', '.join(f'{part + 0.0:.3g}' for part in direction)}]"
 
 
 ALIKE = 1e-6

@@ -152,12 +152,17 @@ class Prepared:
 
     def diverged(self, found: Corrected) -> int | None:
         """Real eigenvalues of the tangent below zero, loads without potential; None where it is too large for them."""
-        return self._tangent.below(found.point) if self.equations.unknowns <= MOST_COUNTED else None
+        return self._tangent.below(found.point) if self.countable else None
+
+    @property
+    def countable(self) -> bool:
+        """Whether all eigenvalues of a tangent, without a potential, are found in less than a second."""
+        return self.equations.unknowns <= MOST_COUNTED
 
     @property
     def leaves(self) -> bool:
         """Whether unstable states can be left: there is an energy and, where its value is not known, not too much."""
-        return self.model.minimisable or (self.model.conservative and self.equations.unknowns <= MOST_COUNTED)
+        return self.model.minimisable or (self.model.conservative and self.countable)
 
     def spectrum(self, found: Corrected, count: int) -> tuple[Array, Array]:
         """Eigenvalues and lowest shapes at a state, see :meth:`StabilityTest.spectrum`."""
