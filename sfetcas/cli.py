@@ -234,10 +234,10 @@ def _report_path(path: Course) -> None:
                 str(stable), "neutral"
             )
             where = f"from factor {ends[0]} to {ends[1]}" if len(ends) > 1 else f"at factor {ends[0]}"
-            # A closed branch ends where it begins.
-            print(
-                f"  {kind} {'all along' if len(ends) == 1 and (first, last) == (0, len(branch.points) - 1) else where}"
-            )
+            if len(ends) == 1 and (first, last) == (0, len(branch.points) - 1):
+                # A closed branch ends where it begins.
+                where = "all along"
+            print(f"  {kind} {where}")
         _report_events(branch, counts)
     if path.error_estimate is not None:
         print(f"  estimated error along it {path.error_estimate:.1e}")

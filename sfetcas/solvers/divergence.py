@@ -109,11 +109,10 @@ class TangentTest:
         equations = self._equations
         turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
         tangent, limit, _ = self._tangent(point)
-        values = self._eigenvalues(tangent)
+        values, vectors = np.linalg.eig(tangent)
         negative = int((values.real < -limit).sum())
         if not negative:
             return Stability("not defined", 0, 0.0, np.zeros(turning), nothing)
-        values, vectors = np.linalg.eig(tangent)
         lowest = int(np.argmin(values.real))
         shape = vectors[:, lowest] / self._root
         quotient = float(values[lowest].real) / self._size(shape)
