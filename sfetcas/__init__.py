@@ -18,7 +18,7 @@ large motion, Part 1.
 from .analyses import solve
 from .checks import check
 from .description.contacts import Contact
-from .description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
+from .description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene, Until
 from .description.scenefile import dump, load
 from .description.sections import CrossSection, Polynomial, Table
 from .description.shapes import Arc, Curvature, Helix, Spline, Straight
@@ -74,6 +74,7 @@ __all__ = [
     "Status",
     "Straight",
     "Table",
+    "Until",
     "assemble",
     "check",
     "dump",

@@ -37,6 +37,7 @@ TABLES = {
     "history": "History",
     "contact": "Contact",
     "analysis": "Analysis",
+    "analysis, until": "Until",
     "expect": "Expect",
 }
 """What the README calls the records."""
@@ -119,7 +120,7 @@ def test_row_gives_the_default(table, key):
 @each
 def test_row_says_in_a_line_what_is_meant_and_all_that_is_accepted(table, key):
     meaning, _ = ROWS[table, key]
-    words = set(re.findall(r"`\"?(\w+)", meaning))
+    words = set(re.findall(r"`\"?([\w-]+)", meaning))
     assert meaning
     assert choices(field_of(table, key).annotation) <= words
 

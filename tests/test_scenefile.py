@@ -197,7 +197,6 @@ def test_a_byte_order_mark_and_windows_lines_are_read(tmp_path):
         ("scene.json", b'{"gravity": [0, NaN]}', "gravity: found nan, accepted: a finite number"),
         ("scene.toml", b"title = 1979-05-27", "title: found datetime.date(1979, 5, 27), accepted: a text"),
         ("scene.toml", b"gravity = [0, 07:32:00]", "gravity: found datetime.time(7, 32), accepted: a number"),
-        ("scene.toml", b"rotating = [0, 0, 1]", "rotating: rotating axes are not available yet"),
     ],
 )
 def test_files_that_are_refused(tmp_path, name, content, sentence):

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .later import Staged
-from .records import Direction, Positive, Vector, listed, say
+from .records import Direction, Positive, Record, Vector, listed, say
 
 __all__ = ["Contact"]
 
@@ -35,7 +34,7 @@ def _side(value: Any) -> Any:
     return value
 
 
-class Contact(Staged):
+class Contact(Record):
     """A frictionless obstacle; its forces push members away and never hold them.
 
     Parameters

@@ -31,13 +31,17 @@ def out_of_plane(
     gravity: Triple | None,
     members: Mapping[str, Member],
     contacts: Mapping[str, Contact],
+    rotating: Triple | None,
 ) -> Finding | None:
     """The place of the first thing out of x-y with what it does there; None where all lies in it."""
     if gravity is not None and _leaves(gravity):
         return ("gravity",), "has a z component"
+    if rotating is not None and _turns_out(rotating):
+        return ("rotating",), "is not along z"
     findings = (
         _nodes(nodes),
         _members(lines),
+        _spins(members),
         _loads(loads, lines),
         _motions(motions),
         _springs(springs),
@@ -54,6 +58,8 @@ def _nodes(nodes: Mapping[str, Node]) -> Iterator[Finding]:
             point = getattr(node, key)
             if point is not None and abs(point[2]) > _ROUNDING * size:
                 yield ("nodes", name, key), "has a z component"
+        if node.velocity is not None and _leaves(node.velocity):
+            yield ("nodes", name, "velocity"), "has a z component"
         if node.axis2 is not None:
             yield ("nodes", name, "axis2"), "makes a joint that turns about two axes"
         if node.direction is not None and _leaves(node.direction):
@@ -73,6 +79,12 @@ def _members(lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
             yield ("members", name, "shape"), "twists"
         else:
             yield ("members", name, "b2"), "is neither along z nor in x-y"
+
+
+def _spins(members: Mapping[str, Member]) -> Iterator[Finding]:
+    for name, member in members.items():
+        if isinstance(member.spin, tuple) and _turns_out(member.spin):
+            yield ("members", name, "spin"), "is not about z"
 
 
 def _cylindrical(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator[Finding]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import model_validator
 
 from ..errors import SceneError
-from .later import Staged
 from .records import Fraction, Numbers, Record, Turn, Vector, say
 from .sections import Varying
 
@@ -66,12 +66,60 @@ class History(Record):
             return sum(c * x**k for k, c in enumerate(self.polynomial[i]))
         return self._value(i) * (1.0 - x) + self._value(i + 1) * x
 
+    def rate(self, t: float, side: Literal[-1, 1] = 1) -> float:
+        """The derivative of the factor at t, zero outside of the history.
+
+        Parameters
+        ----------
+        t : s
+        side : 1 just after t, -1 just before; they differ at most at the numbers of the key ``t``
+
+        Returns
+        -------
+        rate : 1/s
+        """
+        i = (bisect_right(self.t, t) if side > 0 else bisect_left(self.t, t)) - 1
+        if not 0 <= i < len(self.t) - 1:
+            return 0.0
+        span = self.t[i + 1] - self.t[i]
+        x = (t - self.t[i]) / span
+        return sum(k * c * x ** (k - 1) for k, c in enumerate(self._terms(i)) if k) / span
+
+    def jumps(self) -> Iterator[tuple[float, float, float]]:
+        """Where the factor or its rate jumps by more than rounding: t, jump of the factor, jump of the rate in 1/s.
+
+        A history jumps at its ends too where its rate there is not zero, as it is constant outside.
+        """
+        last = len(self.t) - 1
+        terms = [self._terms(i) for i in range(last)]
+        spans = [self.t[i + 1] - self.t[i] for i in range(last)]
+        sizes = [sum(map(abs, term)) for term in terms]
+        slopes = [sum(k * abs(c) for k, c in enumerate(term)) / span for term, span in zip(terms, spans, strict=True)]
+        for i, t in enumerate(self.t if last else ()):
+            beside = slice(max(i - 1, 0), i + 1)
+            step = terms[i][0] - sum(terms[i - 1]) if 0 < i < last else 0.0
+            kink = self.rate(t, 1) - self.rate(t, -1)
+            step = step if abs(step) > ROUNDING * max(sizes[beside]) else 0.0
+            kink = kink if abs(kink) > ROUNDING * max(slopes[beside]) else 0.0
+            if step or kink:
+                yield t, step, kink
+
+    def _terms(self, i: int) -> tuple[float, ...]:
+        """Coefficients of the interval i in the fraction of it."""
+        if self.polynomial is not None:
+            return self.polynomial[i]
+        return self._value(i), self._value(i + 1) - self._value(i)
+
     def _value(self, i: int) -> float:
         assert self.value is not None
         return self.value[i]
 
 
-class Load(Staged):
+ROUNDING = 1e-9
+"""Of the sizes beside it: a smaller jump is the rounding of coefficients that were written with ten digits."""
+
+
+class Load(Record):
     """A force, a moment or a distributed force.
 
     Parameters

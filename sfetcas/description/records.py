@@ -33,6 +33,7 @@ __all__ = [
     "plain",
     "say",
     "sentence",
+    "turn",
     "unknown",
 ]
 
@@ -128,7 +129,14 @@ def _vector(value: Any, accepted: str = "[x, y] or [x, y, z]") -> tuple[float, f
     return (entries[0], entries[1], entries[2] if len(entries) == 3 else 0.0)
 
 
-def _turn(value: Any) -> float | tuple[float, float, float]:
+def turn(value: Any) -> float | tuple[float, float, float]:
+    """A finite number as a float, or a vector as its three.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
     scalar = isinstance(value, (int, float)) or getattr(value, "shape", None) == ()
     return number(value) if scalar else _vector(value, "a number, [x, y] or [x, y, z]")
 
@@ -174,7 +182,7 @@ Vector = Annotated[tuple[float, float, float], BeforeValidator(_vector)]
 Direction = Annotated[tuple[float, float, float], BeforeValidator(_vector), AfterValidator(_direction)]
 """A vector of any length but zero."""
 
-Turn = Annotated[float | tuple[float, float, float], BeforeValidator(_turn)]
+Turn = Annotated[float | tuple[float, float, float], BeforeValidator(turn)]
 """A moment or a rotation: a number, about the axis that its place has, or a vector in the fixed axes."""
 
 Fraction = Annotated[float, BeforeValidator(number), AfterValidator(_fraction)]

@@ -15,17 +15,17 @@ from ..errors import SceneError
 from ..mathematics.quaternion import matrix
 from .contacts import Contact
 from .dimension import out_of_plane
-from .later import Staged
 from .loads import History, Load, Motion
 from .matrices import check_rigid_motion
+from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
 from .obstacles import check_start, members_of, obstacle
-from .records import Named, Vector, say, unknown
+from .records import Named, Record, Vector, say, unknown
 from .sections import CrossSection
 from .shapes import CenterLine, place
 from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
-from .task import Analysis, Expect
+from .task import Analysis, Expect, Until
 
 __all__ = [
     "Analysis",
@@ -38,11 +38,12 @@ __all__ = [
     "Node",
     "Scene",
     "Spring",
+    "Until",
     "check_loaded",
 ]
 
 
-class Scene(Staged):
+class Scene(Record):
     """Flexible members between nodes, how they are held, loaded and moved, and what is asked for.
 
     Parameters
@@ -50,6 +51,7 @@ class Scene(Staged):
     title, source : free text
     dimension : plane (x-y), space, or auto: plane where everything lies in x-y
     gravity : (3,), m/s2, fixed axes
+    rotating : (3,), rad/s - the axes turn with this about the origin, and the answers are in them
     sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only
     analysis : what is asked for
     expect : what is known about the answer
@@ -76,6 +78,7 @@ class Scene(Staged):
     source: str = ""
     dimension: Literal["auto", "plane", "space"] = "auto"
     gravity: Vector | None = None
+    rotating: Vector | None = None
     sections: Named[CrossSection] = Field(default_factory=dict)
     nodes: Named[Node] = Field(default_factory=dict)
     members: Named[Member] = Field(default_factory=dict)
@@ -140,6 +143,7 @@ class Scene(Staged):
             self.gravity,
             self.members,
             self.contacts,
+            self.rotating,
         )
 
 
@@ -162,11 +166,14 @@ def check_loaded(scene: Scene) -> None:
     Raises
     ------
     SceneError
-        There is no load, no motion, no gravity and no spring that is not at rest.
+        There is no load, no motion, no gravity, no turning of the axes and no spring that is not at rest.
     """
+    if scene.analysis.type in ("modes", "dynamic"):
+        return
     pressed = any(spring.rest or spring.length is not None for spring in scene.springs.values())
-    if not scene.loads and not scene.motions and scene.gravity is None and not pressed:
-        raise SceneError("scene without load: statics needs at least one load, one motion or gravity")
+    everywhere = scene.gravity is not None or scene.rotating is not None
+    if not scene.loads and not scene.motions and not everywhere and not pressed:
+        raise SceneError("scene without load: statics needs at least one load, one motion, gravity or turning axes")
 
 
 def _check_driven(scene: Scene) -> None:
@@ -250,19 +257,34 @@ def _check_sections(scene: Scene) -> None:
     for name, member in scene.members.items():
         missing = [] if member.section is None else list(scene.sections[member.section].missing(_needed(scene, name)))
         if missing:
-            why = f"members.{name} needs it in {scene.resolved_dimension} ({scene.dimension_reason})"
-            if missing[0] == "rhoA":
-                why = "gravity acts on the mass per length"
-            raise SceneError(f"the key {missing[0]!r} is missing: {why}", ("sections", str(member.section)))
-        if member.stiffness is not None and member.mass is None and scene.gravity is not None:
-            raise SceneError("the key 'mass' is missing: gravity acts on the member", ("members", name))
+            key, why = missing[0], f"members.{name} needs it in {scene.resolved_dimension} ({scene.dimension_reason})"
+            if key == "rhoA":
+                outlined = scene.sections[str(member.section)].shape is not None
+                key, why = "rho" if outlined else key, _need_of_mass(scene, f"members.{name}", "the mass per length")
+            raise SceneError(f"the key {key!r} is missing: {why}", ("sections", str(member.section)))
+        if member.stiffness is not None and member.mass is None and _massive(scene):
+            why = _need_of_mass(scene, "the member", "the member")
+            raise SceneError(f"the key 'mass' is missing: {why}", ("members", name))
+    if scene.analysis.moves or scene.rotating is not None:
+        check_masses(scene.nodes, scene.members, scene.sections)
+
+
+def _massive(scene: Scene) -> bool:
+    """Whether masses count."""
+    return scene.gravity is not None or scene.rotating is not None or scene.analysis.moves
+
+
+def _need_of_mass(scene: Scene, what: str, mass: str) -> str:
+    if scene.gravity is not None:
+        return f"gravity acts on {mass}"
+    return f"{what} moves" if scene.analysis.moves else f"turning axes act on {mass}"
 
 
 def _needed(scene: Scene, member: str) -> tuple[str, ...]:
     in_plane = ("EI3",) if scene.center_lines[member].bending_axis == 3 else ("EI2",)
     stiffness = in_plane if scene.resolved_dimension == "plane" else ("EI2", "EI3", "GJ")
     needed: tuple[str, ...] = () if scene.members[member].type == "rigid" else stiffness
-    return needed if scene.gravity is None else (*needed, "rhoA")
+    return (*needed, "rhoA") if _massive(scene) else needed
 
 
 def _check_bodies(scene: Scene) -> None:
@@ -340,9 +362,22 @@ def _check_motions(scene: Scene) -> None:
 
 
 def _check_supports(scene: Scene) -> None:
-    # What obstacles hold is known when it is found where members touch them.
-    if not scene.contacts:
+    # What obstacles hold is known when it is found where members touch them; what moves needs no support, but for an
+    # equilibrium that it begins with.
+    free = scene.analysis.type in ("modes", "dynamic") and scene.analysis.initial == "undeformed"
+    if not scene.contacts and not free:
         check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+
+
+def _check_moving(scene: Scene) -> None:
+    analysis = scene.analysis
+    space = f"the scene is in space ({scene.dimension_reason})" if scene.resolved_dimension == "space" else None
+    check_velocities(scene.nodes, scene.members, scene.motions, analysis, space)
+    check_beginning(analysis, scene.nodes, scene.loads)
+    if analysis.type in ("modes", "dynamic"):
+        check_no_contact(analysis, scene.contacts, scene.springs)
+    if analysis.type == "dynamic":
+        check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories)
 
 
 def _check_contacts(scene: Scene) -> None:
@@ -380,7 +415,8 @@ def _check_contacts(scene: Scene) -> None:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
 
-def _check_expect(scene: Scene) -> None:
+def _check_quantity(scene: Scene, quantity: str, *where: str) -> None:
+    """Refuse a place in the answer with a name that the scene does not have."""
     tables = {
         "nodes": scene.nodes,
         "reactions": scene.nodes,
@@ -389,20 +425,41 @@ def _check_expect(scene: Scene) -> None:
         "motions": scene.motions,
         "contacts": scene.contacts,
     }
+    kind, _, rest = quantity.partition(".")
+    if kind in tables:
+        _known(rest.partition(".")[0], tables[kind], kind, *where, "quantity")
+
+
+_ANSWERS = {
+    "step": ("static", "path", "modes"),
+    "time": ("dynamic",),
+    "crossing": ("path",),
+    "limit_point": ("path",),
+    "bifurcation": ("path",),
+    "flutter_point": ("path",),
+}
+"""Types of the analysis that have an answer of this kind."""
+
+
+def _check_expect(scene: Scene) -> None:
+    if scene.analysis.until is not None:
+        _check_quantity(scene, scene.analysis.until.quantity, "analysis", "until")
     for i, expect in enumerate(scene.expect):
         if expect.equilibrium is not None and scene.analysis.equilibria != "all":
             message = "found with analysis.equilibria = 'one', accepted: with analysis.equilibria = 'all'"
             raise SceneError(message, ("expect", str(i), "equilibrium"))
-        kind, _, rest = expect.quantity.partition(".")
-        if kind in tables:
-            _known(rest.partition(".")[0], tables[kind], kind, "expect", str(i), "quantity")
+        _check_quantity(scene, expect.quantity, "expect", str(i))
+        for key, types in _ANSWERS.items():
+            if getattr(expect, key) is not None and scene.analysis.type not in types:
+                accepted = " or ".join(map(repr, types))
+                message = f"found the analysis {scene.analysis.type!r}, accepted: {accepted} with this key"
+                raise SceneError(message, ("expect", str(i), key))
+        if expect.time is not None and not 0.0 <= expect.time <= scene.analysis.duration:
+            accepted = f"from 0 to the end of the analysis at {scene.analysis.duration:g} s"
+            raise SceneError(f"found {expect.time:g} s, accepted: {accepted}", ("expect", str(i), "time"))
         if expect.step is not None and not any(math.isclose(expect.step, f) for f in scene.analysis.steps):
             accepted = f"a factor of analysis.steps, {say(scene.analysis.steps)}"
             raise SceneError(f"found {expect.step:g}, accepted: {accepted}", ("expect", str(i), "step"))
-        for key in ("crossing", "limit_point", "bifurcation"):
-            if getattr(expect, key) is not None and scene.analysis.type != "path":
-                message = f"found the analysis {scene.analysis.type!r}, accepted: 'path' with this key"
-                raise SceneError(message, ("expect", str(i), key))
 
 
 _RULES: tuple[Callable[[Scene], None], ...] = (
@@ -418,6 +475,7 @@ _RULES: tuple[Callable[[Scene], None], ...] = (
     _check_springs,
     _check_motions,
     _check_supports,
+    _check_moving,
     _check_contacts,
     _check_expect,
 )

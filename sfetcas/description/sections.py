@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BeforeValidator, TypeAdapter, model_validator
 
 from ..errors import SceneError
-from .records import Number, Numbers, Record, say
+from .records import NotNegative, Number, Numbers, Record, say
 
-__all__ = ["CrossSection", "Polynomial", "Table", "Varying", "breaks", "evaluate"]
+__all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,14 @@ class Polynomial(Record):
 _NUMBER: TypeAdapter[float] = TypeAdapter(Number)
 
 
-def _varying(value: Any) -> Any:
+def quantity(value: Any) -> Any:
+    """A quantity along a member from what stands for it: a number, a table of a file, or a record.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
     if isinstance(value, (Table, Polynomial)):
         return value
     if isinstance(value, Mapping) and "polynomial" in value:
@@ -79,7 +86,7 @@ def _varying(value: Any) -> Any:
 
 
 Quantity = float | Table | Polynomial
-Varying = Annotated[Quantity, BeforeValidator(_varying)]
+Varying = Annotated[Quantity, BeforeValidator(quantity)]
 """A quantity along a member: a number, a :class:`Table` or a :class:`Polynomial`."""
 
 
@@ -225,7 +232,7 @@ _DIMENSIONS = ("width", "height", "radius", "outer", "inner")
 class CrossSection(Record):
     """Stiffness and mass of a member per length, as numbers or as a shape with a material.
 
-    Each quantity but nu may vary along the member (a :class:`Table` or a :class:`Polynomial`).
+    Each quantity but nu, damping and drag may vary along the member (a :class:`Table` or a :class:`Polynomial`).
 
     Parameters
     ----------
@@ -237,6 +244,11 @@ class CrossSection(Record):
         Mass per length.
     rhoI : (3,) kg m
         Rotary inertia per length about b1, b2, b3; zero where it is left out.
+    damping : s
+        Retardation time of Kelvin and Voigt: moments are stiffness times (strain + damping times its rate), in
+        bending and twist.
+    drag : N s/m2
+        Force per length against the velocity.
     shape : rectangle (width along b3, height along b2), circle (radius) or tube (outer, inner radius), in m
     E, G : N/m2
         Young's and shear modulus.
@@ -257,6 +269,8 @@ class CrossSection(Record):
     GJ: Above | None = None
     rhoA: Above | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
+    damping: NotNegative = 0.0
+    drag: NotNegative = 0.0
     shape: Literal["rectangle", "circle", "tube"] | None = None
     E: Above | None = None
     nu: Annotated[Number, AfterValidator(_poisson)] | None = None

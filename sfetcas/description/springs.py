@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .later import Staged
-from .records import Direction, Number, Vector, listed, number, say
+from .records import Direction, NotNegative, Number, Record, Vector, listed, number, say
 
 __all__ = ["Spring"]
 
@@ -36,7 +35,7 @@ def _stop(value: Any) -> tuple[float, float]:
     return entries[0], entries[1]
 
 
-class Spring(Staged):
+class Spring(Record):
     """A rotational spring at a node, or a translational one between two nodes or a node and the ground.
 
     Parameters
@@ -53,6 +52,8 @@ class Spring(Staged):
     anchor : (3,), m - where it is fixed to the ground; left out: the place of the node in the undeformed scene
     length : m - free length of a translational spring; left out: the distance in the undeformed scene
     direction : (3,), fixed axes - a translational spring that acts along this direction only
+    damping : N m s/rad, or N s/m of a translational one - gives a moment or force against the rate of its angle, travel
+        or length
     stop : [low, high], rad, or m of a spring with a direction - the angle or travel goes no further; statics only
     """
 
@@ -66,6 +67,7 @@ class Spring(Staged):
     anchor: Vector | None = None
     length: Annotated[float, BeforeValidator(_stiffness)] | None = None
     direction: Direction | None = None
+    damping: NotNegative = 0.0
     stop: Annotated[tuple[float, float], BeforeValidator(_stop)] | None = None
 
     @model_validator(mode="after")

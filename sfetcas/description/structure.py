@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .later import Staged
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
-from .records import Direction, NotNegative, Vector, counted, listed, say
+from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn
+from .sections import Polynomial, Quantity, Table, quantity
 from .shapes import Shape, Straight
 
 __all__ = ["SLIDING", "Member", "Node", "released", "unit"]
@@ -44,6 +44,23 @@ def _ends(value: Any) -> tuple[Any, ...]:
     return entries
 
 
+def _spin(value: Any) -> Any:
+    if isinstance(value, (Mapping, Table, Polynomial)):
+        return quantity(value)
+    if isinstance(value, str):
+        accepted = "a number, [x, y, z], {at = [..], value = [..]} or {polynomial = [..]}"
+        raise ValueError(f"found {say(value)}, accepted: {accepted}")
+    return turn(value)
+
+
+def _inertia(value: Any) -> tuple[float, ...]:
+    accepted = "three numbers of zero or above, about x, y and z"
+    entries = tuple(number(entry) for entry in listed(value, accepted))
+    if len(entries) != 3 or min(entries) < 0.0:
+        raise ValueError(f"found {say(entries)}, accepted: {accepted}")
+    return entries
+
+
 def _weld(value: Any) -> Any:
     return "rigid" if value == "weld" else value
 
@@ -58,9 +75,10 @@ Release = Literal["rigid", "hinge", "ball", "universal", "slider", "cylindrical"
 SLIDING = ("slider", "cylindrical", "slot")
 """Releases whose end slides along its node."""
 Count = Annotated[int, BeforeValidator(_count)]
+Spin = Annotated[Quantity | tuple[float, float, float], BeforeValidator(_spin)]
 
 
-class Node(Staged):
+class Node(Record):
     """A point where members end, are joined and are held.
 
     Parameters
@@ -77,8 +95,10 @@ class Node(Staged):
     joint : how the member ends are joined: rigid (or weld), hinge (about axis), ball or universal; but for the
         first case each end turns against every other and the node has no rotation of its own
     mass : kg, lumped in the node; has weight where there is gravity
-    inertia : (3,), kg m2, of the lumped mass; for dynamics
+    inertia : (3,), kg m2 - of the lumped mass about x, y, z through the node; for dynamics, with a rigid joint only
     start : (3,), m, fixed axes - roughly where the node ends up, as a first guess
+    velocity : (3,), m/s, fixed axes - dynamics, at t = 0; left out: what follows from the others, or zero
+    drag : N s/m - gives a force against the velocity of the node
     """
 
     position: Vector
@@ -89,8 +109,10 @@ class Node(Staged):
     rotation: Literal["fixed", "hinge", "ball"] = "fixed"
     joint: Turning = "rigid"
     mass: NotNegative = 0.0
-    inertia: Vector | None = None
+    inertia: Annotated[tuple[float, float, float], BeforeValidator(_inertia)] | None = None
     start: Vector | None = None
+    velocity: Vector | None = None
+    drag: NotNegative = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Node:
@@ -101,6 +123,9 @@ class Node(Staged):
                 f"found {self.rotation!r}, accepted: only for a slider, and the support is {self.support!r}",
                 ("rotation",),
             )
+        if self.inertia is not None and self.joint != "rigid":
+            message = f"the node has no rotation of its own, as its joint is a {self.joint}"
+            raise SceneError(message, ("inertia",))
         return self
 
     @property
@@ -139,7 +164,7 @@ class Node(Staged):
         return self.direction if cylindrical and self.direction is not None else self.axis
 
 
-class Member(Staged):
+class Member(Record):
     """A member between nodes: a flexible inextensible beam, a rigid body, or a body of small deformation.
 
     Parameters
@@ -160,6 +185,8 @@ class Member(Staged):
         b2, b3 at its start; or the name of a file, .npz (array ``stiffness``, or the only one) or Matrix Market;
         in a scene file relative to its folder
     mass : (6 n, 6 n), kg, kg m, kg m2 - of a small member, in the same way; for its weight and for dynamics
+    spin : rad/s - dynamics, at t = 0: angular velocity of the sections along the member, in a plane scene about z,
+        constant or varying; or (3,), fixed axes, the same along the member
     """
 
     nodes: Annotated[tuple[str, ...], BeforeValidator(_ends)]
@@ -172,6 +199,7 @@ class Member(Staged):
     release: Annotated[tuple[Release, ...], BeforeValidator(_welds)] = ("rigid", "rigid")
     stiffness: Stiffness | None = None
     mass: Mass | None = None
+    spin: Spin | None = None
 
     def node_at(self, x: float) -> str | None:
         """The node at an end of a flexible or rigid member, at the fraction 0 or 1 of its length; None within it."""

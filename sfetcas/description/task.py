@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .later import Staged
-from .records import Fraction, Number, Numbers, number, say
+from .records import Fraction, Number, Numbers, Positive, Record, listed, number, say
 
-__all__ = ["Analysis", "Expect", "checked_accuracy"]
+__all__ = ["Analysis", "Expect", "Until", "checked_accuracy"]
 
 FINEST = 1e-14
 """Accuracy that can be asked for: rounding leaves 4e-16 to 5e-15 of the size between one mesh and the next."""
@@ -35,19 +34,45 @@ def _tolerance(value: float) -> float:
     return value
 
 
-def _whole(value: Any, least: int) -> int:
-    found = number(value)
-    if found != int(found) or not least <= found <= MOST_POINTS:
-        raise ValueError(f"found {say(value)}, accepted: a whole number from {least} to {MOST_POINTS}")
-    return int(found)
-
-
 MOST_POINTS = 100_000
 """Points of a path, and with them everything that is counted along one."""
+
+
+def _whole(value: Any, least: int, most: int = MOST_POINTS) -> int:
+    found = number(value)
+    if found != int(found) or not least <= found <= most:
+        raise ValueError(f"found {say(value)}, accepted: a whole number from {least} to {most}")
+    return int(found)
+
 
 Points = Annotated[int, BeforeValidator(lambda value: _whole(value, 2))]
 Bends = Annotated[int, BeforeValidator(lambda value: _whole(value, 0))]
 Count = Annotated[int, BeforeValidator(lambda value: _whole(value, 1))]
+Component = Annotated[int, BeforeValidator(lambda value: _whole(value, 0, 2))]
+Names = Annotated[tuple[str, ...], BeforeValidator(lambda value: listed(value, "a list of names"))]
+
+MOST_ANSWERS = 1_000_000
+"""Answers of a motion: more fill the memory of a computer."""
+
+USUAL_MODES = 8
+"""Modes that are looked for where their number is left out."""
+
+_TYPES = {
+    "steps": ("static", "path"),
+    "range": ("path",),
+    "points": ("path",),
+    "branches": ("path",),
+    "modes": ("modes", "path"),
+    "end": ("dynamic",),
+    "output": ("dynamic",),
+    "step": ("dynamic",),
+    "integrator": ("dynamic",),
+    "initial": ("dynamic",),
+    "cut": ("dynamic",),
+    "release": ("dynamic",),
+    "until": ("dynamic",),
+}
+"""Types of the analysis with which a key has a meaning."""
 
 
 def _range(value: tuple[float, ...]) -> tuple[float, float]:
@@ -65,12 +90,35 @@ def _expected(value: Any) -> Any:
     return value
 
 
-class Analysis(Staged):
+class Until(Record):
+    """What ends a motion before its time: a quantity that passes a value.
+
+    Parameters
+    ----------
+    quantity : place in the answer, as ``nodes.tip.position``
+    component : 0, 1 or 2 - of a vector; left out for what is one number
+    above, below : in the unit of the quantity - one of them: the motion ends when the quantity gets beyond it
+    """
+
+    quantity: str
+    component: Component | None = None
+    above: Number | None = None
+    below: Number | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Until:
+        if (self.above is None) == (self.below is None):
+            raise SceneError("accepted: either above or below, one of them")
+        return self
+
+
+class Analysis(Record):
     """What is asked for.
 
     Parameters
     ----------
-    type : static, or path: the equilibria from factor 0 on, through limit points
+    type : static; path: the equilibria from factor 0 on, through limit points; modes: small vibrations about the
+        equilibrium of the loads (factor 1); or dynamic: the motion in time
     accuracy : wanted error of the positions relative to the size of the scene, 1e-14 to 0.1
     steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
     unstable : leave an unstable equilibrium for a stable one, or stay there
@@ -81,11 +129,21 @@ class Analysis(Staged):
         both sides, each for so many points; their answers stand after those of the path, in the order of the
         bifurcations and of the sides 1 and -1.  0, the default, stays on the path.  Where several eigenvalues
         vanish at once the first shape is taken; ``switch`` takes others
+    modes : so many of the lowest, 8 where left out; of a path at each of its points, where left out none
+    end : s - dynamic: the motion is followed from 0 to this time
+    output : s - dynamic: spacing of the answers, left out: chosen by the steps in time
+    step : s - dynamic: fixed step in time, left out: chosen by the accuracy
+    integrator : dynamic: how steps in time are made, left out: chosen
+    initial : dynamic: the motion begins undeformed, or at rest in the equilibrium of the loads and motions as their
+        histories give them at t = 0 (factor 1 where there is none)
+    cut : dynamic: names of loads that act in that equilibrium only
+    release : dynamic: names of nodes whose support holds in that equilibrium only
+    until : dynamic: what ends the motion earlier
 
     On a path each crossing of a factor of ``steps`` is an answer, in the order in which they are met.
     """
 
-    type: Literal["static", "path"] = "static"
+    type: Literal["static", "path", "modes", "dynamic"] = "static"
     accuracy: Annotated[Number, AfterValidator(checked_accuracy)] = 1e-4
     steps: Numbers = (1.0,)
     unstable: Literal["leave", "stay"] = "leave"
@@ -93,6 +151,15 @@ class Analysis(Staged):
     range: Annotated[Numbers, AfterValidator(_range)] | None = None
     points: Points = 200
     branches: Bends = 0
+    modes: Count | None = None
+    end: Positive | None = None
+    output: Positive | None = None
+    step: Positive | None = None
+    integrator: Literal["radau-3", "radau-2", "generalised-alpha", "conserving", "idas"] | None = None
+    initial: Literal["undeformed", "equilibrium"] = "undeformed"
+    cut: Names = ()
+    release: Names = ()
+    until: Until | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Analysis:
@@ -102,11 +169,29 @@ class Analysis(Staged):
             raise SceneError(
                 "found 'all', accepted: 'one' on a path; its branches are the key 'branches'", ("equilibria",)
             )
-        if self.type != "path":
-            for key in ("range", "points", "branches"):
-                if key in self.model_fields_set:
-                    raise SceneError(f"found type {self.type!r}, accepted: type 'path' with this key", (key,))
+        if self.type in ("modes", "dynamic") and self.equilibria == "all":
+            raise SceneError(f"found 'all', accepted: 'one' with type {self.type!r}", ("equilibria",))
+        for key, types in _TYPES.items():
+            if key in self.model_fields_set and self.type not in types:
+                accepted = " or ".join(map(repr, types))
+                raise SceneError(f"found type {self.type!r}, accepted: type {accepted} with this key", (key,))
+        if self.type == "dynamic":
+            self._check_times()
         return self
+
+    def _check_times(self) -> None:
+        if self.end is None:
+            raise SceneError("the key 'end' is missing: a motion is followed up to a time")
+        for key in ("output", "step"):
+            spacing = getattr(self, key)
+            if spacing is not None and spacing > self.end:
+                raise SceneError(f"found {spacing:g} s, accepted: up to the span of {self.end:g} s", (key,))
+        if self.output is not None and self.end > MOST_ANSWERS * self.output:
+            found = f"found {self.output:g} s, which gives {self.end / self.output:.3g} answers"
+            raise SceneError(f"{found}, accepted: at most {MOST_ANSWERS}", ("output",))
+        for key in ("cut", "release"):
+            if getattr(self, key) and self.initial != "equilibrium":
+                raise SceneError(f"found initial = {self.initial!r}, accepted: 'equilibrium' with this key", (key,))
 
     @property
     def span(self) -> tuple[float, float]:
@@ -114,8 +199,24 @@ class Analysis(Staged):
         assert self.range is not None
         return self.range[0], self.range[1]
 
+    @property
+    def duration(self) -> float:
+        """Span of time of dynamics, s."""
+        assert self.end is not None
+        return self.end
 
-class Expect(Staged):
+    @property
+    def count_of_modes(self) -> int:
+        """How many modes are asked for: none on a path that does not say so."""
+        return self.modes or (USUAL_MODES if self.type == "modes" else 0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether masses count: vibrations or a motion are asked for."""
+        return self.type == "dynamic" or self.count_of_modes > 0
+
+
+class Expect(Record):
     """What the literature or an independent method says about one quantity of one answer.
 
     Parameters
@@ -127,9 +228,10 @@ class Expect(Staged):
     source : where the value is from
     at : fraction of the length of a member
     step : factor of the answer; left out: the last step
+    time : s - dynamic: time of the answer, from 0 to the end; left out: the end
     equilibrium : expects of the same number are met by one of several equilibria, which one is free
     crossing : path: which crossing of that factor, 1 is the first
-    limit_point, bifurcation : path: which limit or bifurcation point
+    limit_point, bifurcation, flutter_point : path: which limit, bifurcation or flutter point
     """
 
     quantity: str
@@ -139,17 +241,20 @@ class Expect(Staged):
     source: str = ""
     at: Fraction | None = None
     step: Number | None = None
+    time: Number | None = None
     equilibrium: Count | None = None
     crossing: Count | None = None
     limit_point: Count | None = None
     bifurcation: Count | None = None
+    flutter_point: Count | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Expect:
         if self.crossing is not None and self.step is None:
             raise SceneError("the key 'step' is missing: a crossing is one of a factor", ("crossing",))
-        if sum(key is not None for key in (self.step, self.limit_point, self.bifurcation)) > 1:
-            raise SceneError("accepted: one of the keys step, limit_point, bifurcation")
+        places = ("step", "time", "limit_point", "bifurcation", "flutter_point")
+        if sum(getattr(self, key) is not None for key in places) > 1:
+            raise SceneError(f"accepted: one of the keys {', '.join(places)}")
         if self.tolerance is None and isinstance(self.value, (float, tuple)):
             raise SceneError(
                 "the key 'tolerance' is missing: only true, false, whole numbers and texts are met exactly"

@@ -1,0 +1,182 @@
+"""What vibrations and motions ask of a scene: masses, a beginning in time, and motions that do not jump."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from ..errors import SceneError
+from .contacts import Contact
+from .loads import History, Load, Motion
+from .records import say, unknown
+from .sections import CrossSection
+from .springs import Spring
+from .structure import Member, Node
+from .task import Analysis
+
+__all__ = ["check_beginning", "check_driving", "check_masses", "check_no_contact", "check_velocities"]
+
+
+def check_masses(
+    nodes: Mapping[str, Node], members: Mapping[str, Member], sections: Mapping[str, CrossSection]
+) -> None:
+    """Refuse a scene of which nothing has mass.
+
+    Raises
+    ------
+    SceneError
+        No member and no node has any.
+    """
+    heavy = any(m.section is not None and not sections[m.section].missing(["rhoA"]) for m in members.values())
+    heavy = heavy or any(any(map(any, member.mass or ())) for member in members.values())
+    if not heavy and not any(node.mass or any(node.inertia or ()) for node in nodes.values()):
+        accepted = "a section with 'rhoA', a node with 'mass' or 'inertia', or a small member with 'mass'"
+        raise SceneError(f"scene without mass, which could not be set in motion, accepted: at least {accepted}")
+
+
+def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], springs: Mapping[str, Spring]) -> None:
+    """Refuse what stops members, of which vibrations and motions know nothing.
+
+    Raises
+    ------
+    SceneError
+        Names the first contact or stop.
+    """
+    for name in contacts:
+        message = f"found an obstacle with analysis.type = {analysis.type!r}, accepted: with 'static' or 'path'"
+        raise SceneError(message, ("contacts", name))
+    for name, spring in springs.items():
+        if spring.stop is not None:
+            message = f"found a stop with analysis.type = {analysis.type!r}, accepted: with 'static'"
+            raise SceneError(message, ("springs", name, "stop"))
+
+
+def check_velocities(
+    nodes: Mapping[str, Node],
+    members: Mapping[str, Member],
+    motions: Mapping[str, Motion],
+    analysis: Analysis,
+    space: str | None,
+) -> None:
+    """Refuse velocities without a motion in time, of what the ground holds, and a spin in the wrong form.
+
+    Parameters
+    ----------
+    space : why the scene is in space; None in a plane scene
+
+    Raises
+    ------
+    SceneError
+        Names the key.
+    """
+    for where in _begun(nodes, members):
+        if analysis.type != "dynamic":
+            raise SceneError(f"found the analysis {analysis.type!r}, accepted: 'dynamic' with this key", where)
+    moved = {motion.node for motion in motions.values() if motion.displacement is not None and motion.between is None}
+    for name, node in nodes.items():
+        free = node.support == "free" or node.slides or name in moved
+        if node.velocity is not None and any(node.velocity) and not free:
+            message = f"found {say(node.velocity)}, accepted: zero, as the support is {node.support!r}"
+            raise SceneError(message, ("nodes", name, "velocity"))
+    for name, member in members.items():
+        if space is not None and member.spin is not None and not isinstance(member.spin, tuple):
+            found = say(member.spin if isinstance(member.spin, float) else member.spin.to_dict())
+            message = f"found {found}, accepted: a vector [x, y, z], as {space}"
+            raise SceneError(message, ("members", name, "spin"))
+
+
+def _begun(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator[tuple[str, ...]]:
+    """Places of the keys that set a scene in motion at t = 0."""
+    yield from (("nodes", name, "velocity") for name, node in nodes.items() if node.velocity is not None)
+    yield from (("members", name, "spin") for name, member in members.items() if member.spin is not None)
+
+
+def check_beginning(analysis: Analysis, nodes: Mapping[str, Node], loads: Mapping[str, Load]) -> None:
+    """Refuse to cut or release what the scene does not have.
+
+    Raises
+    ------
+    SceneError
+        Names the key.
+    """
+    for name in analysis.cut:
+        if name not in loads:
+            raise SceneError(unknown(name, loads, "loads"), ("analysis", "cut"))
+    for name in analysis.release:
+        if name not in nodes:
+            raise SceneError(unknown(name, nodes, "nodes"), ("analysis", "release"))
+        if nodes[name].support == "free":
+            raise SceneError(f"found {name!r}, which is free, accepted: a node with a support", ("analysis", "release"))
+
+
+def check_driving(
+    analysis: Analysis,
+    nodes: Mapping[str, Node],
+    members: Mapping[str, Member],
+    motions: Mapping[str, Motion],
+    histories: Mapping[str, History],
+) -> None:
+    """Refuse motions whose place or velocity would jump in time, which takes a force without bound.
+
+    Raises
+    ------
+    SceneError
+        Names the history and the motion, the time and the size of the jump.
+    """
+    resting = next(_begun(nodes, members), None) is None
+    for name, motion in motions.items():
+        turned = motion.rotation if isinstance(motion.rotation, tuple) else (motion.rotation or 0.0,)
+        still = not any((*turned, *(motion.displacement or ())))
+        # A released node is held in the first equilibrium only: its motion ends there.
+        if still or (motion.between is None and motion.node in analysis.release):
+            continue
+        if motion.history is None:
+            _check_constant(name, analysis)
+            continue
+        history, where = histories[motion.history], ("histories", motion.history)
+        try:
+            _check_start(name, history, analysis, resting)
+            _check_course(name, history, analysis.duration)
+        except SceneError as error:
+            raise error.within(*where) from None
+
+
+def _check_constant(motion: str, analysis: Analysis) -> None:
+    if analysis.initial == "undeformed":
+        message = (
+            "the key 'history' is missing: without one the motion would jump at t = 0, accepted: a history that begins "
+            "with 0, or initial = 'equilibrium'"
+        )
+        raise SceneError(message, ("motions", motion))
+
+
+def _check_start(motion: str, history: History, analysis: Analysis, resting: bool) -> None:
+    factor, rate = history.factor(0.0), history.rate(0.0)
+    if factor and analysis.initial == "undeformed":
+        accepted = "a history that begins with 0, or initial = 'equilibrium'"
+        raise SceneError(
+            f"begins with {factor:g}, so that the motion {motion!r} would jump at t = 0, accepted: {accepted}"
+        )
+    if rate and resting:
+        accepted = "a history that begins at rest, or a scene that begins with velocities"
+        raise SceneError(
+            f"begins with a rate of {rate:g} 1/s, so that the motion {motion!r} would start with a jump, "
+            f"accepted: {accepted}"
+        )
+
+
+def _check_course(motion: str, history: History, end: float) -> None:
+    for t, step, kink in history.jumps():
+        if not 0.0 < t < end:
+            continue
+        if step:
+            so = f"so that the motion {motion!r} would jump too"
+            raise SceneError(f"jumps by {step:g} at t = {t:g} s, {so}, accepted: intervals whose values meet")
+        if t == history.t[-1]:
+            accepted = f"a history until the end of the analysis at {end:g} s or one that ends at rest"
+            raise SceneError(
+                f"ends at {t:g} s with a rate of {-kink:g} 1/s, so that the motion {motion!r} would stop with a jump, "
+                f"accepted: {accepted}"
+            )
+        so = f"so that the velocity of the motion {motion!r} would jump"
+        accepted = "intervals whose rates meet, as polynomials can"
+        raise SceneError(f"its rate jumps by {kink:g} 1/s at t = {t:g} s, {so}, accepted: {accepted}")
