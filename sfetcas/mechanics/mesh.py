@@ -104,6 +104,8 @@ class Mesh:
         Springs that stand at a stop: name, and ``low`` or ``high``.
     cushions : tuple of Cushion
         Places at which obstacles push softly, in the order of their members and fractions.
+    places : bool
+        Every cut of a flexible member is a place with a displacement of its own, as what has mass needs.
     """
 
     order: int
@@ -113,6 +115,7 @@ class Mesh:
     touches: tuple[Touch, ...] = ()
     stops: tuple[tuple[str, str], ...] = ()
     cushions: tuple[Cushion, ...] = ()
+    places: bool = False
 
     @property
     def elements(self) -> int:

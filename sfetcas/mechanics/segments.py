@@ -122,7 +122,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
         cuts = mesh.cuts[name]
         touched, last = _touched(mesh, name), len(cuts) - 1
         kept |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
-        stops = [0, *sorted({*_kept_cuts(scene, name, cuts), *touched} - {0, last}), last]
+        inner = range(1, last) if mesh.places and member.type == "flexible" else _kept_cuts(scene, name, cuts)
+        stops = [0, *sorted({*inner, *touched} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
             there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, f"{name} at {cuts[b]:.12g}")

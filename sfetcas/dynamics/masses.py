@@ -1,0 +1,265 @@
+"""Masses and dampers of a model: what the rates of positions, section axes and strains cost, dimensionless.
+
+Masses of flexible members are lumped at the nodes of their elements (Lobatto quadrature: diagonal, constant, and as
+accurate as the elements); a rigid member has its own consistent mass between its ends, which is exact.
+
+The unit of time is that in which the whole mass is one: ``sqrt(mass length^2 / moment)`` of the units of the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.shapes import Straight, place
+from ..errors import SceneError
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array, Index
+from ..mathematics.interpolation import differentiation, lobatto
+from ..mathematics.linear import SparseMap
+from ..mechanics.joints import Connection, LineSpring, Spring, TurnSpring
+from ..mechanics.model import Model
+from .observed import Axes, Gap, SpringAngle, Strains, Travel
+
+__all__ = ["Masses", "Observables", "masses_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Observables:
+    """Quantities of one kind with their masses and dampers.
+
+    Attributes
+    ----------
+    kind : Connection
+        Its rows are the quantities.
+    turns, places : ndarray (n, rotations | places)
+    data : ndarray (n, data)
+    mass, damping : ndarray (n, rows)
+    spring : int or None
+        The group of connections whose angles these are, in which the counted turns stand.
+    numbers : ndarray (n,) or None
+        Which of that group.
+    """
+
+    kind: Connection
+    turns: Index
+    places: Index
+    data: Array
+    mass: Array
+    damping: Array
+    spring: int | None = None
+    numbers: Index | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """All masses and dampers of a model.
+
+    Attributes
+    ----------
+    time, mass : float
+        Units, s and kg.
+    places : SparseMap (places, places)
+        Kinetic energy of the places: half of this by their velocities.
+    place_drag : ndarray (places,)
+    inner, inner_drag : ndarray (elements, p + 1)
+        At the inner nodes of flexible elements, zero at the ends, which are places.
+    observables : tuple of Observables
+        Section axes, strains, springs, points of small members.
+    """
+
+    time: float
+    mass: float
+    places: SparseMap
+    place_drag: Array
+    inner: Array
+    inner_drag: Array
+    observables: tuple[Observables, ...]
+
+
+def masses_of(model: Model) -> Masses:
+    """The masses of a model whose mesh has a place at every cut.
+
+    Raises
+    ------
+    SceneError
+        Nothing has mass.
+    """
+    return _Weigher(model).all()
+
+
+def _euler(inertia: Array) -> Array:
+    """Weights of the axes (..., 3) for moments of inertia (..., 3) about them."""
+    return 0.5 * inertia.sum(axis=-1, keepdims=True) - inertia
+
+
+class _Weigher:
+    """Collects the masses, in SI units."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.scene = model, model.scene
+        self.space, self.axes = model.space, model.element.axes
+        count = len(model.segments.places)
+        self.entries: list[tuple[int, int, float]] = []
+        self.drag = np.zeros(count)
+        self.inner, self.inner_drag = np.zeros(model.beams.weight.shape), np.zeros(model.beams.weight.shape)
+        # Of each rotation the sum of weight times b b^T over the axes b that turn with it.
+        self.spread = np.zeros((len(model.rotations.kind), 3, 3))
+        self.total = 0.0
+
+    def all(self) -> Masses:
+        """Everything that the scene gives a mass or a damper."""
+        model, scene = self.model, self.scene
+        for name, member in scene.members.items():
+            if member.type == "flexible":
+                self._add_flexible(name)
+            elif member.type == "rigid" and member.section is not None:
+                self._add_rigid(name)
+        for name, node in scene.nodes.items():
+            number = model.segments.place(name)
+            self._at(number, number, node.mass)
+            self.total += node.mass
+            self.drag[number] += node.drag
+            turn = model.rotations.node_turn[name]
+            if node.inertia is not None and turn is not None:
+                self._turning(turn, np.eye(3), np.asarray(node.inertia))
+        length, moment = model.scales.length, model.scales.moment
+        if self.total <= 0.0:
+            raise SceneError("nothing has a mass, accepted: a section with rhoA, or a node with mass")
+        mass = self.total
+        time = float(np.sqrt(mass / moment)) * length
+        of_drag = mass / time
+        row, column, value = (np.array(part) for part in zip(*self.entries, strict=True))
+        size = (len(self.drag), len(self.drag))
+        groups = [*self._axes(mass * length**2), *self._strains(time), *self._springs(time)]
+        return Masses(
+            time=time,
+            mass=mass,
+            places=SparseMap(row, column, value / mass, size),
+            place_drag=self.drag / of_drag,
+            inner=self.inner / mass,
+            inner_drag=self.inner_drag / of_drag,
+            observables=tuple(groups),
+        )
+
+    def _at(self, row: int, column: int, mass: float) -> None:
+        self.entries.append((row, column, mass))
+
+    def _turning(self, turn: int, axes: Array, inertia: Array) -> None:
+        """Moments of inertia (3,), kg m2, about axes (columns) that turn with a rotation."""
+        self.spread[turn] += axes @ np.diag(_euler(inertia)) @ axes.T
+
+    # -- members --------------------------------------------------------------------------------
+
+    def _add_flexible(self, name: str) -> None:
+        model, element = self.model, self.model.element
+        section = self.scene.sections[str(self.scene.members[name].section)]
+        part, cuts, line = model.elements_of(name), model.mesh.cuts[name], self.scene.center_lines[name]
+        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
+        weights = line.length * np.diff(cuts)[:, None] * element.weights
+        mass = section.mass(x.ravel()).reshape(x.shape) * weights
+        drag = section.drag * weights
+        self.total += float(mass.sum())
+        for e, (m, d) in enumerate(zip(mass, drag, strict=True), start=part.start):
+            segment = model.segments.parts[model.segments.owner[e]]
+            for place_name, k in ((segment.start, 0), (segment.end, -1)):
+                number = model.segments.place(place_name)
+                self._at(number, number, float(m[k]))
+                self.drag[number] += d[k]
+            self.inner[e, 1:-1], self.inner_drag[e, 1:-1] = m[1:-1], d[1:-1]
+        inertia = section.inertia(x.ravel())
+        if inertia.any():
+            frames = quaternion.matrix(line.quaternions(x.ravel()))
+            parts = _euler(inertia * weights.ravel()[:, None])
+            spread = np.einsum("nij,nj,nkj->nik", frames, parts, frames)
+            np.add.at(self.spread, model.rotations.turns[part].ravel(), spread)
+
+    def _add_rigid(self, name: str) -> None:
+        """The mass spread over the straight line between the nodes: exact between the displacements of its ends."""
+        member, scene = self.scene.members[name], self.scene
+        section = scene.sections[str(member.section)]
+        if section.missing(["rhoA"]):
+            return
+        x, w = lobatto(9)
+        start, end = (scene.nodes[n].position for n in member.nodes)
+        chord = place(Straight(), start, end, member.b2, ("members", name))
+        share = section.mass(x) * w * chord.length
+        self.total += float(share.sum())
+        a, b = (self.model.segments.place(self.model.segments.ends[name, i]) for i in range(2))
+        for row, column, weight in ((a, a, (1 - x) ** 2), (a, b, x * (1 - x)), (b, a, x * (1 - x)), (b, b, x**2)):
+            self._at(row, column, float(share @ weight))
+        inertia = (section.inertia(x) * (w * chord.length)[:, None]).sum(axis=0)
+        frame = quaternion.matrix(chord.quaternions(np.array([0.5])))[0]
+        self._turning(self.model.rotations.ends[name][0], frame, inertia)
+
+    # -- groups ---------------------------------------------------------------------------------
+
+    def _axes(self, unit: float) -> list[Observables]:
+        """Rotary inertia of all rotations that have any."""
+        if not self.space:
+            # The turning of one direction: about z, the sum of the weights of what lies in the plane.
+            about = self.spread[:, 0, 0] + self.spread[:, 1, 1]
+            turns = np.flatnonzero(about)
+            data = np.tile([1.0, 0.0], (len(turns), 1))
+            mass = np.repeat(about[turns, None], 2, axis=1)
+        else:
+            turns = np.flatnonzero(np.abs(self.spread).max(axis=(1, 2)))
+            values, vectors = np.linalg.eigh(self.spread[turns])
+            data = vectors.transpose(0, 2, 1).reshape(-1, 9)
+            mass = np.repeat(values, 3, axis=1)
+        if not len(turns):
+            return []
+        kind = Axes(self.space)
+        places = np.zeros((len(turns), 0), dtype=np.intp)
+        return [Observables(kind, turns[:, None], places, data, mass / unit, np.zeros(mass.shape))]
+
+    def _strains(self, time: float) -> list[Observables]:
+        """Kelvin-Voigt damping of the flexible members that have any."""
+        model, element = self.model, self.model.element
+        n, groups = element.order + 1, []
+        for name in model.members:
+            member, line = self.scene.members[name], self.scene.center_lines[name]
+            delay = 0.0 if member.type == "rigid" else self.scene.sections[str(member.section)].damping
+            if not delay:
+                continue
+            cuts, part = model.mesh.cuts[name], model.elements_of(name)
+            x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
+            stiffness = self.scene.sections[str(member.section)].stiffness(x.ravel())
+            chosen = stiffness if self.space else stiffness[:, 1:2] if line.bending_axis == 2 else stiffness[:, 2:3]
+            # Squares of derivatives by xi: weight over length.
+            weights = (element.weights / (line.length * np.diff(cuts)[:, None])).ravel()[:, None]
+            unit = model.scales.moment * time
+            damping = (delay * weights * chosen / unit).reshape(len(x), -1)
+            slopes = np.tile(differentiation(element.nodes).T.ravel(order="F"), (len(x), 1))
+            frames = quaternion.matrix(line.quaternions(x.ravel())).transpose(0, 2, 1).reshape(len(x), -1)
+            data = np.hstack([slopes, frames]) if self.space else slopes
+            groups.append((model.rotations.turns[part], data, damping))
+        if not groups:
+            return []
+        turns, data, damping = (np.concatenate(part) for part in zip(*groups, strict=True))
+        places = np.zeros((len(turns), 0), dtype=np.intp)
+        return [Observables(Strains(self.space, n), turns, places, data, np.zeros(damping.shape), damping)]
+
+    def _springs(self, time: float) -> list[Observables]:
+        """Dampers beside springs."""
+        found = []
+        for number, group in enumerate(self.model.connections):
+            kind, axes = group.kind, self.axes
+            units = self.model.scales.moment * time, self.model.scales.force / self.model.scales.length * time
+            if not isinstance(kind, (TurnSpring, Spring, LineSpring)):
+                continue
+            damping = np.array([self.scene.springs[name].damping for name in group.names])
+            chosen = np.flatnonzero(damping)
+            if not len(chosen):
+                continue
+            observed: Connection = Travel(self.space)
+            data, unit, spring = group.data[:, :axes], units[1], None
+            if isinstance(kind, TurnSpring):
+                observed, data, unit, spring = SpringAngle(self.space, kind), group.data, units[0], number
+            elif isinstance(kind, Spring):
+                observed = Gap(self.space)
+            weight = damping[chosen, None] / unit
+            sides = group.turns[chosen], group.places[chosen]
+            found.append(Observables(observed, *sides, data[chosen], np.zeros(weight.shape), weight, spring, chosen))
+        return found

@@ -1,0 +1,152 @@
+"""Methods of integration with stages: how rates at the stages of a step depend on the quantities there.
+
+A method is data and two formulas; everything else of a step is the same for all, see :mod:`~sfetcas.dynamics.steps`.
+All take the equations of index 3 as they are: closings hold at every stage, internal forces are their multipliers.
+
+Source: Chung and Hulbert 1993, Arnold and Bruls 2007 (generalised-alpha of index 3, doi 10.1007/s11044-007-9084-0);
+Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5 and VII (Radau IIA).
+"""
+
+from __future__ import annotations
+
+import abc
+import functools
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.interpolation import integration
+
+__all__ = ["METHODS", "GeneralisedAlpha", "Method", "Radau", "Relations"]
+
+
+@dataclass(frozen=True)
+class Relations:
+    """Rates at the stages by the quantities there: ``X' = (X - X_0) C^T + v``, ``X'' = (X - X_0) B^T + a``.
+
+    Attributes
+    ----------
+    C, B : MX (stages, stages)
+    v, a : MX (quantities, stages)
+    """
+
+    C: ca.MX
+    B: ca.MX
+    v: ca.MX
+    a: ca.MX
+
+
+class Method(abc.ABC):
+    """A method with stages.
+
+    Attributes
+    ----------
+    name : str
+    order : int
+        Of the positions.
+    places : ndarray (stages,)
+        Of the stages in the step, the last of them 1.
+    kept : int
+        Rates that go from step to step: the velocity first.
+    """
+
+    name: str
+    order: int
+    places: Array
+    kept: int
+
+    @property
+    def stages(self) -> int:
+        """Their number."""
+        return len(self.places)
+
+    @abc.abstractmethod
+    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
+        """The relations of a step of length h after rates (quantities, kept)."""
+
+    @abc.abstractmethod
+    def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
+        """Rates (quantities, kept) after a step in which the quantities moved by ``X - X_0`` (quantities, stages)."""
+
+
+@final
+class Radau(Method):
+    """Radau IIA collocation of two or three stages: order 3 or 5; damps what a step cannot resolve."""
+
+    kept = 1
+
+    def __init__(self, stages: int) -> None:
+        self.name, self.order = f"radau-{stages}", 2 * stages - 1
+        self.places = RADAU[stages]
+
+    @functools.cached_property
+    def _inverse(self) -> Array:
+        """Inverse of the matrix of the method: derivatives at the stages over the length of the step."""
+        return np.asarray(np.linalg.inv(integration(self.places, self.places)))
+
+    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
+        """Rates are the derivatives of the collocation polynomials."""
+        slopes = ca.DM(self._inverse)
+        ones = ca.DM.ones(1, self.stages)
+        first = ca.DM(self._inverse.sum(axis=1))
+        velocity = rates[:, 0]
+        return Relations(
+            C=slopes / h,
+            B=ca.DM(self._inverse @ self._inverse) / h**2,
+            v=ca.MX.zeros(velocity.shape[0], self.stages),
+            a=-ca.mtimes(velocity, first.T * ones) / h,
+        )
+
+    def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
+        """The velocity at the last stage."""
+        return ca.mtimes(moved, ca.DM(self._inverse[-1])) / h
+
+
+RADAU = {
+    2: np.array([1.0 / 3.0, 1.0]),
+    3: np.array([(4.0 - np.sqrt(6.0)) / 10.0, (4.0 + np.sqrt(6.0)) / 10.0, 1.0]),
+}
+"""Places of the stages."""
+
+
+@final
+class GeneralisedAlpha(Method):
+    """Generalised-alpha: order 2, one stage; ``damping`` is the spectral radius at infinite frequency, 0 to 1."""
+
+    kept = 3
+    order = 2
+    places = np.array([1.0])
+    name = "generalised-alpha"
+
+    def __init__(self, damping: float = 0.9) -> None:
+        self.of_mass, self.of_force = (2.0 * damping - 1.0) / (damping + 1.0), damping / (damping + 1.0)
+        self.gamma = 0.5 + self.of_force - self.of_mass
+        self.beta = 0.25 * (self.gamma + 0.5) ** 2
+
+    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
+        """Newmark's formulas with an acceleration that lags behind the true one."""
+        velocity, lagging, true = ca.horzsplit(rates)
+        first = -velocity / (self.beta * h) - (0.5 / self.beta - 1.0) * lagging
+        share = (1.0 - self.of_mass) / (1.0 - self.of_force)
+        rest = (self.of_mass * lagging - self.of_force * true) / (1.0 - self.of_force)
+        return Relations(
+            C=self.gamma / (self.beta * h),
+            B=share / (self.beta * h**2),
+            v=velocity + h * ((1.0 - self.gamma) * lagging + self.gamma * first),
+            a=share * first + rest,
+        )
+
+    def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
+        """Velocity, lagging and true acceleration."""
+        velocity, lagging, _ = ca.horzsplit(rates)
+        now = self.relations(h, rates)
+        true = now.B * moved + now.a
+        follows = (moved - h * velocity) / (self.beta * h**2) - (0.5 / self.beta - 1.0) * lagging
+        return ca.horzcat(now.C * moved + now.v, follows, true)
+
+
+METHODS = {method.name: method for method in (Radau(2), Radau(3), GeneralisedAlpha())}
+"""By name."""

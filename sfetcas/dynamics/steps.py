@@ -1,0 +1,124 @@
+"""A whole time step as one CasADi Function: prediction, Newton's method, rates after it.
+
+Newton's iterations are nested conditionals, so that a step ends when it has converged; nothing of it is Python.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import casadi as ca
+import numpy as np
+
+from .methods import Method
+from .stages import StageEquations, moved_by
+
+__all__ = ["CONVERGED", "ITERATIONS", "step_function"]
+
+ITERATIONS = 10
+"""Iterations of Newton's method at most."""
+
+CONVERGED = 1e-8
+"""Change, rad or lengths, below which it ends: convergence is quadratic, so the next one would be below rounding."""
+
+
+def step_function(system: StageEquations, method: Method, linear: str = "csparse") -> ca.Function:
+    """A step of a method.
+
+    ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, near) -> (q, y, lam, turns, shifts, x, rates, size,
+    iterations)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
+    quantities x and their rates (quantities, kept); of its stages turns (turns, rotations * stages) since its begin and
+    shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a fresh start;
+    factors (groups, stages) of the loads.  It has converged when ``size`` is at most :data:`CONVERGED`.
+    """
+    n, s = system.layout, method.stages
+    q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
+    turns, shifts = ca.MX.sym("turns", system.turns, n.rotations * s), ca.MX.sym("shifts", n.y, s)
+    x, rates = ca.MX.sym("x", n.x), ca.MX.sym("rates", n.x, method.kept)
+    ratio, h = ca.MX.sym("ratio"), ca.MX.sym("h")
+    factors, near = ca.MX.sym("factors", n.factors, s), ca.MX.sym("near", n.near)
+    onward = _onward(tuple(method.places))(ratio)
+    # Turns and shifts so far go on along the polynomials of the last step.
+    spins = ca.horzsplit(turns, n.rotations)
+    first = [sum((onward[i, j] * spins[j] for j in range(s)), ca.MX(0)) for i in range(s)]
+    begin = [system.held(moved_by(system, q, first[i]), factors[:, i]) for i in range(s)]
+    guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
+    given = method.relations(h, rates)
+    constants = [x, given.v, given.a, given.C, given.B, factors, near]
+    newton = _newton(system, s, linear)
+    stages, moved, multipliers, size, count = newton(*guess, *constants)
+    parts = ca.horzsplit(stages, n.rotations)
+    places = [system.displacements(moved[:, i], factors[:, i]) for i in range(s)]
+    there = ca.horzcat(*[system.quantities(parts[i], places[i], near) for i in range(s)])
+    results = [
+        parts[-1],
+        moved[:, -1],
+        multipliers,
+        ca.horzcat(*[system.turned(q, part) for part in parts]),
+        moved - ca.repmat(y, 1, s),
+        there,
+        method.after(h, rates, there - ca.repmat(x, 1, s)),
+        size,
+        count,
+    ]
+    names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "near"]
+    arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, factors, near]
+    out = [
+        "q_next",
+        "y_next",
+        "lam_stages",
+        "turns_stages",
+        "shifts_stages",
+        "x_stages",
+        "rates_next",
+        "size",
+        "iterations",
+    ]
+    return ca.Function("step", arguments, results, names, out)
+
+
+def _newton(system: StageEquations, stages: int, linear: str) -> ca.Function:
+    """Newton's method from a guess: ``(q, y, lam, constants) -> (q, y, lam, size, iterations)``."""
+    iteration = system.iteration(stages, linear)
+    symbols = [ca.MX.sym(iteration.name_in(i), iteration.sparsity_in(i)) for i in range(iteration.n_in())]
+    constants = symbols[3:]
+    size, count = ca.MX.sym("size"), ca.MX.sym("count")
+    arguments = [*symbols, size, count]
+    end = ca.Function("end", arguments, [*symbols[:3], size, count])
+    on = end
+    for level in range(ITERATIONS):
+        q, y, lam, change = iteration(*symbols)
+        # What has converged, or gone beyond all numbers, ends.
+        going = ca.logic_and(change > CONVERGED, change < LOST)
+        further = ca.Function.if_else(f"further_{level}", on, end)
+        on = ca.Function(f"newton_{level}", arguments, further(going, q, y, lam, *constants, change, count + 1))
+    return ca.Function("newton", symbols, on(*symbols, 0.0, 0.0))
+
+
+LOST = 1e3
+"""Change, rad or lengths, beyond which Newton's method is lost."""
+
+
+@functools.cache
+def _onward(places: tuple[float, ...]) -> ca.Function:
+    """(ratio) -> matrix that takes what stages have gained since the begin to what the next ones will since the end."""
+    ratio = ca.SX.sym("ratio")
+    nodes = np.array([0.0, *places])
+    rows = []
+    for c in places:
+        at = 1.0 + ratio * c
+        rows.append(
+            [
+                ca.SX(np.prod([1.0])) * _lagrange(nodes, j, at) - (1.0 if j == len(nodes) - 1 else 0.0)
+                for j in range(1, len(nodes))
+            ]
+        )
+    return ca.Function("onward", [ratio], [ca.vertcat(*[ca.horzcat(*row) for row in rows])])
+
+
+def _lagrange(nodes: np.ndarray, j: int, at: ca.SX) -> ca.SX:
+    value = ca.SX(1)
+    for k, node in enumerate(nodes):
+        if k != j:
+            value *= (at - node) / (nodes[j] - node)
+    return value
