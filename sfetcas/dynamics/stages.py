@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -27,6 +28,7 @@ from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseMap, pattern
 from ..mathematics.quaternion import product, turned
 from ..mechanics.connections import Group
+from ..mechanics.elements import Element
 from ..mechanics.equations import Equations
 from ..mechanics.joints import Connection, by_turning
 from ..mechanics.rotations import Turn
@@ -52,6 +54,9 @@ def _by_axes(matrix: SparseMap, axes: int) -> SparseMap:
     each = np.arange(axes)
     row, column = ((part[:, None] * axes + each).ravel() for part in (matrix.row, matrix.column))
     return SparseMap(row, column, np.repeat(matrix.value, axes), (matrix.shape[0] * axes, matrix.shape[1] * axes))
+
+
+T = TypeVar("T", ca.SX, ca.MX)
 
 
 def _times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
@@ -184,6 +189,90 @@ class StageEquations:
         """Full coordinates (n, axes) of displacements of places."""
         return np.asarray(self.of_places + self.axes * places[:, None] + np.arange(self.axes))
 
+    # -- what follows -------------------------------------------------------------------------------
+
+    def _tangential(self, q: ca.MX, factors: ca.MX) -> ca.MX:
+        """Distributed forces that turn with the sections, (axes, elements with such * points)."""
+        elements = self.model.followers.elements
+        columns = (elements[:, None] * self.points + np.arange(self.points)).ravel().tolist()
+        given = ca.reshape(_times(self.tangential, factors), self.axes, self.elements * self.points)[:, columns]
+        turns = self.model.rotations.turns[elements].ravel().tolist()
+        return _turned(self.model.space).map(len(columns))(q[:, turns], given)
+
+    def carried(self, q: ca.MX, factors: ca.MX) -> ca.MX:
+        """Pull of distributed followers on the points of all elements."""
+        elements = self.model.followers.elements
+        if not len(elements):
+            return ca.MX.zeros(self.elements * self.points * self.axes)
+        forces = ca.vec(self._tangential(q, factors))
+        return _times(self._pulled(elements), forces)
+
+    def _pulled(self, elements: Index) -> ca.DM:
+        """What takes forces at the points of elements to the pull there: minus what acts beyond."""
+        element, n = self.model.element, self.points
+        weights = -element.to_points.T / element.weights[:, None]
+        count = len(elements)
+        row = elements[:, None, None] * n + np.arange(n)[:, None] + np.zeros((1, 1, n), np.intp)
+        column = np.arange(count)[:, None, None] * n + np.zeros((1, n, 1), np.intp) + np.arange(n)
+        value = np.broadcast_to(weights, (count, n, n))
+        matrix = SparseMap(row.ravel(), column.ravel(), value.ravel(), (self.elements * n, count * n))
+        return _constant(_by_axes(matrix, self.axes))
+
+    def follower_cells(self) -> list[tuple[Index, Index]]:
+        """Full coordinates of the rows and columns of what followers add to the matrix, see :meth:`followed`."""
+        followers, turns = self.model.followers, np.arange(self.turns)
+        cells = []
+        if len(followers.places):
+            rows = self.place_cells(followers.places)
+            cells.append((rows[:, None, :], (self.turns * followers.turns[:, None] + turns)[:, :, None]))
+        if len(followers.elements):
+            along = self.cells[followers.elements]
+            rows = np.concatenate([self.place_cells(self.start[followers.elements]), along], axis=1)
+            cells.append((rows[:, None, :], along[:, :, None]))
+        if self.twisting:
+            each = 3 * np.arange(self.layout.rotations)[:, None] + np.arange(3)
+            cells.append((each[:, None, :], each[:, :, None]))
+        return cells
+
+    @functools.cached_property
+    def twisting(self) -> bool:
+        """Whether moments in space turn what is free to turn: they have no potential."""
+        return self.model.space and bool(self.moment.nnz() or self.twist.nnz())
+
+    def followed(self, q: ca.MX, factors: ca.MX) -> tuple[ca.MX, ca.MX, list[ca.MX]]:
+        """Forces on places and moments on rotations of what follows, both as residuals, and entries of the matrix."""
+        followers, space = self.model.followers, self.model.space
+        on_places, entries = ca.MX.zeros(self.axes * self.places), []
+        on_turns = ca.MX.zeros(self.of_places)
+        if len(followers.places):
+            n = len(followers.places)
+            given = ca.reshape(_times(self.following, factors), self.axes, n)
+            forces = _turned(space).map(n)(q[:, followers.turns.tolist()], given)
+            at = (self.axes * followers.places[:, None] + np.arange(self.axes)).ravel()
+            on_places -= _times(
+                _sparse(at, np.arange(len(at)), np.ones(len(at)), (self.axes * self.places, len(at))), ca.vec(forces)
+            )
+            entries.append(ca.vec(_change(space).map(n)(forces)))
+        if len(followers.elements):
+            n = len(followers.elements)
+            forces = self._tangential(q, factors)
+            starts = np.repeat(self.start[followers.elements], self.points)
+            at = (self.axes * starts[:, None] + np.arange(self.axes)).ravel()
+            on_places -= _times(
+                _sparse(at, np.arange(len(at)), np.ones(len(at)), (self.axes * self.places, len(at))), ca.vec(forces)
+            )
+            columns = (followers.elements[:, None] * self.points + np.arange(self.points)).ravel().tolist()
+            tangents = self.tangents(q)[:, columns]
+            entries.append(ca.vec(_spread_change(self.model.element).map(n)(forces, tangents)))
+        if self.twisting:
+            n = self.layout.rotations
+            twist = _turned(True).map(n)(q, ca.reshape(_times(self.twist, factors), 3, n))
+            moment = ca.reshape(_times(self.moment, factors), 3, n)
+            on_turns -= ca.vec(twist)
+            # The symmetric form of all moments counts these with minus and plus half of what they turn by.
+            entries.append(0.5 * ca.vec(_change(True).map(n)(twist - moment)))
+        return on_places, on_turns, entries
+
     def _sides(self, group: Group | Observables) -> Index:
         """Full coordinates of the sides of a group (n, width), -1 of the ground."""
         n = len(group.data)
@@ -309,6 +398,7 @@ class StageEquations:
         self.pull, self.force, self.shift, self.turn = (columns(part) for part in ("pull", "force", "shift", "turn"))
         moments = np.stack([loading.moment[:, 3 - self.turns :].ravel() for loading in loadings], axis=1)
         self.moment = ca.sparsify(ca.DM(moments))
+        self.twist, self.following, self.tangential = (columns(part) for part in ("twist", "following", "tangential"))
         numbers = range(len(self.model.connections))
         self.loads = [ca.DM(np.stack([group.loads[i].ravel() for group in loadings], axis=1)) for i in numbers]
 
@@ -333,6 +423,20 @@ class StageEquations:
                 q[:, int(i)] = _exponential(turn[:, int(i)]) if self.model.space else turn[2, int(i)]
         return q
 
+    def gaps(self, q: ca.MX, y: ca.MX, factors: ca.MX, near: ca.MX) -> ca.MX:
+        """What is left open of the closings and of the rows of joints."""
+        positions, places = self.model.positions, self.displacements(y, factors)
+        gaps = _times(_constant(positions.W), y) + _times(_constant(positions.BZ), _times(self.shift, factors))
+        if self.elements:
+            gaps += _times(self.closing, ca.vec(self.tangents(q)) - ca.DM(self.rest))
+        parts = [gaps]
+        for number, group in enumerate(self.model.connections):
+            if group.rows:
+                n = len(group.data)
+                load = ca.reshape(_times(self.loads[number], factors), group.kind.sizes[4], n)
+                parts.append(ca.vec(_values(group.kind).map(n)(*self.sides(group, q, places, near), load)))
+        return ca.vertcat(*parts)
+
     def turned(self, q: ca.MX, there: ca.MX) -> ca.MX:
         """Rotation vectors (turns, rotations) from rotations to others."""
         return _vectors(self.model.space).map(self.layout.rotations)(q, there)
@@ -343,7 +447,8 @@ class StageEquations:
         if self.elements:
             parts[0] += _times(self.by_tangent, ca.vec(self.tangents(q)) - ca.DM(self.rest))
         for group in self.masses.observables:
-            parts.append(ca.vec(_values(group.kind).map(len(group.data))(*self.sides(group, q, places, near))))
+            n = len(group.data)
+            parts.append(ca.vec(_values(group.kind).map(n)(*self.sides(group, q, places, near), ca.MX(0, n))))
         return ca.vertcat(*parts)
 
     def sides(self, group: Observables | Group, q: ca.MX, places: ca.MX, near: ca.MX) -> list[ca.MX]:
@@ -422,17 +527,12 @@ class StageEquations:
         linear = _times(self.mass, accelerations[: self.linear, :]) + _times(self.drag, rates[: self.linear, :])
         parts = [linear]
         for group, (begin, end) in zip(self.masses.observables, self.ranges, strict=True):
-            mass, damping = (ca.DM(part.ravel()) for part in (group.mass, group.damping))
             force = ca.MX.zeros(end - begin, rates.shape[1])
-            for weight, rate in ((mass, accelerations), (damping, rates)):
-                if weight.nnz():
-                    force += ca.repmat(weight, 1, rates.shape[1]) * rate[begin:end, :]
+            for weight, rate in ((group.mass, accelerations), (group.damping, rates)):
+                if weight.any():
+                    force += ca.repmat(ca.DM(weight.ravel()), 1, rates.shape[1]) * rate[begin:end, :]
             parts.append(force)
         return ca.vertcat(*parts)
-
-    @property
-    def _ranges(self) -> list[tuple[int, int]]:
-        return list(zip(self.bounds.tolist(), self.bounds.tolist()[1:], strict=False))
 
     def _system(self, stages: int) -> _System:
         """Pattern of the matrix of all stages, unknown by unknown, each with its stages."""
@@ -507,6 +607,8 @@ class _Places:
         for sides in system.observed:
             static.add(sides[:, None, :], sides[:, :, None])
             coupled.add(sides[:, None, :], sides[:, :, None])
+        for rows, columns in system.follower_cells():
+            static.add(rows, columns)
         inside = system.massive
         own, at = cells[inside], system.place_cells(system.start[inside])
         coupled.add(own[:, None, :], own[:, :, None])
@@ -543,7 +645,7 @@ class _Stage:
         turning = -_times(system.moment, factors)
         if system.elements:
             pull = _times(system.pull, factors) + _times(system.closing.T, lam[:closings])
-            pull += _times(system.by_tangent.T, linear)
+            pull += _times(system.by_tangent.T, linear) + system.carried(q, factors)
             found = system.kernel.map(system.elements)(
                 q[:, model.rotations.turns.ravel().tolist()],
                 system.given[0],
@@ -556,6 +658,8 @@ class _Stage:
             closed = ca.vec(spin)[system.closed.entry.tolist()] * ca.DM(system.closed.value)
             entries += [ca.vec(stiffness), closed, closed]
             self._spin = spin[:, system.massive_columns]
+        else:
+            self._spin = ca.MX(system.axes, 0)
         rows = [gaps]
         for number, (group, sides) in enumerate(zip(model.connections, system.linked, strict=True)):
             n, count = len(group.data), group.kind.sizes[2]
@@ -569,13 +673,18 @@ class _Stage:
                 rows.append(ca.vec(found[2]))
                 entries += [ca.vec(found[5]), ca.vec(found[5])]
         self._spins = []
-        for group, sides, (begin, end) in zip(system.masses.observables, system.observed, system.ranges, strict=True):
-            n, count = len(group.data), group.kind.sizes[2]
+        for observed, sides, (begin, end) in zip(
+            system.masses.observables, system.observed, system.ranges, strict=True
+        ):
+            n, count = len(observed.data), observed.kind.sizes[2]
             own = ca.reshape(forces[begin:end], count, n)
-            found = by_turning(group.kind).map(n)(*system.sides(group, q, places, near), ca.MX(0, n), own)
+            found = by_turning(observed.kind).map(n)(*system.sides(observed, q, places, near), ca.MX(0, n), own)
             full.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
             self._spins.append(found[5])
+        pushed, turned_by, followed = system.followed(q, factors)
+        entries += followed
+        turning, on_places = turning + turned_by, on_places + pushed
         residual = ca.mtimes(system.gather, ca.vertcat(turning, on_places, gap_of_rows))
         for sides, values in full:
             residual += _times(system.onto_unknowns(sides), ca.vec(values))
@@ -618,17 +727,43 @@ def _turned(space: bool) -> ca.Function:
 
 
 @functools.cache
+def _change(space: bool) -> ca.Function:
+    """(f) -> minus the derivative of a vector that turns, by its rotation."""
+    f = ca.SX.sym("f", 3 if space else 2)
+    return ca.Function("change", [f], [ca.densify(ca.skew(f) if space else ca.vertcat(f[1], -f[0]))])
+
+
+@functools.cache
+def _spread_change(element: Element) -> ca.Function:
+    """(forces, tangents) -> what turning distributed followers adds, on the first place and on the nodes."""
+    n, axes, turns = element.order + 1, element.axes, element.turns
+    f, t = ca.SX.sym("f", axes, n), ca.SX.sym("t", axes, n)
+    whole = ca.SX(axes + turns * n, turns * n)
+    for i in range(n):
+        change = _change(element.space)(f[:, i])
+        columns = slice(turns * i, turns * (i + 1))
+        whole[:axes, columns] = change
+        for j in range(n):
+            arm = t[:, j] / element.weights[j]
+            crossed = ca.skew(arm) if element.space else ca.horzcat(-arm[1], arm[0])
+            rows = slice(axes + turns * j, axes + turns * (j + 1))
+            whole[rows, columns] = element.to_points[i, j] * ca.mtimes(crossed, change)
+    return ca.Function("spread_change", [f, t], [ca.densify(whole)])
+
+
+@functools.cache
 def _moved(space: bool, count: int) -> ca.Function:
     """(q, phi) -> exp(phi / 2) q for all rotations, of length one again."""
     q, phi = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("phi", 3 if space else 1)
-    now = q + phi
     if space:
         now = ca.vertcat(*product(ca.vertsplit(_exponential(phi)), ca.vertsplit(q)))
         now /= ca.norm_2(now)
+    else:
+        now = q + phi
     return ca.Function("moved", [q, phi], [now]).map(count)
 
 
-def _exponential(phi: ca.SX) -> ca.SX:
+def _exponential(phi: T) -> T:
     """Unit quaternion of a rotation vector."""
     square = 0.25 * ca.dot(phi, phi)
     half = ca.sqrt(ca.fmax(square, 1e-30))
@@ -659,12 +794,13 @@ def _vectors(space: bool) -> ca.Function:
 
 @functools.cache
 def _values(kind: Connection) -> ca.Function:
-    """(q, u, data) -> the rows of a kind."""
-    turns, places, _, data, _ = kind.sizes
-    q, u, given = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places), ca.SX.sym("data", data)
+    """(q, u, data, load) -> the rows of a kind."""
+    turns, places, _, data, loads = kind.sizes
+    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
+    given, load = ca.SX.sym("data", data), ca.SX.sym("load", loads)
     sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
-    rows = ca.densify(ca.vertcat(*kind.residual(*sides, given, ca.SX(0, 1))))
-    return ca.Function("values", [q, u, given], [rows])
+    rows = ca.densify(ca.vertcat(*kind.residual(*sides, given, load)))
+    return ca.Function("values", [q, u, given, load], [rows])
 
 
 @functools.cache

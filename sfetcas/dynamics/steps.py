@@ -26,10 +26,11 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     """A step of a method.
 
     ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, near) -> (q, y, lam, turns, shifts, x, rates, size,
-    iterations)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
+    iterations, gap)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
     quantities x and their rates (quantities, kept); of its stages turns (turns, rotations * stages) since its begin and
     shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a fresh start;
-    factors (groups, stages) of the loads.  It has converged when ``size`` is at most :data:`CONVERGED`.
+    factors (groups, stages) of the loads.  It has converged when ``size`` is at most :data:`CONVERGED`; ``gap`` is what
+    closings miss.
     """
     n, s = system.layout, method.stages
     q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
@@ -40,7 +41,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     onward = _onward(tuple(method.places))(ratio)
     # Turns and shifts so far go on along the polynomials of the last step.
     spins = ca.horzsplit(turns, n.rotations)
-    first = [sum((onward[i, j] * spins[j] for j in range(s)), ca.MX(0)) for i in range(s)]
+    first = [sum((onward[i, j] * spins[j] for j in range(1, s)), onward[i, 0] * spins[0]) for i in range(s)]
     begin = [system.held(moved_by(system, q, first[i]), factors[:, i]) for i in range(s)]
     guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
     given = method.relations(h, rates)
@@ -60,6 +61,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
         method.after(h, rates, there - ca.repmat(x, 1, s)),
         size,
         count,
+        ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], factors[:, -1], near))),
     ]
     names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "near"]
     arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, factors, near]
@@ -73,6 +75,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
         "rates_next",
         "size",
         "iterations",
+        "gap",
     ]
     return ca.Function("step", arguments, results, names, out)
 

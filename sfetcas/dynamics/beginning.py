@@ -1,0 +1,248 @@
+"""Where a motion begins: a state of rotations and displacements, and velocities that joints allow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..description.records import enumerated
+from ..description.scene import Load, Motion, Scene
+from ..description.sections import Polynomial, Table, evaluate
+from ..equilibria import statics, stops
+from ..equilibria.settings import Settings
+from ..equilibria.solution import Equilibrium
+from ..errors import SceneError
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mathematics.linear import SparseSolver, pattern  # noqa: F401
+from ..mechanics.equations import Equations, Point, State
+from ..mechanics.fields import rotations_along
+from ..mechanics.model import Model
+from .stages import StageEquations
+
+__all__ = ["at_rest", "equilibrium_before", "posed", "velocities"]
+
+
+def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
+    """The equilibrium in which a motion begins: of loads and motions as they are at t = 0, of those cut as well.
+
+    Raises
+    ------
+    SceneError, SolveError
+        As of statics.
+    """
+    histories = scene.histories
+
+    def now(record: Load | Motion) -> dict[str, Any]:
+        if record.history is None:
+            return {}
+        factor = histories[record.history].factor(0.0)
+        return {"history": None, **{key: _scaled(getattr(record, key), factor) for key in DRIVEN if hasattr(record, key)}}
+
+    loads = {name: load.model_copy(update=now(load)) for name, load in scene.loads.items()}
+    motions = {name: motion.model_copy(update=now(motion)) for name, motion in scene.motions.items()}
+    static = {"type": "static", "accuracy": scene.analysis.accuracy, "unstable": scene.analysis.unstable}
+    analysis = type(scene.analysis)(**static)
+    nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
+    members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
+    tables = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
+    before = Scene(**{**dict(scene), **tables, "analysis": analysis, "expect": ()})
+    stopped = any(spring.stop is not None for spring in scene.springs.values())
+    return (stops.solve_stopped(before, settings) if stopped else statics.solve(before, settings)).last
+
+
+DRIVEN = ("value", "displacement", "rotation")
+"""Keys of loads and motions that a history multiplies."""
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    if value is None:
+        return None
+    return tuple(factor * part for part in value) if isinstance(value, tuple) else factor * value
+
+
+def moving(scene: Scene) -> Scene:
+    """The scene as it moves: without the loads that are cut and the supports that are released at the begin."""
+    cut, released = scene.analysis.cut, scene.analysis.release
+    if not cut and not released:
+        return scene
+    loads = {name: load for name, load in scene.loads.items() if name not in cut}
+    nodes = {
+        name: node.model_copy(update=FREE) if name in released else node for name, node in scene.nodes.items()
+    }
+    motions = {name: motion for name, motion in scene.motions.items() if motion.node not in released}
+    analysis = scene.analysis.model_copy(update={"cut": (), "release": ()})
+    return Scene(**{**dict(scene), "loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis})
+
+
+FREE = {"support": "free", "rotation": "fixed"}
+"""Of a node whose support is released."""
+
+
+def at_rest(model: Model) -> State:
+    """The undeformed state of a model."""
+    q = np.zeros((len(model.rotations.kind), model.element.components))
+    q[:, 0] = 1.0 if model.space else 0.0
+    y, lam = np.zeros(len(model.positions.unknowns)), np.zeros(len(model.row_names))
+    return State(q, y, lam, np.zeros(model.winding.count))
+
+
+def posed(model: Model, source: Equilibrium) -> State:
+    """An equilibrium of the same members as a state of another model, which may be held otherwise."""
+    state, origin = at_rest(model), source.model
+    q, moved = state.q.copy(), np.zeros((len(model.segments.places), 3))
+    for name, ends in model.rotations.ends.items():
+        q[list(ends)] = source.state.q[list(origin.rotations.ends[name])]
+    for name in model.members:
+        if model.scene.members[name].type == "flexible":
+            q[model.chain(name)] = rotations_along(origin, source.state.q, name, model.along(name))
+    for name, number in model.rotations.node_turn.items():
+        other = origin.rotations.node_turn[name]
+        if number is not None and other is not None:
+            q[number] = source.state.q[other]
+    for name in model.nodes:
+        moved[model.segments.place(name)] = source.position(name) - np.asarray(model.scene.nodes[name].position)
+    for name, places, x in _along_members(model):
+        there = source.fields.positions(name, x) - model.scene.center_lines[name].positions(x)
+        moved[places] = there
+    shift = model.loading(0.0).shift
+    u = moved[:, : model.element.axes].ravel() / model.scales.length - model.positions.B @ shift
+    y = np.bincount(
+        model.positions.Y.column,
+        weights=model.positions.Y.value * u[model.positions.Y.row],
+        minlength=len(model.positions.unknowns),
+    )
+    wound = model.winding.angles(q, _wound(model, source))
+    return State(q, y, state.lam, wound)
+
+
+def _wound(model: Model, source: Equilibrium) -> Array:
+    """Counted angles by their names."""
+    known = dict(zip(source.model.winding.names, source.state.wound, strict=True))
+    return np.array([known.get(name, 0.0) for name in model.winding.names])
+
+
+def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
+    """Of each member of elements its places but nodes of the scene, and the fractions of its length."""
+    found = []
+    for name in model.members:
+        parts = [part for part in model.segments.parts if part.member == name]
+        cuts, first = model.mesh.cuts[name], model.beams.first[name]
+        ends = [(part.start, part.elements.start - first) for part in parts]
+        ends.append((parts[-1].end, len(cuts) - 1))
+        inner = [(model.segments.place(place), cuts[i]) for place, i in ends if place not in model.scene.nodes]
+        if inner:
+            places, x = zip(*inner, strict=True)
+            found.append((name, list(places), np.array(x)))
+    return found
+
+
+# -- velocities -------------------------------------------------------------------------------------------
+
+
+def velocities(system: StageEquations, equations: Equations, state: State, point: Point) -> tuple[Array, tuple[str, ...]]:
+    """Rates of all unknowns at the begin, and notes.
+
+    What is given holds; what is left open follows from the joints with the least rates of bending and turning.
+
+    Raises
+    ------
+    SceneError
+        What is given contradicts the joints, or itself.
+    """
+    model = equations.model
+    rows, wanted, names = _given(system, equations, state)
+    rates = np.zeros(equations.unknowns)
+    if not len(wanted) or not np.abs(wanted).max():
+        return rates, ()
+    n, closings = equations.unknowns, equations.rows
+    full = np.zeros((equations.total, equations.total))
+    full[equations.row, equations.column] = point.entries
+    stiffness = 0.5 * (full[:n, :n] + full[:n, :n].T)
+    values, vectors = np.linalg.eigh(stiffness)
+    stiffness = (vectors * np.abs(values)) @ vectors.T
+    size = float(np.abs(stiffness).max())
+    weight = stiffness / size + OPEN * np.eye(n)
+    held = full[n:, :n]
+    both = np.vstack([held, rows])
+    right = np.concatenate([np.zeros(closings), wanted])
+    # Least energy on what is given; what cannot be met is missed as little as possible.
+    root = np.linalg.cholesky(weight)
+    reduced = np.linalg.solve(root, both.T).T
+    solution = np.linalg.lstsq(reduced, right, rcond=RANK)[0]
+    rates = np.linalg.solve(root.T, solution)
+    missed = rows @ rates - wanted
+    largest = float(np.abs(wanted).max())
+    worst = int(np.abs(missed).argmax())
+    share = float(np.abs(missed[worst])) / largest
+    joints = float(np.abs(held @ rates).max(initial=0.0)) / largest
+    if max(share, joints) > CONTRADICTION:
+        other = _open_row(model, held @ rates) if joints > share else ""
+        raise SceneError(
+            f"contradicts the joints{other}: {max(share, joints):.2g} of the largest velocity cannot be met", names[worst]
+        )
+    if max(share, joints) > TOLD:
+        changed = f"initial velocities were changed by up to {max(share, joints):.1e} of the largest to suit the joints"
+        return rates, (changed,)
+    return rates, ()
+
+
+OPEN = 1e-8
+"""Weight of turning and moving as such beside that of bending."""
+
+RANK = 1e-13
+"""Singular values below this share of the largest are none."""
+
+CONTRADICTION = 1e-3
+"""Share of the largest velocity up to which initial velocities are projected onto what joints allow."""
+
+TOLD = 1e-9
+"""The same from which the change is told."""
+
+
+def _open_row(model: Model, gaps: Array) -> str:
+    return f" ({model.row_names[int(np.abs(gaps).argmax())]})"
+
+
+def _given(system: StageEquations, equations: Equations, state: State) -> tuple[Array, Array, list[tuple[str, ...]]]:
+    """Rows of the rates of the unknowns that are given, their values, and where they stand in the scene."""
+    model, scene, unit = equations.model, equations.model.scene, system.masses.time
+    axes, turns = model.element.axes, model.element.turns
+    rows: list[Array] = []
+    values: list[Array] = []
+    names: list[tuple[str, ...]] = []
+    moving_of = np.zeros((len(model.segments.places) * axes, equations.unknowns))
+    y = model.positions.Y
+    moving_of[y.row, equations.turning_unknowns + y.column] = y.value
+    turning_of = np.zeros((system.of_places, equations.unknowns))
+    used = np.flatnonzero(system.unknown[: system.of_places] >= 0)
+    turning_of[used, system.unknown[used]] = system.weight[used]
+    for name, node in scene.nodes.items():
+        if node.velocity is not None:
+            place = model.segments.place(name)
+            rows.append(moving_of[axes * place : axes * (place + 1)])
+            values.append(np.asarray(node.velocity)[:axes] * unit / model.scales.length)
+            names += [("nodes", name, "velocity")] * axes
+    for name, member in scene.members.items():
+        if member.spin is None:
+            continue
+        chain = model.chain(name) if name in model.beams.first else np.array(model.rotations.ends[name])
+        x = model.along(name)
+        chain, first = np.unique(chain, return_index=True)
+        spins = _spins(member.spin, x[first], model.space) * unit
+        for number, spin in zip(chain.tolist(), spins, strict=True):
+            rows.append(turning_of[turns * number : turns * (number + 1)])
+            values.append(spin[3 - turns :])
+            names += [("members", name, "spin")] * turns
+    if not rows:
+        return np.zeros((0, equations.unknowns)), np.zeros(0), []
+    return np.concatenate(rows), np.concatenate(values), names
+
+
+def _spins(spin: Any, x: Array, space: bool) -> Array:
+    """Angular velocities (n, 3) along a member."""
+    if isinstance(spin, tuple):
+        return np.tile(np.asarray(spin, dtype=float), (len(x), 1))
+    about = evaluate(spin, x) if isinstance(spin, (Polynomial, Table)) else np.full(len(x), float(spin))
+    return np.stack([np.zeros(len(x)), np.zeros(len(x)), about], axis=1)

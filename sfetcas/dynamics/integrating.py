@@ -1,0 +1,302 @@
+"""Steps one after the other: fixed or by the error, with a fresh start wherever loads or motions have a kink."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.interpolation import differentiation, evaluation
+from ..mathematics.kernels import Batch
+from .methods import Method, Radau
+from .stages import StageEquations
+from .steps import CONVERGED, step_function
+
+__all__ = ["Memory", "Stepper", "Taken", "integrate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What goes from step to step, dimensionless.
+
+    Attributes
+    ----------
+    t : float
+    q : ndarray (rotations, components)
+    y, lam : ndarray
+        Displacements kept as unknowns, multipliers.
+    x : ndarray (quantities,)
+    rates : ndarray (kept, quantities)
+        Velocities first.
+    near : ndarray
+        Angles that count turns.
+    last : Taken or None
+        The step before; None where the motion begins afresh.
+    """
+
+    t: float
+    q: Array
+    y: Array
+    lam: Array
+    x: Array
+    rates: Array
+    near: Array
+    last: Taken | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """A step.
+
+    Attributes
+    ----------
+    begin, after : Memory
+    h : float
+    turns : ndarray (stages, rotations, turns)
+        Rotation vectors since its begin.
+    shifts : ndarray (stages, displacements)
+    x : ndarray (stages, quantities)
+    lam : ndarray (stages, multipliers)
+    size : float
+        Last change of Newton's method.
+    iterations : int
+    gap : float
+        What closings miss at its end.
+    """
+
+    begin: Memory
+    after: Memory
+    h: float
+    turns: Array
+    shifts: Array
+    x: Array
+    lam: Array
+    size: float
+    iterations: int
+    gap: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether Newton's method has."""
+        return self.size <= CONVERGED
+
+
+class Stepper:
+    """Steps of one method for one system.
+
+    Parameters
+    ----------
+    system : StageEquations
+    method : Method
+    linear : str
+        Linear solver of CasADi.
+    """
+
+    def __init__(self, system: StageEquations, method: Method, linear: str = "csparse") -> None:
+        self.system, self.method = system, method
+        self.function = step_function(system, method, linear)
+        self._batch = Batch(self.function, 1)
+        self._histories = [None if name is None else system.model.scene.histories[name] for name in system.groups]
+        self.time = system.masses.time
+        self.count = 0
+
+    def factors(self, t: float) -> Array:
+        """Factors of the groups of loads at a time, dimensionless."""
+        seconds = t * self.time
+        return np.array([1.0 if history is None else history.factor(seconds) for history in self._histories])
+
+    def step(self, memory: Memory, h: float) -> Taken:
+        """A step of length h."""
+        system, method, n = self.system, self.method, self.system.layout
+        stages, last = method.stages, memory.last
+        # What jumps at the end of the step does so after it.
+        times = np.minimum(memory.t + h * method.places, np.nextafter(memory.t + h, -np.inf))
+        factors = np.array([self.factors(t) for t in times])
+        turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
+        shifts = np.zeros((stages, n.y)) if last is None else last.shifts
+        ratio = np.array([0.0 if last is None else h / last.h])
+        given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
+        for i, values in enumerate((*given, ratio, np.array([h]), factors, memory.near)):
+            if values.size:
+                self._batch.set(i, values)
+        # Stopped by a matrix without an inverse, a step leaves no numbers.
+        for result in self._batch.results:
+            result[...] = np.nan
+        q, y, lam, turns, shifts, x, rates, size, iterations, gap = (part.ravel().copy() for part in self._batch())
+        self.count += 1
+        q, lam, x = q.reshape(n.rotations, -1), lam.reshape(stages, n.lam), x.reshape(stages, n.x)
+        near = system.model.winding.angles(q, memory.near) if n.near else memory.near
+        after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), near)
+        change = float(size[0]) if np.isfinite(x).all() else np.inf
+        parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
+        taken = Taken(memory, after, h, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
+        return replace(taken, after=replace(after, last=taken))
+
+    def predicted(self, memory: Memory, h: float) -> Array:
+        """Quantities after a step as the one before goes on."""
+        last = memory.last
+        assert last is not None
+        if self.method.stages == 1:
+            velocity, _, acceleration = memory.rates
+            return np.asarray(memory.x + h * velocity + 0.5 * h * h * acceleration)
+        nodes = np.array([0.0, *self.method.places])
+        row = evaluation(nodes, 1.0 + h / last.h)[0]
+        return np.asarray(row @ np.vstack([last.begin.x, last.x]))
+
+    def refreshed(self, memory: Memory, h: float) -> Memory:
+        """A memory at which the motion begins afresh; accelerations, where the method keeps any, are those after it."""
+        fresh = replace(memory, last=None)
+        if self.method.kept == 1:
+            return fresh
+        starter = Stepper(self.system, Radau(2)) if self._starter is None else self._starter
+        self._starter = starter
+        short = starter.step(replace(fresh, rates=memory.rates[:1]), START * h)
+        nodes = np.array([0.0, *starter.method.places])
+        values = np.vstack([memory.x, short.x])
+        slopes = differentiation(nodes)
+        # The polynomial through the stages and the velocity at the begin, twice differentiated there.
+        missed = memory.rates[0] * short.h - (slopes @ values)[0]
+        second = (slopes @ slopes @ values)[0] + missed * _bend(nodes)
+        acceleration = second / short.h**2
+        return replace(fresh, rates=np.stack([memory.rates[0], acceleration, acceleration]))
+
+    _starter: Stepper | None = None
+
+
+START = 0.05
+"""Share of a step in which the accelerations at its begin are found."""
+
+
+def _bend(nodes: Array) -> float:
+    """Second derivative at the first node of the polynomial that vanishes at all and has the slope 1 there."""
+    rest = nodes[1:] - nodes[0]
+    # (x - x0) prod (x - xk) / prod (x0 - xk): slope 1 at x0, second derivative 2 sum 1 / (x0 - xk).
+    return float(2.0 * np.sum(-1.0 / rest))
+
+
+def integrate(
+    stepper: Stepper,
+    memory: Memory,
+    breaks: Sequence[float],
+    *,
+    step: float | None = None,
+    tolerance: float | None = None,
+    first: float | None = None,
+) -> Iterator[Taken]:
+    """Steps up to the last of the breaks, which all are ends of steps.
+
+    Parameters
+    ----------
+    breaks : rising times, dimensionless
+    step : fixed length; the steps between two breaks are equal and no longer
+    tolerance : or by the error of a step, relative to the unit of length
+
+    Raises
+    ------
+    SolveError
+        A step does not converge; the steps before have been given.
+    """
+    for end in breaks:
+        if end <= memory.t:
+            continue
+        span = end - memory.t
+        if step is not None:
+            count = max(1, int(np.ceil(span / step - 1e-9)))
+            memory = stepper.refreshed(memory, span / count)
+            for k in range(count):
+                taken = stepper.step(memory, (end - memory.t) / (count - k))
+                if not taken.converged:
+                    raise _failed(stepper, taken)
+                memory = taken.after
+                yield taken
+        else:
+            assert tolerance is not None
+            steps = _Adaptive(stepper, tolerance, first)
+            for taken in steps.until(memory, end):
+                memory = taken.after
+                yield taken
+            first = steps.h
+
+
+class _Adaptive:
+    """Steps by the error up to a break."""
+
+    def __init__(self, stepper: Stepper, tolerance: float, first: float | None) -> None:
+        self._stepper, self._tolerance, self.h = stepper, tolerance, first
+        s = stepper.method.stages
+        # Order in h of what a step differs from how the one before went on.
+        self._order = s + 1 if s > 1 else 3
+
+    def until(self, memory: Memory, end: float) -> Iterator[Taken]:
+        """The steps."""
+        span = end - memory.t
+        h = min(span if self.h is None else self.h, span)
+        least = SMALLEST * span
+        for taken in self._begun(memory, h, least):
+            memory = taken.after
+            yield taken
+        h = self.h = min(self.h or h, span)
+        while end - memory.t > least:
+            left = end - memory.t
+            # The last steps share what is left evenly.
+            h = left if left <= h * 1.0001 else 0.5 * left if left < 2.0 * h else h
+            taken = self._stepper.step(memory, h)
+            error = self._error(memory, taken)
+            if error > REJECTED:
+                if h < least:
+                    raise _failed(self._stepper, taken)
+                h = self._scaled(h, error, 0.5)
+                continue
+            memory = taken.after
+            yield taken
+            h = self.h = max(self._scaled(h, error, GROWTH), least)
+
+    def _scaled(self, h: float, error: float, most: float) -> float:
+        share = 0.25 if not np.isfinite(error) else 0.9 * max(error, 1e-12) ** (-1.0 / self._order)
+        return h * float(np.clip(share, 0.2, most))
+
+    def _error(self, memory: Memory, taken: Taken) -> float:
+        """Over the tolerance, of the positions."""
+        if not taken.converged:
+            return float(np.inf)
+        positions = slice(0, self._stepper.system.linear)
+        missed = taken.after.x[positions] - self._stepper.predicted(memory, taken.h)[positions]
+        return float(np.abs(missed).max()) / self._tolerance
+
+    def _begun(self, memory: Memory, h: float, least: float) -> list[Taken]:
+        """The first two steps, each half of one that agrees with them."""
+        stepper, positions = self._stepper, slice(0, self._stepper.system.linear)
+        while True:
+            fresh = stepper.refreshed(memory, h)
+            whole, half = stepper.step(fresh, h), stepper.step(fresh, 0.5 * h)
+            error = np.inf
+            if whole.converged and half.converged:
+                other = stepper.step(half.after, 0.5 * h)
+                if other.converged:
+                    missed = whole.after.x[positions] - other.after.x[positions]
+                    error = float(np.abs(missed).max()) / self._tolerance
+                    if error <= 1.0:
+                        self.h = 0.5 * h
+                        return [half, other]
+            if h < least:
+                raise _failed(stepper, half)
+            h *= float(np.clip(0.8 * error ** (-1.0 / (stepper.method.order + 1)), 0.1, 0.5))
+
+
+GROWTH = 2.0
+"""A step is at most so many times as long as the one before."""
+
+REJECTED = 2.0
+"""Error over the tolerance from which a step is taken again."""
+
+SMALLEST = 1e-12
+"""Share of the time between two breaks below which steps do not get."""
+
+
+def _failed(stepper: Stepper, taken: Taken) -> SolveError:
+    seconds = taken.begin.t * stepper.time
+    detail = f"Newton's method did not converge at {seconds:.6g} s in a step of {taken.h * stepper.time:.3g} s"
+    return SolveError(Status.FAILED, detail, taken.begin)
