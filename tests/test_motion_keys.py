@@ -481,9 +481,11 @@ def test_a_motion_of_a_scene_that_moves_may_begin_with_a_rate():
 
 def test_a_motion_is_at_rest_but_for_rounding():
     """At t = 0, within the interval, value and rate are sums that vanish but for rounding."""
-    history = {"t": [-0.1, 0.2], "polynomial": [[0.7 / 9.0, -0.7 * 2.0 / 3.0, 0.7]]}
-    found = made({**driven(history), "analysis/end": 0.2}).histories["h"]
-    assert 0.0 < abs(found.factor(0.0)) + abs(found.rate(0.0)) < 1e-15
+    x, a = 0.4 / (0.4 + 0.7), 0.7
+    history = {"t": [-0.4, 0.7], "polynomial": [[-a * x**3, 3 * a * x * x, -3 * a * x, a]]}
+    found = made({**driven(history), "analysis/end": 0.7}).histories["h"]
+    assert 0.0 < abs(found.factor(0.0)) < 1e-14
+    assert 0.0 < abs(found.rate(0.0)) < 1e-14
 
 
 def test_a_motion_of_what_is_released_ends_with_it():
