@@ -626,8 +626,14 @@ def test_bad_analyses_are_refused_with_one_sentence(analysis, sentence):
     [
         ({"crossing": 1}, "expect.0.crossing: the key 'step' is missing"),
         ({"limit_point": 0}, "expect.0.limit_point: found 0, accepted: a whole number from 1"),
-        ({"limit_point": 1, "bifurcation": 1}, "expect.0: accepted: one of the keys step, limit_point, bifurcation"),
-        ({"step": 1.0, "limit_point": 1}, "expect.0: accepted: one of the keys step, limit_point, bifurcation"),
+        (
+            {"limit_point": 1, "bifurcation": 1},
+            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+        ),
+        (
+            {"step": 1.0, "limit_point": 1},
+            "expect.0: accepted: one of the keys step, time, limit_point, bifurcation, flutter_point",
+        ),
     ],
 )
 def test_bad_expectations_are_refused_with_one_sentence(expect, sentence):

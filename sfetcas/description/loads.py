@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
+from functools import cached_property
+from itertools import pairwise
 from typing import Literal
 
 from pydantic import model_validator
@@ -90,19 +92,24 @@ class History(Record):
 
         A history jumps at its ends too where its rate there is not zero, as it is constant outside.
         """
+        largest, fastest = self.rounding
         last = len(self.t) - 1
-        terms = [self._terms(i) for i in range(last)]
-        spans = [self.t[i + 1] - self.t[i] for i in range(last)]
-        sizes = [sum(map(abs, term)) for term in terms]
-        slopes = [sum(k * abs(c) for k, c in enumerate(term)) / span for term, span in zip(terms, spans, strict=True)]
-        for i, t in enumerate(self.t if last else ()):
-            beside = slice(max(i - 1, 0), i + 1)
-            step = terms[i][0] - sum(terms[i - 1]) if 0 < i < last else 0.0
+        for i, t in enumerate(self.t):
+            step = self._terms(i)[0] - sum(self._terms(i - 1)) if 0 < i < last else 0.0
             kink = self.rate(t, 1) - self.rate(t, -1)
-            step = step if abs(step) > ROUNDING * max(sizes[beside]) else 0.0
-            kink = kink if abs(kink) > ROUNDING * max(slopes[beside]) else 0.0
+            step, kink = step if abs(step) > largest else 0.0, kink if abs(kink) > fastest else 0.0
             if step or kink:
                 yield t, step, kink
+
+    @cached_property
+    def rounding(self) -> tuple[float, float]:
+        """What is no more than the rounding of its coefficients: of the factor, and of the rate in 1/s."""
+        size, rate = abs(self.factor(self.t[0])), 0.0
+        for i, (left, right) in enumerate(pairwise(self.t)):
+            terms = self._terms(i)
+            size = max(size, sum(map(abs, terms)))
+            rate = max(rate, sum(k * abs(c) for k, c in enumerate(terms)) / (right - left))
+        return ROUNDING * size, ROUNDING * rate
 
     def _terms(self, i: int) -> tuple[float, ...]:
         """Coefficients of the interval i in the fraction of it."""
@@ -116,7 +123,7 @@ class History(Record):
 
 
 ROUNDING = 1e-9
-"""Of the sizes beside it: a smaller jump is the rounding of coefficients that were written with ten digits."""
+"""Of the largest values: coefficients are written with ten digits or more."""
 
 
 class Load(Record):

@@ -8,7 +8,7 @@ from ..errors import SceneError
 from .contacts import Contact
 from .loads import History, Load, Motion
 from .records import say, unknown
-from .sections import CrossSection
+from .sections import CrossSection, Polynomial, Table
 from .springs import Spring
 from .structure import Member, Node
 from .task import Analysis
@@ -90,6 +90,18 @@ def _begun(nodes: Mapping[str, Node], members: Mapping[str, Member]) -> Iterator
     yield from (("members", name, "spin") for name, member in members.items() if member.spin is not None)
 
 
+def _spins(member: Member) -> bool:
+    """Whether it begins with an angular velocity that is not zero."""
+    match member.spin:
+        case Table():
+            return any(member.spin.value)
+        case Polynomial():
+            return any(member.spin.polynomial)
+        case tuple():
+            return any(member.spin)
+    return bool(member.spin)
+
+
 def check_beginning(analysis: Analysis, nodes: Mapping[str, Node], loads: Mapping[str, Load]) -> None:
     """Refuse to cut or release what the scene does not have.
 
@@ -122,7 +134,7 @@ def check_driving(
     SceneError
         Names the history and the motion, the time and the size of the jump.
     """
-    resting = next(_begun(nodes, members), None) is None
+    resting = not any(any(node.velocity or ()) for node in nodes.values()) and not any(map(_spins, members.values()))
     for name, motion in motions.items():
         turned = motion.rotation if isinstance(motion.rotation, tuple) else (motion.rotation or 0.0,)
         still = not any((*turned, *(motion.displacement or ())))
@@ -151,12 +163,13 @@ def _check_constant(motion: str, analysis: Analysis) -> None:
 
 def _check_start(motion: str, history: History, analysis: Analysis, resting: bool) -> None:
     factor, rate = history.factor(0.0), history.rate(0.0)
-    if factor and analysis.initial == "undeformed":
+    least, slowest = history.rounding
+    if abs(factor) > least and analysis.initial == "undeformed":
         accepted = "a history that begins with 0, or initial = 'equilibrium'"
         raise SceneError(
             f"begins with {factor:g}, so that the motion {motion!r} would jump at t = 0, accepted: {accepted}"
         )
-    if rate and resting:
+    if abs(rate) > slowest and resting:
         accepted = "a history that begins at rest, or a scene that begins with velocities"
         raise SceneError(
             f"begins with a rate of {rate:g} 1/s, so that the motion {motion!r} would start with a jump, "
