@@ -6,6 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from .description.scene import Scene, check_loaded
+from .dynamics.motion import Motion
+from .dynamics.simulation import simulate
 from .equilibria import statics, stops
 from .equilibria.solution import Solution
 from .equilibria.statics import Settings
@@ -16,7 +18,7 @@ from .paths.path import Path
 __all__ = ["solve"]
 
 
-def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution | Path:
+def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution | Path | Motion:
     """The answer of a scene, by the type of its analysis.
 
     Parameters
@@ -27,8 +29,8 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
 
     Returns
     -------
-    Solution or Path
-        Both have ``steps``, ``last``, ``status`` and ``to_dict``.
+    Solution, Path or Motion
+        All have ``steps``, ``last``, ``status`` and ``to_dict``.
 
     Raises
     ------
@@ -43,6 +45,8 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
+    if scene.analysis.type == "dynamic":
+        return simulate(scene, settings)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":

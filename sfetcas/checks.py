@@ -11,6 +11,7 @@ import numpy as np
 
 from .description.records import nearest, say
 from .description.scene import Expect, Scene
+from .dynamics.motion import Instant, Motion
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
 from .paths.path import Path
@@ -38,7 +39,7 @@ class Check:
     passed: bool
 
 
-def check(scene: Scene, solution: Solution | Path) -> list[Check]:
+def check(scene: Scene, solution: Solution | Path | Motion) -> list[Check]:
     """Compare the answers with all expectations of the scene, in their order.
 
     Raises
@@ -69,10 +70,12 @@ def check(scene: Scene, solution: Solution | Path) -> list[Check]:
     return checks
 
 
-def _entry_of(solution: Solution | Path, expect: Expect) -> Equilibrium:
+def _entry_of(solution: Solution | Path | Motion, expect: Expect) -> Equilibrium | Instant:
     """The answer that an expectation speaks of."""
     if isinstance(solution, Path):
         return _entry_on_path(solution, expect)
+    if isinstance(solution, Motion):
+        return solution.last if expect.time is None else solution.at(expect.time)
     if expect.step is None:
         return solution.last
     return min(solution.steps, key=lambda step: abs(step.factor - float(expect.step or 0.0)))
@@ -96,7 +99,7 @@ def _numbered(entries: Sequence[Equilibrium], number: int, key: str) -> Equilibr
     return entries[number - 1]
 
 
-def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
+def look_up(step: Equilibrium | Instant, quantity: str, at: float | None = None) -> Any:
     """A quantity by its name in the answer, as ``nodes.B.position`` or ``members.beam.moment``.
 
     Parameters
@@ -117,6 +120,8 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
             entry |= (
                 {"quaternion": turned} if step.model.space else {"quaternion": turned, "angle": step.angle(parts[1])}
             )
+        if isinstance(step, Instant):
+            entry["velocity"] = step.velocity(parts[1])
         return _entry(entry, parts[2])
     if parts[0] == "reactions" and len(parts) == 3:
         force, moment = step.reaction(parts[1])
@@ -129,7 +134,9 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
         return _entry(step.contacts[parts[1]], parts[2])
     if parts[0] == "energy" and len(parts) == 2:
         return _entry(step.energy, parts[1])
-    if parts[0] == "certificate" and len(parts) == 2:
+    if parts[0] == "momentum" and len(parts) == 2 and isinstance(step, Instant):
+        return _entry(dict(step.momentum), parts[1])
+    if parts[0] == "certificate" and len(parts) == 2 and isinstance(step, Equilibrium):
         return _entry(step.certificate.to_dict(), parts[1])
     if quantity == "factor":
         return step.factor
@@ -140,13 +147,13 @@ def look_up(step: Equilibrium, quantity: str, at: float | None = None) -> Any:
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 
 
-def _assigned(scene: Scene, solution: Solution | Path) -> dict[int, tuple[Equilibrium, bool]]:
+def _assigned(scene: Scene, solution: Solution | Path | Motion) -> dict[int, tuple[Equilibrium, bool]]:
     """Entry of each expect, by its place, where a search listed several of one factor; whether it is its own.
 
     Numbers of ``equilibrium`` go to different entries so that as many as possible are met; an expect without one
     is about the first entry of its factor, the default answer.
     """
-    if scene.analysis.equilibria != "all":
+    if scene.analysis.equilibria != "all" or not isinstance(solution, Solution):
         return {}
     chosen: dict[int, tuple[Equilibrium, bool]] = {}
     groups: dict[float, dict[int, list[int]]] = {}

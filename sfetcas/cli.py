@@ -20,6 +20,7 @@ from .checks import Check, check
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load
+from .dynamics.motion import Motion
 from .equilibria.solution import Equilibrium, Solution
 from .equilibria.statics import Settings, pilot_of
 from .errors import SceneError, SolveError, Status
@@ -128,7 +129,7 @@ def _run(options: argparse.Namespace) -> int:
         raise SceneError(f"{options.plot}: found for --json and for --plot, accepted: two files")
     drawing = _drawing(options.plot, scene.analysis.type == "path")
 
-    def told(solution: Solution | Course) -> None:
+    def told(solution: Solution | Course | Motion) -> None:
         if options.json is not None:
             _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
         if drawing is not None:
@@ -146,7 +147,7 @@ def _run(options: argparse.Namespace) -> int:
     return SOLVED if solution.status is Status.SOLVED and all(c.passed for c in checks) else SHORT
 
 
-def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Solution | Course, list[Check]]:
+def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Solution | Course | Motion, list[Check]]:
     """The answer of a scene and its comparisons."""
     solution = _named(file, lambda: solve(scene, settings))
     return solution, _named(file, lambda: check(scene, solution))
@@ -207,15 +208,18 @@ def _umask() -> int:
     return mask
 
 
-def _report(solution: Solution | Course, seconds: float) -> None:
+def _report(solution: Solution | Course | Motion, seconds: float) -> None:
     model = solution.last.model
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(f"  {_flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
     if isinstance(solution, Course):
         _report_path(solution)
-    for step, place in zip(solution.steps, _places(solution), strict=True):
-        _report_step(step, place)
+    if isinstance(solution, Motion):
+        _report_motion(solution)
+    else:
+        for step, place in zip(solution.steps, _places(solution), strict=True):
+            _report_step(step, place)
     split = f"model {solution.seconds['model']:.3f} s, solve {solution.seconds['solve']:.3f} s"
     print(f"{solution.status.value} in {seconds:.3f} s ({split})")
 
@@ -242,6 +246,22 @@ def _report_path(path: Course) -> None:
     if path.error_estimate is not None:
         print(f"  estimated error along it {path.error_estimate:.1e}")
     for note in path.notes:
+        print(f"  note: {note}")
+
+
+def _report_motion(motion: Motion) -> None:
+    last = motion.last
+    print(f"  {motion.integrator}, {counted(motion.count, 'step')} in time, {counted(len(motion.steps), 'answer')}")
+    print(f"at {last.time:.9g} s")
+    for name in last.model.nodes[:MOST_NODES]:
+        print(f"  node {name}: position {_vector(last.position(name))} m, velocity {_vector(last.velocity(name))} m/s")
+    energy = ", ".join(f"{kind} {value:.9g}" for kind, value in last.energy.items())
+    print(f"  energy: {energy} N m")
+    worst = ", ".join(f"{kind} {value:.1e}" for kind, value in motion.violation.items())
+    error = motion.error_estimate
+    said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
+    print(f"  worst violation: {worst}; {said}")
+    for note in motion.notes:
         print(f"  note: {note}")
 
 

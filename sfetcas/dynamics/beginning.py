@@ -6,22 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from ..description.records import enumerated
-from ..description.scene import Load, Motion, Scene
+from ..description.scene import Analysis, Load, Motion, Scene
 from ..description.sections import Polynomial, Table, evaluate
 from ..equilibria import statics, stops
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError
-from ..mathematics import quaternion
 from ..mathematics.arrays import Array
-from ..mathematics.linear import SparseSolver, pattern  # noqa: F401
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import rotations_along
 from ..mechanics.model import Model
 from .stages import StageEquations
 
-__all__ = ["at_rest", "equilibrium_before", "posed", "velocities"]
+__all__ = ["at_rest", "equilibrium_before", "moving", "posed", "velocities"]
 
 
 def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
@@ -38,15 +35,17 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
         if record.history is None:
             return {}
         factor = histories[record.history].factor(0.0)
-        return {"history": None, **{key: _scaled(getattr(record, key), factor) for key in DRIVEN if hasattr(record, key)}}
+        return {
+            "history": None,
+            **{key: _scaled(getattr(record, key), factor) for key in DRIVEN if hasattr(record, key)},
+        }
 
     loads = {name: load.model_copy(update=now(load)) for name, load in scene.loads.items()}
     motions = {name: motion.model_copy(update=now(motion)) for name, motion in scene.motions.items()}
-    static = {"type": "static", "accuracy": scene.analysis.accuracy, "unstable": scene.analysis.unstable}
-    analysis = type(scene.analysis)(**static)
+    analysis = Analysis(accuracy=scene.analysis.accuracy, unstable=scene.analysis.unstable)
     nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
     members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
-    tables = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
+    tables: dict[str, Any] = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
     before = Scene(**{**dict(scene), **tables, "analysis": analysis, "expect": ()})
     stopped = any(spring.stop is not None for spring in scene.springs.values())
     return (stops.solve_stopped(before, settings) if stopped else statics.solve(before, settings)).last
@@ -68,12 +67,11 @@ def moving(scene: Scene) -> Scene:
     if not cut and not released:
         return scene
     loads = {name: load for name, load in scene.loads.items() if name not in cut}
-    nodes = {
-        name: node.model_copy(update=FREE) if name in released else node for name, node in scene.nodes.items()
-    }
+    nodes = {name: node.model_copy(update=FREE) if name in released else node for name, node in scene.nodes.items()}
     motions = {name: motion for name, motion in scene.motions.items() if motion.node not in released}
     analysis = scene.analysis.model_copy(update={"cut": (), "release": ()})
-    return Scene(**{**dict(scene), "loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis})
+    tables: dict[str, Any] = {"loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis}
+    return Scene(**{**dict(scene), **tables})
 
 
 FREE = {"support": "free", "rotation": "fixed"}
@@ -141,7 +139,9 @@ def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
 # -- velocities -------------------------------------------------------------------------------------------
 
 
-def velocities(system: StageEquations, equations: Equations, state: State, point: Point) -> tuple[Array, tuple[str, ...]]:
+def velocities(
+    system: StageEquations, equations: Equations, state: State, point: Point
+) -> tuple[Array, tuple[str, ...]]:
     """Rates of all unknowns at the begin, and notes.
 
     What is given holds; what is left open follows from the joints with the least rates of bending and turning.
@@ -180,7 +180,8 @@ def velocities(system: StageEquations, equations: Equations, state: State, point
     if max(share, joints) > CONTRADICTION:
         other = _open_row(model, held @ rates) if joints > share else ""
         raise SceneError(
-            f"contradicts the joints{other}: {max(share, joints):.2g} of the largest velocity cannot be met", names[worst]
+            f"contradicts the joints{other}: {max(share, joints):.2g} of the largest velocity cannot be met",
+            names[worst],
         )
     if max(share, joints) > TOLD:
         changed = f"initial velocities were changed by up to {max(share, joints):.1e} of the largest to suit the joints"

@@ -55,6 +55,8 @@ class Taken:
     ----------
     begin, after : Memory
     h : float
+    places : ndarray (stages,)
+        Of the stages in it, the last of them 1.
     turns : ndarray (stages, rotations, turns)
         Rotation vectors since its begin.
     shifts : ndarray (stages, displacements)
@@ -70,6 +72,7 @@ class Taken:
     begin: Memory
     after: Memory
     h: float
+    places: Array
     turns: Array
     shifts: Array
     x: Array
@@ -132,7 +135,7 @@ class Stepper:
         after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), near)
         change = float(size[0]) if np.isfinite(x).all() else np.inf
         parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
-        taken = Taken(memory, after, h, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
+        taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
         return replace(taken, after=replace(after, last=taken))
 
     def predicted(self, memory: Memory, h: float) -> Array:

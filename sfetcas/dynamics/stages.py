@@ -29,7 +29,7 @@ from ..mathematics.linear import SparseMap, pattern
 from ..mathematics.quaternion import product, turned
 from ..mechanics.connections import Group
 from ..mechanics.elements import Element
-from ..mechanics.equations import Equations
+from ..mechanics.equations import Equations, State
 from ..mechanics.joints import Connection, by_turning
 from ..mechanics.rotations import Turn
 from .masses import Masses, Observables
@@ -422,6 +422,25 @@ class StageEquations:
             if self.model.rotations.kind[i] == Turn.HELD:
                 q[:, int(i)] = _exponential(turn[:, int(i)]) if self.model.space else turn[2, int(i)]
         return q
+
+    @functools.cached_property
+    def _rates(self) -> ca.Function:
+        """(q, y, factors, near, step) -> quantities, and their derivative along a step of the unknowns."""
+        n = self.layout
+        q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
+        factors, near, step = ca.MX.sym("factors", n.factors), ca.MX.sym("near", n.near), ca.MX.sym("step", self.total)
+        along = ca.MX.sym("along")
+        spin = ca.reshape(_times(self._turning, along * step), self.turns, n.rotations)
+        shift = along * step[self.equations.turning_unknowns : self.equations.unknowns]
+        x = self.quantities(moved_by(self, q, spin), self.displacements(y + shift, factors), near)
+        rate = ca.substitute([x, ca.jtimes(x, along, ca.MX(1))], [along], [ca.MX(0)])
+        return ca.Function("rates", [q, y, factors, near, step], rate)
+
+    def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
+        """Quantities at a state, and their rates where the unknowns have the rates ``step``."""
+        full = np.concatenate([step, np.zeros(self.equations.rows)])
+        x, v = self._rates(state.q.T, state.y, factors, state.wound, full)
+        return np.array(x).ravel(), np.array(v).ravel()
 
     def gaps(self, q: ca.MX, y: ca.MX, factors: ca.MX, near: ca.MX) -> ca.MX:
         """What is left open of the closings and of the rows of joints."""

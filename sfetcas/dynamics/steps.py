@@ -94,8 +94,9 @@ def _newton(system: StageEquations, stages: int, linear: str) -> ca.Function:
         # What has converged, or gone beyond all numbers, ends.
         going = ca.logic_and(change > CONVERGED, change < LOST)
         further = ca.Function.if_else(f"further_{level}", on, end)
-        on = ca.Function(f"newton_{level}", arguments, further(going, q, y, lam, *constants, change, count + 1))
-    return ca.Function("newton", symbols, on(*symbols, 0.0, 0.0))
+        found = further(going, q, y, lam, *constants, change, count + 1)
+        on = ca.Function(f"newton_{level}", arguments, list(found))
+    return ca.Function("newton", symbols, list(on(*symbols, 0.0, 0.0)))
 
 
 LOST = 1e3

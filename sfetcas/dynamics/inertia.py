@@ -1,0 +1,158 @@
+"""Inertia and damping in numbers: forces, kinetic energy, momentum, and the loads that they are to statics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Batch
+from ..mathematics.linear import SparseMap
+from ..mechanics.balance import three
+from ..mechanics.equations import Equations, State
+from ..mechanics.joints import by_turning
+from ..mechanics.loading import Loading, carried
+from .masses import Observables
+from .observed import Axes
+from .stages import StageEquations
+
+__all__ = ["Inertia"]
+
+
+class Inertia:
+    """Masses and dampers of one model, applied to rates of its quantities (dimensionless)."""
+
+    def __init__(self, system: StageEquations) -> None:
+        self._system, self._masses = system, system.masses
+        self._model = model = system.model
+        masses, axes = system.masses, system.axes
+        self._inside = tuple(system.inner_nodes.T)
+        self._inner = masses.inner[self._inside]
+        self._inner_drag = masses.inner_drag[self._inside]
+        self._rest = np.zeros((system.linear // axes, axes))
+        for name in model.nodes:
+            self._rest[model.segments.place(name)] = np.asarray(model.scene.nodes[name].position)[:axes]
+        for name in model.members:
+            self._place(name)
+        self._rest /= model.scales.length
+        self._batches = [Batch(by_turning(group.kind), len(group.data)) for group in masses.observables]
+
+    def _place(self, name: str) -> None:
+        """Where the places and inner nodes of a member are in the undeformed scene."""
+        model, system = self._model, self._system
+        line, cuts, first = model.scene.center_lines[name], model.mesh.cuts[name], model.beams.first[name]
+        for part in model.segments.parts:
+            if part.member == name:
+                for place, i in ((part.start, part.elements.start), (part.end, part.elements.stop)):
+                    at = line.positions(np.array([cuts[i - first]]))[0]
+                    self._rest[model.segments.place(place)] = at[: system.axes]
+        mine = np.flatnonzero((system.inner_nodes[:, 0] >= first) & (system.inner_nodes[:, 0] < first + len(cuts) - 1))
+        e, k = system.inner_nodes[mine].T
+        x = cuts[e - first] + (cuts[e - first + 1] - cuts[e - first]) * model.element.nodes[k]
+        self._rest[system.places + mine] = line.positions(x)[:, : system.axes]
+
+    # -- of rates -------------------------------------------------------------------------------------
+
+    def _linear(self, of_places: SparseMap, inner: Array, rates: Array) -> Array:
+        """Weights times rates of positions (positions, axes)."""
+        places = self._system.places
+        on_places = np.stack([of_places @ column for column in rates[:places].T], axis=1)
+        return np.concatenate([on_places, inner[:, None] * rates[places:]])
+
+    def _split(self, rates: Array) -> tuple[Array, list[Array]]:
+        system = self._system
+        linear = rates[: system.linear].reshape(-1, system.axes)
+        return linear, [rates[begin:end] for begin, end in system.ranges]
+
+    def momenta(self, velocity: Array) -> tuple[Array, list[Array]]:
+        """Weights times velocities: of positions (positions, axes), of each group of observables."""
+        linear, others = self._split(velocity)
+        groups = [group.mass.ravel() * rate for group, rate in zip(self._masses.observables, others, strict=True)]
+        return self._linear(self._masses.places, self._inner, linear), groups
+
+    def forces(self, velocity: Array, acceleration: Array) -> Array:
+        """What inertia and damping ask for, (quantities,)."""
+        system = self._system
+        at_places = np.arange(system.places)
+        drag = SparseMap(at_places, at_places, self._masses.place_drag, (system.places, system.places))
+        linear, groups = self.momenta(acceleration)
+        rates, others = self._split(velocity)
+        linear = linear + self._linear(drag, self._inner_drag, rates)
+        damped = [group.damping.ravel() * rate for group, rate in zip(self._masses.observables, others, strict=True)]
+        return np.concatenate([linear.ravel(), *(a + b for a, b in zip(groups, damped, strict=True))])
+
+    def kinetic(self, velocity: Array) -> float:
+        """Kinetic energy."""
+        linear, groups = self.momenta(velocity)
+        rates, others = self._split(velocity)
+        return 0.5 * float((linear * rates).sum() + sum(float(a @ b) for a, b in zip(groups, others, strict=True)))
+
+    def momentum(self, x: Array, velocity: Array) -> tuple[Array, Array]:
+        """Linear momentum and angular momentum about the centre of mass, (3,) each."""
+        linear, groups = self.momenta(velocity)
+        moved, others = self._split(x)
+        positions = three(self._rest + moved)
+        weights = self._linear(self._masses.places, self._inner, np.ones((len(positions), 1)))[:, 0]
+        total = three(linear.sum(axis=0))
+        first, mass = weights @ positions, float(weights.sum())
+        angular = np.cross(positions, three(linear)).sum(axis=0)
+        for group, value, momentum in zip(self._masses.observables, others, groups, strict=True):
+            vectors, its = (three(part.reshape(-1, self._system.axes)) for part in (value, momentum))
+            if isinstance(group.kind, Axes):
+                angular = angular + np.cross(vectors, its).sum(axis=0)
+        return total, angular - np.cross(first / mass, total)
+
+    # -- as loads ---------------------------------------------------------------------------------------
+
+    def loading(self, equations: Equations, state: State, loading: Loading, forces: Array) -> Loading:
+        """Loads at a state with inertia and damping forces among them (d'Alembert)."""
+        system, model = self._system, self._model
+        linear = -forces[: system.linear].reshape(-1, system.axes)
+        on_places, inner = linear[: system.places], linear[system.places :]
+        spread = np.zeros_like(loading.spread)
+        spread[self._inside] = inner
+        pull, carried_to = carried(spread, model.segments, model.element)
+        moment, own = loading.moment.copy(), on_places.copy()
+        places = equations.places(state, loading)
+        for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
+            shares = -self._shares(equations, state, places, group, batch, forces[begin:end])
+            width = system.turns
+            for side, turns in enumerate(group.turns.T):
+                used = turns >= 0
+                part = shares[:, width * side : width * (side + 1)]
+                three_of = np.zeros((len(part), 3))
+                three_of[:, 3 - width :] = part
+                np.add.at(moment, turns[used], three_of[used])
+            first = width * group.turns.shape[1]
+            for side, at in enumerate(group.places.T):
+                used, begin_of = at >= 0, first + system.axes * side
+                np.add.at(own, at[used], shares[used, begin_of : begin_of + system.axes])
+        return replace(
+            loading,
+            force=loading.force + own + carried_to,
+            own=loading.own + own,
+            spread=loading.spread + spread,
+            pull=loading.pull + pull,
+            moment=moment,
+        )
+
+    def _shares(
+        self, equations: Equations, state: State, places: Array, group: Observables, batch: Batch, forces: Array
+    ) -> Array:
+        """Moments on the rotations and forces on the places of a group, (n, width)."""
+        model, n = self._model, len(group.data)
+        rest = np.array([1.0, 0.0, 0.0, 0.0]) if model.space else np.zeros(1)
+        q = np.vstack([state.q, rest])
+        u = np.vstack([places.reshape(-1, model.element.axes), np.zeros((1, model.element.axes))])
+        data = group.data
+        if group.spring is not None and model.winding.parts[group.spring] is not None:
+            part = model.winding.parts[group.spring]
+            assert part is not None
+            data = data.copy()
+            data[:, -1] = model.winding.angles(state.q, state.wound)[part][group.numbers]
+        for i, values in enumerate((q[group.turns], u[group.places], data)):
+            if values.size:
+                batch.set(i, values)
+        batch.set(4, forces.reshape(n, -1))
+        return np.asarray(batch()[3].copy())

@@ -1,0 +1,222 @@
+"""What a motion gives by name: histories of positions, rotations, reactions, energies and momenta."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..description.records import plain
+from ..equilibria.solution import Posture
+from ..errors import Status
+from ..mathematics.arrays import Array
+from ..mechanics.balance import three
+from ..mechanics.equations import Equations, State
+from ..mechanics.fields import Fields
+from ..mechanics.model import Model
+from ..solvers.newton import DUAL
+from .inertia import Inertia
+from .sampling import Sample
+
+__all__ = ["Instant", "Motion", "Mover"]
+
+
+class Mover:
+    """What makes instants of samples: one model with its equations and masses."""
+
+    def __init__(self, equations: Equations, inertia: Inertia, time: float, factors: Callable[[float], Array]) -> None:
+        self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
+        self.model: Model = equations.model
+
+    def instant(self, sample: Sample) -> Instant:
+        """A sample by name."""
+        model, equations = self.model, self.equations
+        groups = [
+            model.groups[name].scaled(float(f)) for name, f in zip(model.groups, self.factors(sample.t), strict=True)
+        ]
+        loading = functools.reduce(lambda a, b: a.plus(b), groups)
+        free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.near)
+        point = equations.at(free, loading)
+        forces = self.inertia.forces(sample.v, sample.a)
+        balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
+        state = State(sample.q, sample.y, self._multipliers(free, balanced), sample.near)
+        kinetic = self.inertia.kinetic(sample.v)
+        return Instant(
+            factor=sample.t * self.time,
+            model=model,
+            state=state,
+            loading=balanced,
+            fields=Fields(equations, state, balanced),
+            time=sample.t * self.time,
+            sample=sample,
+            energies=(kinetic, point.strain, point.potential - point.strain),
+            mover=self,
+        )
+
+    def _multipliers(self, free: State, balanced: Any) -> Array:
+        """Internal forces that leave the least out of balance."""
+        equations = self.equations
+        point, n = equations.at(free, balanced), equations.unknowns
+        if not equations.rows:
+            return np.zeros(0)
+        # [1 G^T; G 0]: least squares of the residual, rows of the closings last.
+        mixed = (equations.row >= n) != (equations.column >= n)
+        entries = np.where(mixed, point.entries, 0.0)
+        entries[equations.diagonal[:n]] = 1.0
+        entries[equations.diagonal[n:]] = -DUAL
+        equations.solver.factor(entries)
+        right = np.concatenate([-point.residual[:n], np.zeros(equations.rows)])
+        return np.asarray(equations.solver.solve(right)[n:])
+
+
+@dataclass(frozen=True, eq=False)
+class Instant(Posture):
+    """The state of a motion at a time; section forces and reactions are those with inertia and damping.
+
+    Attributes
+    ----------
+    time : float
+        s; also its ``factor``.
+    sample : Sample
+        Rotations, quantities and their rates, dimensionless.
+    """
+
+    time: float
+    sample: Sample = field(repr=False)
+    energies: tuple[float, float, float] = field(repr=False)
+    mover: Mover = field(repr=False)
+
+    def velocity(self, node: str) -> Array:
+        """Velocity of a node, (3,) m/s."""
+        place = self.model.segments.place(self._known(node, self.model.nodes, "node"))
+        axes = self.model.element.axes
+        rate = self.sample.v[axes * place : axes * (place + 1)]
+        return three(rate) * self.model.scales.length / self.mover.time
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """Kinetic and elastic energy, potential of the loads as they are now, and their sum, N m."""
+        kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
+        return {"kinetic": kinetic, "elastic": elastic, "loads": loads, "total": kinetic + elastic + loads}
+
+    @functools.cached_property
+    def momentum(self) -> dict[str, Array]:
+        """Linear momentum, (3,) kg m/s, and angular momentum about the centre of mass, (3,) kg m2/s."""
+        linear, angular = self.mover.inertia.momentum(self.sample.x, self.sample.v)
+        time, scales = self.mover.time, self.model.scales
+        return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Values of this time, as leaves of the JSON answer."""
+        scene = self.model.scene
+        nodes: dict[str, Any] = {}
+        for name in self.model.nodes:
+            entry: dict[str, Any] = {"position": self.position(name), "velocity": self.velocity(name)}
+            turned = self.quaternion(name)
+            if turned is not None:
+                entry["quaternion"] = turned
+                if not self.model.space:
+                    entry["angle"] = self.angle(name)
+            nodes[name] = entry
+        reactions = {}
+        for name, node in scene.nodes.items():
+            if node.support != "free":
+                force, moment = self.reaction(name)
+                reactions[name] = {"force": force, "moment": moment}
+        answer: dict[str, Any] = {"nodes": nodes, "reactions": reactions}
+        if scene.springs:
+            answer["springs"] = {name: self.spring(name).to_dict() for name in scene.springs}
+        if scene.motions:
+            answer["motions"] = {name: self.motion(name) for name in scene.motions}
+        return {**answer, "energy": self.energy, "momentum": self.momentum}
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The motion of a scene, made by :func:`sfetcas.solve`.
+
+    Attributes
+    ----------
+    status : Status
+    steps : tuple of Instant
+        One for each time of the answer.
+    seconds : mapping
+        Time spent on the model, on building and on compiling the step, and on solving.
+    count : int
+        Steps in time of the last run.
+    error_estimate : float or None
+        Of the positions over the size of the scene, largest over the times; None where step and mesh are prescribed.
+    violation : mapping
+        Largest that ``norms`` of quaternions and ``closings`` (over the unit of length) were off at the ends of steps.
+    notes : tuple of str
+    failure : str
+        Where it ended before its time, why.
+    """
+
+    scene: Any = field(repr=False)
+    status: Status
+    steps: tuple[Instant, ...] = field(repr=False)
+    seconds: Mapping[str, float]
+    integrator: str
+    count: int
+    error_estimate: float | None
+    violation: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+    failure: str = ""
+
+    @property
+    def last(self) -> Instant:
+        """The state at the last time."""
+        return self.steps[-1]
+
+    @property
+    def times(self) -> Array:
+        """Times of the answer, s."""
+        return np.array([step.time for step in self.steps])
+
+    def at(self, time: float) -> Instant:
+        """The instant of the answer nearest to a time."""
+        return self.steps[int(np.abs(self.times - time).argmin())]
+
+    def positions(self, node: str) -> Array:
+        """Positions of a node over the times, (times, 3) m."""
+        return np.array([step.position(node) for step in self.steps])
+
+    def velocities(self, node: str) -> Array:
+        """Velocities of a node over the times, (times, 3) m/s."""
+        return np.array([step.velocity(node) for step in self.steps])
+
+    def energies(self, kind: str = "total") -> Array:
+        """Energies over the times, (times,) N m: kinetic, elastic, loads or total."""
+        return np.array([step.energy[kind] for step in self.steps])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON answer: every leaf is a list over ``times``."""
+        model = self.last.model
+        return {
+            "status": self.status.value,
+            **({"failure": self.failure} if self.failure else {}),
+            "title": self.scene.title,
+            "dimension": model.dimension,
+            "unknowns": model.unknowns,
+            "seconds": dict(self.seconds),
+            "integrator": self.integrator,
+            "count": self.count,
+            "error_estimate": self.error_estimate,
+            "violation": dict(self.violation),
+            "notes": list(self.notes),
+            "times": self.times.tolist(),
+            **_columns([step.to_dict() for step in self.steps]),
+        }
+
+
+def _columns(entries: list[dict[str, Any]]) -> dict[str, Any]:
+    """Equal nested tables as one whose leaves are lists."""
+    found: dict[str, Any] = {}
+    for key, first in entries[0].items():
+        values = [entry[key] for entry in entries]
+        found[key] = _columns(values) if isinstance(first, dict) else [plain(value) for value in values]
+    return found

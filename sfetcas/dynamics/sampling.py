@@ -1,0 +1,130 @@
+"""States between and at the ends of steps: polynomials through the stages of neighbouring steps.
+
+Positions at the ends of steps are of the full order of a method, its own velocities and internal forces of index 3
+are not; derivatives of these polynomials are nearly, and serve instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mathematics.interpolation import differentiation, evaluation
+from .integrating import Taken
+
+__all__ = ["Sample", "Sampler"]
+
+NODES = 6
+"""Intervals of the polynomials at least, where so many stages are smoothly connected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A state of the motion, dimensionless.
+
+    Attributes
+    ----------
+    t : float
+    q : ndarray (rotations, components)
+    y : ndarray
+    x, v, a : ndarray (quantities,)
+        Quantities and their rates.
+    near : ndarray
+        Angles that count turns.
+    """
+
+    t: float
+    q: Array
+    y: Array
+    x: Array
+    v: Array
+    a: Array
+    near: Array
+
+
+class Sampler:
+    """Samples of a motion at rising times, as soon as the steps around them are there.
+
+    Parameters
+    ----------
+    times : rising, dimensionless
+    stages : int
+        Stages of a step.
+    """
+
+    def __init__(self, times: Sequence[float] | Array, stages: int) -> None:
+        self._times, self._next = list(times), 0
+        self._steps: list[Taken] = []
+        self._around = -(-NODES // stages)
+
+    def feed(self, taken: Taken) -> Iterator[Sample]:
+        """Samples that a further step makes possible."""
+        if taken.begin.last is None:
+            yield from self.close()
+        self._steps.append(taken)
+        # Two steps beyond the one a time lies in make its polynomial a central one.
+        settled = len(self._steps) - 1 - max(1, self._around // 2)
+        if settled >= 0:
+            yield from self._up_to(self._steps[settled].after.t)
+        if len(self._steps) > 2 * self._around:
+            del self._steps[0]
+
+    def close(self) -> Iterator[Sample]:
+        """Samples of the steps so far, which nothing continues smoothly."""
+        if self._steps:
+            yield from self._up_to(self._steps[-1].after.t)
+        self._steps.clear()
+
+    def _up_to(self, end: float) -> Iterator[Sample]:
+        while self._next < len(self._times) and self._times[self._next] <= end * (1.0 + 1e-12):
+            yield self.at(self._times[self._next])
+            self._next += 1
+
+    def at(self, t: float) -> Sample:
+        """The sample at a time within the steps that are there."""
+        ends = [taken.after.t for taken in self._steps]
+        k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
+        first = max(0, min(k - (self._around - 1) // 2, len(ends) - self._around))
+        return _interpolated(self._steps[first : first + self._around], self._steps[k], t)
+
+
+def _interpolated(steps: Sequence[Taken], own: Taken, t: float) -> Sample:
+    begin, h = own.begin, own.h
+    nodes, x, y, turns = [(steps[0].begin.t - begin.t) / h], [steps[0].begin.x], [steps[0].begin.y], []
+    turns.append(_from(begin.q, steps[0].begin.q))
+    for taken in steps:
+        nodes += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places]
+        x += list(taken.x)
+        y += list(taken.begin.y + taken.shifts)
+        turns += [_from(begin.q, _turned(taken.begin.q, turn)) for turn in taken.turns]
+    at, here = np.array(nodes), np.array([(t - begin.t) / h])
+    row = evaluation(at, here)
+    slopes = differentiation(at)
+    quantities = np.array(x) - own.after.x
+    q = _turned(begin.q, np.einsum("n,nra->ra", row[0], np.array(turns)))
+    v = (row @ slopes @ quantities)[0] / h
+    a = (row @ slopes @ slopes @ quantities)[0] / h**2
+    position = own.after.x + (row @ quantities)[0]
+    return Sample(t, q, (row @ np.array(y))[0], position, v, a, own.after.near)
+
+
+def _turned(q: Array, turn: Array) -> Array:
+    if q.shape[1] == 1:
+        return q + turn
+    moved = quaternion.multiply(quaternion.from_rotation_vector(turn), q)
+    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+
+
+def _from(q: Array, there: Array) -> Array:
+    """Rotation vectors (rotations, turns) from rotations to others, shorter than a turn."""
+    if q.shape[1] == 1:
+        return there - q
+    r = quaternion.multiply(there, quaternion.conjugate(q))
+    r = np.where(r[:, :1] < 0.0, -r, r)
+    sine = np.linalg.norm(r[:, 1:], axis=1, keepdims=True)
+    share = np.where(sine < 1e-8, 2.0, 2.0 * np.arctan2(sine, r[:, :1]) / np.maximum(sine, 1e-300))
+    return np.asarray(share * r[:, 1:])
