@@ -6,6 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
+from math import perm
 from typing import Literal
 
 from pydantic import model_validator
@@ -102,6 +103,25 @@ class History(Record):
                 yield t, step, kink
 
     @cached_property
+    def kinks(self) -> tuple[float, ...]:
+        """Where the factor, its rate or its second derivative jumps by more than coefficients of six digits do."""
+        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._terms(i))) for i in range(len(self.t) - 1)), 0.0)
+        found = []
+        for i, t in enumerate(self.t):
+            left = (self._terms(i - 1), self.t[i] - self.t[i - 1]) if i else None
+            right = (self._terms(i), self.t[i + 1] - t) if i < len(self.t) - 1 else None
+            span = min(piece[1] for piece in (left, right) if piece) if left or right else 1.0
+            jumps = [
+                (_derivative(*right, 0.0, k) if right else 0.0) - (_derivative(*left, 1.0, k) if left else 0.0)
+                for k in (1, 2)
+            ]
+            jumps = [jump * span**k for k, jump in zip((1, 2), jumps, strict=True)]
+            step = right[0][0] - sum(left[0]) if left and right else 0.0
+            if max(map(abs, (step, *jumps))) > SMOOTH * size:
+                found.append(t)
+        return tuple(found)
+
+    @cached_property
     def rounding(self) -> tuple[float, float]:
         """What is no more than the rounding of its coefficients: of the factor, and of the rate in 1/s."""
         size, rate = abs(self.factor(self.t[0])), 0.0
@@ -121,6 +141,14 @@ class History(Record):
         assert self.value is not None
         return self.value[i]
 
+
+def _derivative(terms: tuple[float, ...], span: float, x: float, k: int) -> float:
+    """A derivative of a polynomial in the fraction x of a span of time."""
+    return sum(perm(j, k) * c * x ** (j - k) for j, c in enumerate(terms) if j >= k) / span**k
+
+
+SMOOTH = 1e-6
+"""Jumps over the largest value, of derivatives times the interval's length, up to which a history goes on smoothly."""
 
 ROUNDING = 1e-9
 """Of the largest values: coefficients are written with ten digits or more."""

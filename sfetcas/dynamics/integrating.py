@@ -188,14 +188,19 @@ def integrate(
     step: float | None = None,
     tolerance: float | None = None,
     first: float | None = None,
+    beyond: float = 0.0,
 ) -> Iterator[Taken]:
-    """Steps up to the last of the breaks, which all are ends of steps.
+    """Steps up to the last of the breaks, which all are ends of steps, and a few beyond it.
+
+    Those beyond make the last answers as accurate as all others, which have steps on both sides.
 
     Parameters
     ----------
     breaks : rising times, dimensionless
     step : fixed length; the steps between two breaks are equal and no longer
     tolerance : or by the error of a step, relative to the unit of length
+    first : step that is tried first
+    beyond : time up to which all goes on smoothly after the last break
 
     Raises
     ------
@@ -222,6 +227,19 @@ def integrate(
                 memory = taken.after
                 yield taken
             first = steps.h
+    for _ in range(BEYOND):
+        last = memory.last
+        if last is None or memory.t + last.h > beyond:
+            break
+        taken = stepper.step(memory, last.h)
+        if not taken.converged:
+            break
+        memory = taken.after
+        yield taken
+
+
+BEYOND = 3
+"""Steps beyond the end at most."""
 
 
 class _Adaptive:

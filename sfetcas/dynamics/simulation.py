@@ -101,8 +101,13 @@ class _Simulation:
     def _breaks(self, unit: float) -> list[float]:
         """Times at which loads or motions have a kink, and the end, dimensionless."""
         end = self.scene.analysis.duration
-        kinks = {t for history in self.scene.histories.values() for t in history.t if 0.0 < t < end}
-        return [t / unit for t in sorted({*kinks, end})]
+        return [t / unit for t in sorted({*(t for t in self._kinks if 0.0 < t < end), end})]
+
+    @property
+    def _kinks(self) -> set[float]:
+        used = {load.history for load in self.scene.loads.values()}
+        used |= {motion.history for motion in self.scene.motions.values()}
+        return {t for name in used if name is not None for t in self.scene.histories[name].kinks}
 
     # -- one run ----------------------------------------------------------------------------------------
 
@@ -124,9 +129,9 @@ class _Simulation:
         step = None if analysis.step is None else analysis.step / masses.time
         size = self.scene.size / model.scales.length
         first = None if step is not None else FIRST * analysis.duration / masses.time
-        steps = integrate(
-            stepper, memory, self._breaks(masses.time), step=step, tolerance=tolerance * size, first=first
-        )
+        beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf) / masses.time
+        limits: dict[str, Any] = {"step": step, "tolerance": tolerance * size, "first": first, "beyond": beyond}
+        steps = integrate(stepper, memory, self._breaks(masses.time), **limits)
         run = _Run([], 0, 0.0, 0.0, notes, {})
         solving = time.perf_counter()
         try:
@@ -142,6 +147,9 @@ class _Simulation:
 
     def _counted(self, steps: Iterator[Taken], run: _Run, unit: float) -> Iterator[Taken]:
         for taken in steps:
+            if taken.begin.t * unit >= self.scene.analysis.duration * (1.0 - 1e-12):
+                yield taken
+                continue
             run.count += 1
             run.gap = max(run.gap, taken.gap)
             if taken.after.q.shape[1] == 4:
