@@ -30,7 +30,7 @@ from ..mathematics.quaternion import product, turned
 from ..mechanics.connections import Group
 from ..mechanics.elements import Element
 from ..mechanics.equations import Equations, State
-from ..mechanics.joints import Connection, by_turning
+from ..mechanics.joints import Connection, by_turning, name_of
 from ..mechanics.rotations import Turn
 from .masses import Masses, Observables
 
@@ -139,7 +139,7 @@ class StageEquations:
         self.elements, self.points = model.rotations.turns.shape
         self.axes, self.turns = element.axes, element.turns
         self.groups = tuple(model.groups)
-        self.kernel = chosen(element.turning, calls * self.elements, kernels)
+        self._calls, self._kernels = calls, kernels
         self.given = [
             ca.DM(part.reshape(self.elements * self.points, -1).T)
             for part in (model.beams.stiffness, model.beams.tangent)
@@ -150,6 +150,10 @@ class StageEquations:
         self._close()
         self._weigh()
         self._load()
+
+    def many(self, function: ca.Function, n: int) -> ca.Function:
+        """A function of single things for n of them, compiled where that pays."""
+        return chosen(function, self._calls * n, self._kernels).map(n)
 
     # -- numbers ----------------------------------------------------------------------------------
 
@@ -197,7 +201,7 @@ class StageEquations:
         columns = (elements[:, None] * self.points + np.arange(self.points)).ravel().tolist()
         given = ca.reshape(_times(self.tangential, factors), self.axes, self.elements * self.points)[:, columns]
         turns = self.model.rotations.turns[elements].ravel().tolist()
-        return _turned(self.model.space).map(len(columns))(q[:, turns], given)
+        return self.many(_turned(self.model.space), len(columns))(q[:, turns], given)
 
     def carried(self, q: ca.MX, factors: ca.MX) -> ca.MX:
         """Pull of distributed followers on the points of all elements."""
@@ -247,12 +251,12 @@ class StageEquations:
         if len(followers.places):
             n = len(followers.places)
             given = ca.reshape(_times(self.following, factors), self.axes, n)
-            forces = _turned(space).map(n)(q[:, followers.turns.tolist()], given)
+            forces = self.many(_turned(space), n)(q[:, followers.turns.tolist()], given)
             at = (self.axes * followers.places[:, None] + np.arange(self.axes)).ravel()
             on_places -= _times(
                 _sparse(at, np.arange(len(at)), np.ones(len(at)), (self.axes * self.places, len(at))), ca.vec(forces)
             )
-            entries.append(ca.vec(_change(space).map(n)(forces)))
+            entries.append(ca.vec(self.many(_change(space), n)(forces)))
         if len(followers.elements):
             n = len(followers.elements)
             forces = self._tangential(q, factors)
@@ -263,14 +267,14 @@ class StageEquations:
             )
             columns = (followers.elements[:, None] * self.points + np.arange(self.points)).ravel().tolist()
             tangents = self.tangents(q)[:, columns]
-            entries.append(ca.vec(_spread_change(self.model.element).map(n)(forces, tangents)))
+            entries.append(ca.vec(self.many(_spread_change(self.model.element), n)(forces, tangents)))
         if self.twisting:
             n = self.layout.rotations
-            twist = _turned(True).map(n)(q, ca.reshape(_times(self.twist, factors), 3, n))
+            twist = self.many(_turned(True), n)(q, ca.reshape(_times(self.twist, factors), 3, n))
             moment = ca.reshape(_times(self.moment, factors), 3, n)
             on_turns -= ca.vec(twist)
             # The symmetric form of all moments counts these with minus and plus half of what they turn by.
-            entries.append(0.5 * ca.vec(_change(True).map(n)(twist - moment)))
+            entries.append(0.5 * ca.vec(self.many(_change(True), n)(twist - moment)))
         return on_places, on_turns, entries
 
     def _sides(self, group: Group | Observables) -> Index:
@@ -408,7 +412,7 @@ class StageEquations:
         """Turned tangents of all points, (axes, elements * points)."""
         at_points = q[:, self.model.rotations.turns.ravel().tolist()]
         given = ca.DM(self.model.beams.tangent.reshape(-1, self.axes).T)
-        return _turned(self.model.space).map(self.elements * self.points)(at_points, given)
+        return self.many(_turned(self.model.space), self.elements * self.points)(at_points, given)
 
     def displacements(self, y: ca.MX, factors: ca.MX) -> ca.MX:
         """Displacements of all places."""
@@ -453,12 +457,12 @@ class StageEquations:
             if group.rows:
                 n = len(group.data)
                 load = ca.reshape(_times(self.loads[number], factors), group.kind.sizes[4], n)
-                parts.append(ca.vec(_values(group.kind).map(n)(*self.sides(group, q, places, near), load)))
+                parts.append(ca.vec(self.many(_values(group.kind), n)(*self.sides(group, q, places, near), load)))
         return ca.vertcat(*parts)
 
     def turned(self, q: ca.MX, there: ca.MX) -> ca.MX:
         """Rotation vectors (turns, rotations) from rotations to others."""
-        return _vectors(self.model.space).map(self.layout.rotations)(q, there)
+        return self.many(_vectors(self.model.space), self.layout.rotations)(q, there)
 
     def quantities(self, q: ca.MX, places: ca.MX, near: ca.MX) -> ca.MX:
         """All quantities X."""
@@ -467,7 +471,7 @@ class StageEquations:
             parts[0] += _times(self.by_tangent, ca.vec(self.tangents(q)) - ca.DM(self.rest))
         for group in self.masses.observables:
             n = len(group.data)
-            parts.append(ca.vec(_values(group.kind).map(n)(*self.sides(group, q, places, near), ca.MX(0, n))))
+            parts.append(ca.vec(self.many(_values(group.kind), n)(*self.sides(group, q, places, near), ca.MX(0, n))))
         return ca.vertcat(*parts)
 
     def sides(self, group: Observables | Group, q: ca.MX, places: ca.MX, near: ca.MX) -> list[ca.MX]:
@@ -665,7 +669,7 @@ class _Stage:
         if system.elements:
             pull = _times(system.pull, factors) + _times(system.closing.T, lam[:closings])
             pull += _times(system.by_tangent.T, linear) + system.carried(q, factors)
-            found = system.kernel.map(system.elements)(
+            found = system.many(model.element.turning, system.elements)(
                 q[:, model.rotations.turns.ravel().tolist()],
                 system.given[0],
                 system.given[1],
@@ -685,7 +689,7 @@ class _Stage:
             first = closings + sum(len(g.rows) for g in model.connections[:number])
             own = ca.reshape(lam[first : first + n * count], count, n)
             load = ca.reshape(_times(system.loads[number], factors), group.kind.sizes[4], n)
-            found = by_turning(group.kind).map(n)(*system.sides(group, q, places, near), load, own)
+            found = system.many(by_turning(group.kind), n)(*system.sides(group, q, places, near), load, own)
             full.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
             if count:
@@ -697,7 +701,9 @@ class _Stage:
         ):
             n, count = len(observed.data), observed.kind.sizes[2]
             own = ca.reshape(forces[begin:end], count, n)
-            found = by_turning(observed.kind).map(n)(*system.sides(observed, q, places, near), ca.MX(0, n), own)
+            found = system.many(by_turning(observed.kind), n)(
+                *system.sides(observed, q, places, near), ca.MX(0, n), own
+            )
             full.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
             self._spins.append(found[5])
@@ -717,13 +723,15 @@ class _Stage:
         for group, mine, its in zip(system.masses.observables, self._spins, other._spins, strict=True):
             n = len(group.data)
             weight = b * ca.DM(group.mass.T) + c * ca.DM(group.damping.T)
-            entries.append(ca.vec(_pairs(*group.kind.sizes[2:3], mine.shape[1] // n).map(n)(mine, its, weight)))
+            entries.append(ca.vec(system.many(_pairs(group.kind.sizes[2], mine.shape[1] // n), n)(mine, its, weight)))
         if len(system.massive):
             n = len(system.massive)
             shares = b * ca.DM(system.inner[0]) + c * ca.DM(system.inner[1])
             first = b * ca.DM(system.firsts[0]) + c * ca.DM(system.firsts[1])
             entries.append(
-                ca.vec(_inner(system.axes, system.turns, system.points).map(n)(self._spin, other._spin, shares))
+                ca.vec(
+                    system.many(_inner(system.axes, system.turns, system.points), n)(self._spin, other._spin, shares)
+                )
             )
             entries += [ca.vec(self._spin) * first, ca.vec(other._spin) * first]
         entries += [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
@@ -731,6 +739,10 @@ class _Stage:
 
 
 # -- functions of single things, made once a process ---------------------------------------------------
+
+
+def _tag(space: bool) -> str:
+    return "space" if space else "plane"
 
 
 @functools.cache
@@ -742,14 +754,14 @@ def _turned(space: bool) -> ca.Function:
     else:
         c, s = ca.cos(q), ca.sin(q)
         now = ca.vertcat(c * t[0] - s * t[1], s * t[0] + c * t[1])
-    return ca.Function("turned", [q, t], [now])
+    return ca.Function(f"turned_{_tag(space)}", [q, t], [now])
 
 
 @functools.cache
 def _change(space: bool) -> ca.Function:
     """(f) -> minus the derivative of a vector that turns, by its rotation."""
     f = ca.SX.sym("f", 3 if space else 2)
-    return ca.Function("change", [f], [ca.densify(ca.skew(f) if space else ca.vertcat(f[1], -f[0]))])
+    return ca.Function(f"change_{_tag(space)}", [f], [ca.densify(ca.skew(f) if space else ca.vertcat(f[1], -f[0]))])
 
 
 @functools.cache
@@ -767,19 +779,19 @@ def _spread_change(element: Element) -> ca.Function:
             crossed = ca.skew(arm) if element.space else ca.horzcat(-arm[1], arm[0])
             rows = slice(axes + turns * j, axes + turns * (j + 1))
             whole[rows, columns] = element.to_points[i, j] * ca.mtimes(crossed, change)
-    return ca.Function("spread_change", [f, t], [ca.densify(whole)])
+    return ca.Function(f"spread_change_{_tag(element.space)}_{n}", [f, t], [ca.densify(whole)])
 
 
 @functools.cache
-def _moved(space: bool, count: int) -> ca.Function:
-    """(q, phi) -> exp(phi / 2) q for all rotations, of length one again."""
+def _moved(space: bool) -> ca.Function:
+    """(q, phi) -> exp(phi / 2) q, of length one again."""
     q, phi = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("phi", 3 if space else 1)
     if space:
         now = ca.vertcat(*product(ca.vertsplit(_exponential(phi)), ca.vertsplit(q)))
         now /= ca.norm_2(now)
     else:
         now = q + phi
-    return ca.Function("moved", [q, phi], [now]).map(count)
+    return ca.Function(f"moved_{_tag(space)}", [q, phi], [now])
 
 
 def _exponential(phi: T) -> T:
@@ -793,7 +805,7 @@ def _exponential(phi: T) -> T:
 
 def moved_by(system: StageEquations, q: ca.MX, phi: ca.MX) -> ca.MX:
     """Rotations (components, rotations) after rotation vectors (turns, rotations)."""
-    return _moved(system.model.space, system.layout.rotations)(q, phi)
+    return system.many(_moved(system.model.space), system.layout.rotations)(q, phi)
 
 
 @functools.cache
@@ -801,14 +813,14 @@ def _vectors(space: bool) -> ca.Function:
     """(q, p) -> rotation vector from q to p, shorter than a turn."""
     q, p = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("p", 4 if space else 1)
     if not space:
-        return ca.Function("vectors", [q, p], [p - q])
+        return ca.Function(f"vectors_{_tag(space)}", [q, p], [p - q])
     a = ca.vertsplit(q)
     r = ca.vertcat(*product(ca.vertsplit(p), [a[0], -a[1], -a[2], -a[3]]))
     r = ca.if_else(r[0] < 0.0, -1.0, 1.0) * r
     sine = ca.sqrt(ca.fmax(ca.dot(r[1:], r[1:]), 1e-30))
     # The angle over its half sine, to all digits also where it vanishes.
     share = ca.if_else(sine < 1e-6, 2.0, 2.0 * ca.atan2(sine, r[0]) / sine)
-    return ca.Function("vectors", [q, p], [share * r[1:]])
+    return ca.Function(f"vectors_{_tag(space)}", [q, p], [share * r[1:]])
 
 
 @functools.cache
@@ -819,14 +831,14 @@ def _values(kind: Connection) -> ca.Function:
     given, load = ca.SX.sym("data", data), ca.SX.sym("load", loads)
     sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
     rows = ca.densify(ca.vertcat(*kind.residual(*sides, given, load)))
-    return ca.Function("values", [q, u, given, load], [rows])
+    return ca.Function(f"values_{name_of(kind)}", [q, u, given, load], [rows])
 
 
 @functools.cache
 def _pairs(rows: int, width: int) -> ca.Function:
     """(A, B, w) -> A^T diag(w) B."""
     a, b, w = ca.SX.sym("a", rows, width), ca.SX.sym("b", rows, width), ca.SX.sym("w", rows)
-    return ca.Function("pairs", [a, b, w], [ca.densify(ca.mtimes(a.T, ca.repmat(w, 1, width) * b))])
+    return ca.Function(f"pairs_{rows}_{width}", [a, b, w], [ca.densify(ca.mtimes(a.T, ca.repmat(w, 1, width) * b))])
 
 
 @functools.cache
@@ -835,4 +847,4 @@ def _inner(axes: int, turns: int, points: int) -> ca.Function:
     a, b = ca.SX.sym("a", axes, turns * points), ca.SX.sym("b", axes, turns * points)
     w = ca.SX.sym("w", points, points)
     whole = ca.mtimes(a.T, b) * ca.kron(w, ca.SX.ones(turns, turns))
-    return ca.Function("inner", [a, b, w], [ca.densify(whole)])
+    return ca.Function(f"inner_{axes}_{turns}_{points}", [a, b, w], [ca.densify(whole)])

@@ -34,6 +34,9 @@ FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 SECONDS_PER_INSTRUCTION = 5e-9
 """What the virtual machine spends on an instruction (measured 4 to 6 ns)."""
 
+COMPILE_SECONDS = 0.06
+"""What a compiler spends on nothing."""
+
 COMPILE_SECONDS_PER_INSTRUCTION = 8e-5
 """What the compiler spends on an instruction (measured: 16,000 instructions in 1.3 s)."""
 
@@ -111,7 +114,7 @@ def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca
         return function
     instructions = function.n_instructions()
     spent = calls * instructions * SECONDS_PER_INSTRUCTION
-    if way == "compiled" or spent > instructions * COMPILE_SECONDS_PER_INSTRUCTION:
+    if way == "compiled" or spent > COMPILE_SECONDS + instructions * COMPILE_SECONDS_PER_INSTRUCTION:
         return compiled(function)
     # Looking into the cache costs a serialization: worth it only where time is spent at all.
     return (_load(function, _library(function)) or function) if spent > 0.02 else function

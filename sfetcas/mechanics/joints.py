@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import final
 
 import casadi as ca
@@ -37,6 +37,7 @@ __all__ = [
     "Universal",
     "by_components",
     "by_turning",
+    "name_of",
 ]
 
 Side = list[ca.SX]
@@ -425,9 +426,15 @@ def _symbols(kind: Connection) -> tuple[list[ca.SX], ca.SX, ca.SX]:
     return arguments, energy, residual
 
 
-def _name(kind: Connection) -> str:
-    extra = f"_{kind.nodes}_{kind.stiff}" if isinstance(kind, Body) else ""
-    extra += "_crossed" if isinstance(kind, Turning) and kind.crossed else ""
+def name_of(kind: Connection) -> str:
+    """A name for functions of a kind, of its own for each kind."""
+    extra = ""
+    for item in fields(kind):
+        value = getattr(kind, item.name)
+        if item.name != "space" and value is not False:
+            extra += "_" + (
+                name_of(value) if isinstance(value, Connection) else item.name if value is True else str(value)
+            )
     return f"{type(kind).__name__.lower()}_{'space' if kind.space else 'plane'}{extra}"
 
 
@@ -462,7 +469,7 @@ def by_turning(kind: Connection) -> ca.Function:
         ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
     ]
     names = ["energy", "stored", "rows", "gradient", "stiffness", "spin"]
-    return ca.Function(f"turning_{_name(kind)}", arguments, results, ["q", "u", "data", "load", "lam"], names)
+    return ca.Function(f"turning_{name_of(kind)}", arguments, results, ["q", "u", "data", "load", "lam"], names)
 
 
 @functools.cache
@@ -482,4 +489,4 @@ def by_components(kind: Connection) -> ca.Function:
     ]
     given = ["q", "u", "data", "load", "lam", "weight"]
     names = ["energy", "rows", "gradient", "jacobian", "hessian"]
-    return ca.Function(f"components_{_name(kind)}", [*arguments, weight], results, given, names)
+    return ca.Function(f"components_{name_of(kind)}", [*arguments, weight], results, given, names)
