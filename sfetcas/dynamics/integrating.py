@@ -116,7 +116,7 @@ class Stepper:
         system, method, n = self.system, self.method, self.system.layout
         stages, last = method.stages, memory.last
         # What jumps at the end of the step does so after it.
-        times = np.minimum(memory.t + h * method.places, np.nextafter(memory.t + h, -np.inf))
+        times = np.minimum(memory.t + h * method.loaded, np.nextafter(memory.t + h, -np.inf))
         factors = np.array([self.factors(t) for t in times])
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts

@@ -19,8 +19,9 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.interpolation import integration
+from .stages import StageEquations
 
-__all__ = ["METHODS", "GeneralisedAlpha", "Method", "Radau", "Relations"]
+__all__ = ["Begin", "GeneralisedAlpha", "Method", "Radau", "Relations", "StageMethod"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Relations:
 
 
 class Method(abc.ABC):
-    """A method with stages.
+    """What a method of integration gives; a step of any is put together by :mod:`~sfetcas.dynamics.steps`.
 
     Attributes
     ----------
@@ -49,6 +50,8 @@ class Method(abc.ABC):
         Of the positions.
     places : ndarray (stages,)
         Of the stages in the step, the last of them 1.
+    loaded : ndarray
+        Places in the step at which it asks for loads and motions, the last so many of them those of the stages.
     kept : int
         Rates that go from step to step: the velocity first.
     """
@@ -56,6 +59,7 @@ class Method(abc.ABC):
     name: str
     order: int
     places: Array
+    loaded: Array
     kept: int
 
     @property
@@ -64,23 +68,59 @@ class Method(abc.ABC):
         return len(self.places)
 
     @abc.abstractmethod
-    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
-        """The relations of a step of length h after rates (quantities, kept)."""
+    def iteration(self, system: StageEquations, linear: str) -> ca.Function:
+        """One iteration of Newton's method, ``(q, y, lam, constants...) -> (q, y, lam, size)``.
+
+        q (components, rotations * stages), y and lam with a column a stage; ``size`` is the largest rotation or
+        displacement by which anything changed.
+        """
+
+    @abc.abstractmethod
+    def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
+        """What the iterations of a step of length h share; factors (groups, loaded) of the loads."""
 
     @abc.abstractmethod
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
         """Rates (quantities, kept) after a step in which the quantities moved by ``X - X_0`` (quantities, stages)."""
 
 
+@dataclass(frozen=True)
+class Begin:
+    """The begin of a step: rotations, displacements, quantities, rates (quantities, kept), and counted angles."""
+
+    q: ca.MX
+    y: ca.MX
+    x: ca.MX
+    rates: ca.MX
+    near: ca.MX
+
+
+class StageMethod(Method):
+    """A method that is nothing but relations of rates and quantities at its stages."""
+
+    @abc.abstractmethod
+    def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
+        """The relations of a step of length h after rates (quantities, kept)."""
+
+    def iteration(self, system: StageEquations, linear: str) -> ca.Function:
+        """That of the equations at the stages."""
+        return system.iteration(self.stages, linear)
+
+    def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
+        """The relations and the loads."""
+        given = self.relations(h, begin.rates)
+        return [begin.x, given.v, given.a, given.C, given.B, factors, begin.near]
+
+
 @final
-class Radau(Method):
+class Radau(StageMethod):
     """Radau IIA collocation of two or three stages: order 3 or 5; damps what a step cannot resolve."""
 
     kept = 1
 
     def __init__(self, stages: int) -> None:
         self.name, self.order = f"radau-{stages}", 2 * stages - 1
-        self.places = RADAU[stages]
+        self.places = self.loaded = RADAU[stages]
 
     @functools.cached_property
     def _inverse(self) -> Array:
@@ -113,12 +153,12 @@ RADAU = {
 
 
 @final
-class GeneralisedAlpha(Method):
+class GeneralisedAlpha(StageMethod):
     """Generalised-alpha: order 2, one stage; ``damping`` is the spectral radius at infinite frequency, 0 to 1."""
 
     kept = 3
     order = 2
-    places = np.array([1.0])
+    places = loaded = np.array([1.0])
     name = "generalised-alpha"
 
     def __init__(self, damping: float = 0.9) -> None:
@@ -146,7 +186,3 @@ class GeneralisedAlpha(Method):
         true = now.B * moved + now.a
         follows = (moved - h * velocity) / (self.beta * h**2) - (0.5 / self.beta - 1.0) * lagging
         return ca.horzcat(now.C * moved + now.v, follows, true)
-
-
-METHODS = {method.name: method for method in (Radau(2), Radau(3), GeneralisedAlpha())}
-"""By name."""

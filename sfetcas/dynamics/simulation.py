@@ -19,10 +19,11 @@ from ..mechanics.equations import Equations
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
+from .conserving import Conserving
 from .inertia import Inertia
 from .integrating import Memory, Stepper, Taken, integrate
 from .masses import masses_of
-from .methods import METHODS
+from .methods import GeneralisedAlpha, Method, Radau
 from .motion import Instant, Motion, Mover
 from .sampling import Sampler
 from .stages import StageEquations
@@ -31,6 +32,9 @@ __all__ = ["simulate"]
 
 USUAL = "radau-3"
 """Integrator where none is asked for: of all it needs the least time for an accuracy of 1e-2 or finer (measured)."""
+
+METHODS: dict[str, Method] = {m.name: m for m in (Radau(3), Radau(2), GeneralisedAlpha(), Conserving())}
+"""Methods with steps of their own, by name."""
 
 OUTPUTS = 100
 """Answers where no spacing is asked for."""

@@ -181,7 +181,7 @@ class StageEquations:
         self.cells = (self.turns * model.rotations.turns[:, :, None] + turns).reshape(self.elements, -1)
         moments = np.arange(self.cells.size)
         ones = np.ones(self.cells.size)
-        self._onto_rotations = _sparse(self.cells.ravel(), moments, ones, (self.of_places, self.cells.size))
+        self.onto_rotations = _sparse(self.cells.ravel(), moments, ones, (self.of_places, self.cells.size))
         self.linked = [self._sides(group) for group in model.connections]
         self.observed = [self._sides(group) for group in self.masses.observables]
         self.link_rows, first = [], self.of_rows + len(model.positions.rows)
@@ -443,13 +443,48 @@ class StageEquations:
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities at a state, and their rates where the unknowns have the rates ``step``."""
         full = np.concatenate([step, np.zeros(self.equations.rows)])
-        x, v = self._rates(state.q.T, state.y, factors, state.wound, full)
+        # Compiled functions have no derivatives.
+        plain = self if self._kernels == "interpreted" else StageEquations(self.equations, self.masses, "interpreted")
+        x, v = plain._rates(state.q.T, state.y, factors, state.wound, full)
         return np.array(x).ravel(), np.array(v).ravel()
+
+    @staticmethod
+    def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
+        """A product with a constant sparse matrix, of full length."""
+        return _times(matrix, vector)
+
+    def open_gaps(self, y: ca.MX, factors: ca.MX) -> ca.MX:
+        """The share of displacements in the closings."""
+        positions = self.model.positions
+        return _times(_constant(positions.W), y) + _times(_constant(positions.BZ), _times(self.shift, factors))
+
+    def gathered(
+        self, turning: ca.MX, on_places: ca.MX, full: list[tuple[Index, ca.MX]], lam: ca.MX, rows: list[ca.MX]
+    ) -> ca.MX:
+        """The residual of the unknowns and rows.
+
+        From moments on all rotations, forces on all places, shares on sides, multipliers of the closings, and gaps.
+        """
+        residual = ca.mtimes(self.gather, ca.vertcat(turning, on_places, ca.MX.zeros(self.full - self.of_rows)))
+        for sides, values in full:
+            residual += _times(self.onto_unknowns(sides), ca.vec(values))
+        below = ca.vertcat(_times(_constant(self.model.positions.W).T, lam), *rows)
+        return residual + ca.vertcat(ca.MX.zeros(self.equations.turning_unknowns), below)
+
+    def paired(self, rows: int, width: int, n: int) -> ca.Function:
+        """(A, B, w) -> A^T diag(w) B of n groups of rows."""
+        return self.many(_pairs(rows, width), n)
+
+    def hung(self, mine: ca.MX, its: ca.MX, c: ca.MX, b: ca.MX) -> list[ca.MX]:
+        """Entries of masses and drags within elements: on their rotations, and with their first places."""
+        shares = b * ca.DM(self.inner[0]) + c * ca.DM(self.inner[1])
+        first = b * ca.DM(self.firsts[0]) + c * ca.DM(self.firsts[1])
+        blocks = self.many(_inner(self.axes, self.turns, self.points), len(self.massive))
+        return [ca.vec(blocks(mine, its, shares)), ca.vec(mine) * first, ca.vec(its) * first]
 
     def gaps(self, q: ca.MX, y: ca.MX, factors: ca.MX, near: ca.MX) -> ca.MX:
         """What is left open of the closings and of the rows of joints."""
-        positions, places = self.model.positions, self.displacements(y, factors)
-        gaps = _times(_constant(positions.W), y) + _times(_constant(positions.BZ), _times(self.shift, factors))
+        places, gaps = self.displacements(y, factors), self.open_gaps(y, factors)
         if self.elements:
             gaps += _times(self.closing, ca.vec(self.tangents(q)) - ca.DM(self.rest))
         parts = [gaps]
@@ -521,29 +556,33 @@ class StageEquations:
             _Stage(self, parts[i], y[:, i], lam[:, i], places[i], forces[:, i], factors[:, i], near)
             for i in range(stages)
         ]
-        system = self._system(stages)
         entries = [stage.entries for stage in found]
         for i, one in enumerate(found):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
-        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries)))
-        left = ca.vec(ca.horzcat(*[stage.residual for stage in found]).T)
-        step = -ca.reshape(ca.solve(matrix, left[system.order], linear)[system.back], stages, self.total).T
-        turned, size = [], ca.MX(0)
-        for i in range(stages):
-            spin = _times(self._turning, step[:, i])
-            turned.append(moved_by(self, parts[i], ca.reshape(spin, self.turns, n.rotations)))
-            change = ca.vertcat(spin, step[self.equations.turning_unknowns : self.equations.unknowns, i])
-            size = ca.fmax(size, ca.norm_inf(change))
-        unknowns, total = self.equations.unknowns, self.total
-        results = [
-            ca.horzcat(*turned),
-            y + step[self.equations.turning_unknowns : unknowns, :],
-            lam + step[unknowns:total, :],
-            size,
-        ]
+        step = self.solved(entries, ca.horzcat(*[stage.residual for stage in found]), linear)
+        turned, shift, more, size = self.moved(parts, step)
+        results = [ca.horzcat(*turned), y + shift, lam + more, size]
         names = ["q", "y", "lam", "x0", "v", "a", "C", "B", "factors", "near"]
         arguments = [q, y, lam, x0, v, a, c, b, factors, near]
         return ca.Function(f"iteration_{stages}", arguments, results, names, ["q_next", "y_next", "lam_next", "size"])
+
+    def solved(self, entries: list[ca.MX], residual: ca.MX, linear: str) -> ca.MX:
+        """Newton's step of all stages, (total, stages), for entries in the order of their places."""
+        stages = residual.shape[1]
+        system = self._system(stages)
+        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries)))
+        left = ca.vec(residual.T)
+        return -ca.reshape(ca.solve(matrix, left[system.order], linear)[system.back], stages, self.total).T
+
+    def moved(self, q: list[ca.MX], step: ca.MX) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX]:
+        """Rotations of all stages after a step, changes of displacements and multipliers, and the largest movement."""
+        turning, unknowns = self.equations.turning_unknowns, self.equations.unknowns
+        there, size = [], ca.MX(0)
+        for i, part in enumerate(q):
+            spin = _times(self._turning, step[:, i])
+            there.append(moved_by(self, part, ca.reshape(spin, self.turns, self.layout.rotations)))
+            size = ca.fmax(size, ca.norm_inf(ca.vertcat(0.0, spin, step[turning:unknowns, i])))
+        return there, step[turning:unknowns, :], step[unknowns:, :], size
 
     def forces(self, rates: ca.MX, accelerations: ca.MX) -> ca.MX:
         """Inertia and damping forces of all quantities."""
@@ -657,14 +696,12 @@ class _Stage:
         near: ca.MX,
     ) -> None:
         self._system, model = system, system.model
-        positions, equations = model.positions, system.equations
-        closings = len(positions.rows)
+        closings = len(model.positions.rows)
         full, entries = [], []
         # What acts along the elements: loads, internal forces, inertia.
         linear = forces[: system.linear]
         on_places = _times(system.by_place.T, linear) - _times(system.force, factors)
-        gaps = _times(_constant(positions.W), y) + _times(_constant(positions.BZ), _times(system.shift, factors))
-        gap_of_rows = ca.MX.zeros(system.full - system.of_rows)
+        gaps = system.open_gaps(y, factors)
         turning = -_times(system.moment, factors)
         if system.elements:
             pull = _times(system.pull, factors) + _times(system.closing.T, lam[:closings])
@@ -677,7 +714,7 @@ class _Stage:
             )
             moments, stiffness, spin = found[2], found[3], found[5]
             gaps += _times(system.closing, ca.vec(system.tangents(q)) - ca.DM(system.rest))
-            turning += _times(system._onto_rotations, ca.vec(moments))
+            turning += _times(system.onto_rotations, ca.vec(moments))
             closed = ca.vec(spin)[system.closed.entry.tolist()] * ca.DM(system.closed.value)
             entries += [ca.vec(stiffness), closed, closed]
             self._spin = spin[:, system.massive_columns]
@@ -710,11 +747,7 @@ class _Stage:
         pushed, turned_by, followed = system.followed(q, factors)
         entries += followed
         turning, on_places = turning + turned_by, on_places + pushed
-        residual = ca.mtimes(system.gather, ca.vertcat(turning, on_places, gap_of_rows))
-        for sides, values in full:
-            residual += _times(system.onto_unknowns(sides), ca.vec(values))
-        below = ca.vertcat(_times(_constant(positions.W).T, lam[:closings]), *rows)
-        self.residual = residual + ca.vertcat(ca.MX.zeros(equations.turning_unknowns), below)
+        self.residual = system.gathered(turning, on_places, full, lam[:closings], rows)
         self.entries = ca.vertcat(*entries, ca.MX(1))
 
     def coupled(self, other: _Stage, c: ca.MX, b: ca.MX) -> ca.MX:
@@ -723,17 +756,9 @@ class _Stage:
         for group, mine, its in zip(system.masses.observables, self._spins, other._spins, strict=True):
             n = len(group.data)
             weight = b * ca.DM(group.mass.T) + c * ca.DM(group.damping.T)
-            entries.append(ca.vec(system.many(_pairs(group.kind.sizes[2], mine.shape[1] // n), n)(mine, its, weight)))
+            entries.append(ca.vec(system.paired(group.kind.sizes[2], mine.shape[1] // n, n)(mine, its, weight)))
         if len(system.massive):
-            n = len(system.massive)
-            shares = b * ca.DM(system.inner[0]) + c * ca.DM(system.inner[1])
-            first = b * ca.DM(system.firsts[0]) + c * ca.DM(system.firsts[1])
-            entries.append(
-                ca.vec(
-                    system.many(_inner(system.axes, system.turns, system.points), n)(self._spin, other._spin, shares)
-                )
-            )
-            entries += [ca.vec(self._spin) * first, ca.vec(other._spin) * first]
+            entries += system.hung(self._spin, other._spin, c, b)
         entries += [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
         return ca.vertcat(*entries)
 

@@ -10,7 +10,7 @@ import functools
 import casadi as ca
 import numpy as np
 
-from .methods import Method
+from .methods import Begin, Method
 from .stages import StageEquations, moved_by
 
 __all__ = ["CONVERGED", "ITERATIONS", "step_function"]
@@ -29,7 +29,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     iterations, gap)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
     quantities x and their rates (quantities, kept); of its stages turns (turns, rotations * stages) since its begin and
     shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a fresh start;
-    factors (groups, stages) of the loads.  It has converged when ``size`` is at most :data:`CONVERGED`; ``gap`` is what
+    factors (groups, loaded) of the loads.  It has converged when ``size`` is at most :data:`CONVERGED`; ``gap`` is what
     closings miss.
     """
     n, s = system.layout, method.stages
@@ -37,16 +37,16 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     turns, shifts = ca.MX.sym("turns", system.turns, n.rotations * s), ca.MX.sym("shifts", n.y, s)
     x, rates = ca.MX.sym("x", n.x), ca.MX.sym("rates", n.x, method.kept)
     ratio, h = ca.MX.sym("ratio"), ca.MX.sym("h")
-    factors, near = ca.MX.sym("factors", n.factors, s), ca.MX.sym("near", n.near)
+    loads, near = ca.MX.sym("factors", n.factors, len(method.loaded)), ca.MX.sym("near", n.near)
+    factors = loads[:, len(method.loaded) - s :]
     onward = _onward(tuple(method.places))(ratio)
     # Turns and shifts so far go on along the polynomials of the last step.
     spins = ca.horzsplit(turns, n.rotations)
     first = [sum((onward[i, j] * spins[j] for j in range(1, s)), onward[i, 0] * spins[0]) for i in range(s)]
     begin = [system.held(moved_by(system, q, first[i]), factors[:, i]) for i in range(s)]
     guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
-    given = method.relations(h, rates)
-    constants = [x, given.v, given.a, given.C, given.B, factors, near]
-    newton = _newton(system, s, linear)
+    constants = method.constants(Begin(q, y, x, rates, near), h, loads)
+    newton = _newton(method.iteration(system, linear))
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
     places = [system.displacements(moved[:, i], factors[:, i]) for i in range(s)]
@@ -64,7 +64,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
         ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], factors[:, -1], near))),
     ]
     names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "near"]
-    arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, factors, near]
+    arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, loads, near]
     out = [
         "q_next",
         "y_next",
@@ -80,9 +80,8 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     return ca.Function("step", arguments, results, names, out)
 
 
-def _newton(system: StageEquations, stages: int, linear: str) -> ca.Function:
+def _newton(iteration: ca.Function) -> ca.Function:
     """Newton's method from a guess: ``(q, y, lam, constants) -> (q, y, lam, size, iterations)``."""
-    iteration = system.iteration(stages, linear)
     symbols = [ca.MX.sym(iteration.name_in(i), iteration.sparsity_in(i)) for i in range(iteration.n_in())]
     constants = symbols[3:]
     size, count = ca.MX.sym("size"), ca.MX.sym("count")
