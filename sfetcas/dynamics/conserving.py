@@ -1,18 +1,19 @@
-"""A scheme that keeps energy and momentum: midpoint rule with discrete gradients.
+"""A scheme that keeps energy and momentum: midpoint rule with discrete derivatives.
 
-Positions, section axes and strains are quadratic in quaternions, so that their derivatives at the mean of two states,
-taken as it is and not of length one, are exact differences:
+Between two states a rotation gains a Rodrigues vector ``psi`` (twice the tangent of half the angle, along the axis),
+and vectors that turn with it gain exactly
 
-    X(q_1) - X(q_0) = X'(q_m) (q_1 - q_0),      q_m = (q_0 + q_1) / 2.
+    R_1 t - R_0 t = psi x (R_0 t + R_1 t) / 2.
 
-Elastic forces are those of the mean strain, loads those at the middle of the step.  With constant masses and dead
-loads the energy is then kept exactly, and the momenta by the invariance of all terms.  In the plane the factor
-``sin(d/2)/(d/2)`` does the same for vectors that turn by an angle d.  Springs with a free length, rotational springs
-in space and the rows of universal joints and slides are taken at the mean state: with these the energy is kept to
-second order only, without drift, as the scheme is reversible.
+Relative rotations ``p = conj(q_a) q_b``, of which strains and hinges are made, gain exactly a linear form of
+``psi_b - psi_a``.  Forces by these derivatives, with elastic ones those of the mean strain, masses constant and loads
+those in the middle of the step, keep the energy under dead loads, and the momenta, as no derivative sees a common
+rotation.  Small members, universal joints, slides, rotational springs in space and springs with a free length are
+taken at the mean state: with these the energy is kept to second order only, without drift, as the scheme is
+reversible.
 
-Source: Simo and Tarnow 1992; Gonzalez 1996 (discrete gradients, doi 10.1007/BF02440162); Betsch and Siebert 2009
-(rigid bodies in quaternions); strains as quadratic invariants of quaternions are ours.
+Source: Simo and Tarnow 1992; Gonzalez 1996 (discrete derivatives, doi 10.1007/BF02440162); Betsch and Steinmann 2001
+(mean directors); the exact derivative of relative quaternions is ours.
 """
 
 from __future__ import annotations
@@ -24,10 +25,11 @@ import casadi as ca
 import numpy as np
 
 from ..errors import SceneError
+from ..mathematics.arrays import Array
 from ..mathematics.interpolation import differentiation
 from ..mathematics.quaternion import product, turned
 from ..mechanics.elements import Element
-from ..mechanics.joints import Connection, name_of
+from ..mechanics.joints import Connection, Hinge, name_of
 from .methods import Begin, Method
 from .observed import Axes
 from .stages import StageEquations
@@ -42,6 +44,7 @@ class Conserving(Method):
     name, order, kept = "conserving", 2, 1
     places = np.array([1.0])
     loaded = np.array([0.5, 1.0])
+    polished = True
 
     def iteration(self, system: StageEquations, linear: str) -> ca.Function:
         """One for the end of the step; constants are the begin, h, and the loads in the middle and at the end.
@@ -156,7 +159,7 @@ class _Middle:
 
 
 def _basis(q: ca.SX) -> ca.SX:
-    """Derivative of rotations (components, n), of any length, by rotation vectors about the fixed axes."""
+    """Derivative of rotations (components, n) by rotation vectors about the fixed axes."""
     if q.shape[0] == 1:
         return ca.SX.eye(q.shape[1])
     blocks = []
@@ -166,83 +169,133 @@ def _basis(q: ca.SX) -> ca.SX:
     return ca.diagcat(*blocks)
 
 
-def _swept(before: ca.SX, after: ca.SX) -> ca.SX:
-    """``sin(d/2)/(d/2)`` of the angles d between, to all digits also where they vanish."""
-    half = 0.5 * (after - before)
-    square = half**2
-    near = 1.0 - square / 6.0 + square**2 / 120.0
-    return ca.if_else(square < 1e-6, near, ca.sin(half) / ca.if_else(square < 1e-6, 1.0, half))
+def _conjugate(q: ca.SX) -> ca.SX:
+    return ca.vertcat(q[0], -q[1:])
+
+
+def _times(a: ca.SX, b: ca.SX) -> ca.SX:
+    return ca.vertcat(*product(ca.vertsplit(a), ca.vertsplit(b)))
+
+
+def _gained(before: ca.SX, after: ca.SX) -> ca.SX:
+    """Rodrigues vector from a rotation to another one."""
+    if before.shape[0] == 1:
+        return 2.0 * ca.tan(0.5 * (after - before))
+    r = _times(after, _conjugate(before))
+    return 2.0 * r[1:] / r[0]
+
+
+def _onward(a: ca.SX, b: ca.SX, of_a: ca.SX, of_b: ca.SX) -> ca.SX:
+    """Derivative (4, 3) of ``conj(a) b`` by the difference of the spins of b and a, exact for Rodrigues vectors."""
+    size = ca.sqrt((1.0 + 0.25 * ca.dot(of_a, of_a)) * (1.0 + 0.25 * ca.dot(of_b, of_b)))
+    scalar = (1.0 + 0.25 * ca.dot(of_a, of_b)) / size
+    vector = (0.5 * ca.SX.eye(3) - 0.25 * ca.skew(of_a)) / size
+    # conj(r_a) r_b - 1: its scalar part is minus the square of its vector over one plus the scalar.
+    gain = ca.mtimes(vector, of_b - of_a)
+    whole = ca.vertcat(-ca.mtimes(gain.T, vector) / (1.0 + scalar), vector)
+    return ca.horzcat(*[_times(_conjugate(a), _times(whole[:, i], b)) for i in range(3)])
+
+
+def _relative(a0: ca.SX, a1: ca.SX, b0: ca.SX, b1: ca.SX) -> ca.SX:
+    """The same, seen from both ends alike; in the plane the derivative of the relative angle."""
+    of_a, of_b = _gained(a0, a1), _gained(b0, b1)
+    if a0.shape[0] == 1:
+        z = 0.5 * (of_b - of_a) / (1.0 + 0.25 * of_a * of_b)
+        square = z**2
+        small = square < 1e-6
+        share = ca.if_else(small, 1.0 - square / 3.0 + square**2 / 5.0, ca.atan(z) / ca.if_else(small, 1.0, z))
+        return share / (1.0 + 0.25 * of_a * of_b)
+    return 0.5 * (_onward(a0, b0, of_a, of_b) + _onward(a1, b1, -of_a, -of_b))
+
+
+def _vectors(element: Element, q: ca.SX, tangent: ca.SX) -> list[ca.SX]:
+    """Turned tangents of an element at rotations."""
+    if element.space:
+        return [ca.vertcat(*turned(ca.vertsplit(q[:, k]), ca.vertsplit(tangent[:, k]))) for k in range(q.shape[1])]
+    c, s = ca.cos(q), ca.sin(q)
+    return [
+        ca.vertcat(c[k] * tangent[0, k] - s[k] * tangent[1, k], s[k] * tangent[0, k] + c[k] * tangent[1, k])
+        for k in range(q.shape[1])
+    ]
+
+
+def _crossed(a: ca.SX, b: ca.SX) -> ca.SX:
+    """Moment of a force b at a."""
+    return ca.cross(a, b) if a.shape[0] == 3 else a[0] * b[1] - a[1] * b[0]
 
 
 @functools.cache
 def _element(element: Element) -> ca.Function:
-    """(q0, q1, stiffness, tangent, pull) -> moments, their derivative, spins of the mean state and of the end."""
-    n, axes, turns, space = element.order + 1, element.axes, element.turns, element.space
+    """(q0, q1, stiffness, tangent, pull) -> moments, their derivative, mean spins, spins at the end.
+
+    The derivative is that of elastic moments at the mean state, which differs from the exact one by the square of what
+    nodes turn in a step; that of all else is exact.
+    """
+    n, axes, turns = element.order + 1, element.axes, element.turns
     q0, q1 = ca.SX.sym("q0", element.components, n), ca.SX.sym("q1", element.components, n)
     stiffness, tangent = ca.SX.sym("stiffness", element.stiffnesses, n), ca.SX.sym("tangent", axes, n)
     pull = ca.SX.sym("pull", axes, n)
-    slopes = ca.DM(differentiation(element.nodes).T)
-    if space:
-        moments = _in_space(element, q0, q1, stiffness, tangent, pull, slopes)
-    else:
-        mean, swept = 0.5 * (q0 + q1), _swept(q0, q1)
-        bent = ca.mtimes(mean, slopes)
-        c, s = ca.cos(mean), ca.sin(mean)
-        turning = [
-            (-s[k] * tangent[0, k] - c[k] * tangent[1, k], c[k] * tangent[0, k] - s[k] * tangent[1, k])
-            for k in range(n)
-        ]
-        work = [swept[k] * (pull[0, k] * x + pull[1, k] * y) for k, (x, y) in enumerate(turning)]
-        moments = ca.mtimes(slopes, (stiffness * bent).T) + ca.vertcat(*work)
+    slopes = differentiation(element.nodes)
+    moments = [ca.SX.zeros(turns) for _ in range(n)]
+    for k in range(n):
+        effort = _effort(element, 0.5 * (_strain(slopes[k], k, q0) + _strain(slopes[k], k, q1)), stiffness[:, k])
+        for j in range(n):
+            if j != k:
+                gain = _relative(q0[:, k], q1[:, k], q0[:, j], q1[:, j])
+                share = slopes[k, j] * (ca.mtimes(gain[1:, :].T, effort) if element.space else gain * effort)
+                moments[j] += share
+                moments[k] -= share
+    mean = [0.5 * (a + b) for a, b in zip(_vectors(element, q0, tangent), _vectors(element, q1, tangent), strict=True)]
+    work = ca.vertcat(*[_crossed(mean[k], pull[:, k]) for k in range(n)])
     basis = _basis(q1)
-    changed = ca.densify(ca.mtimes(ca.jacobian(moments, ca.vec(q1)), basis))
-    by_pull = ca.jacobian(moments, ca.vec(pull))
+    near = ca.mtimes(ca.jacobian(_at_mean(element, q0, q1, stiffness) + work, ca.vec(q1)), basis)
+    by_pull = ca.jacobian(work, ca.vec(pull))
     mean_spin = ca.horzcat(*[by_pull[turns * k : turns * (k + 1), axes * k : axes * (k + 1)].T for k in range(n)])
-    if space:
-        ends = ca.horzcat(*[ca.vertcat(*turned(ca.vertsplit(q1[:, k]), ca.vertsplit(tangent[:, k]))) for k in range(n)])
-    else:
-        c, s = ca.cos(q1), ca.sin(q1)
-        ends = ca.vertcat(c * tangent[0, :] - s * tangent[1, :], s * tangent[0, :] + c * tangent[1, :])
-    spin = ca.mtimes(ca.jacobian(ca.sum2(ends), ca.vec(q1)), basis)
-    results = [ca.densify(part) for part in (moments, changed, mean_spin, spin)]
-    return ca.Function(f"conserving_{'space' if space else 'plane'}_{n}", [q0, q1, stiffness, tangent, pull], results)
-
-
-def _in_space(
-    element: Element, q0: ca.SX, q1: ca.SX, stiffness: ca.SX, tangent: ca.SX, pull: ca.SX, slopes: ca.DM
-) -> ca.SX:
-    """Moments about the fixed axes on the nodes of an element."""
-    n = element.order + 1
-
-    def strains(q: ca.SX) -> list[ca.SX]:
-        """Half the curvature times the length at each node."""
-        slope = ca.mtimes(q, slopes)
-        pairs = [(ca.vertsplit(q[:, k]), ca.vertsplit(slope[:, k])) for k in range(n)]
-        return [ca.vertcat(*product([a[0], -a[1], -a[2], -a[3]], b)[1:]) for a, b in pairs]
-
-    q, efforts, work = ca.SX.sym("q", 4, n), [], ca.SX(0)
-    for k, (before, after, here) in enumerate(zip(strains(q0), strains(q1), strains(q), strict=True)):
-        c = ca.SX(ca.Sparsity.dense(3, 3))
-        c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2] = ca.vertsplit(stiffness[:, k])
-        c[1, 0], c[2, 0], c[2, 1] = c[0, 1], c[0, 2], c[1, 2]
-        effort = ca.SX.sym(f"effort_{k}", 3)
-        efforts.append((effort, 4.0 * ca.mtimes(c, 0.5 * (before + after))))
-        work += ca.dot(effort, here)
-        work += ca.dot(pull[:, k], ca.vertcat(*turned(ca.vertsplit(q[:, k]), ca.vertsplit(tangent[:, k]))))
-    mean = 0.5 * (q0 + q1)
-    gradient = ca.vec(ca.gradient(work, q))
-    (gradient,) = ca.substitute(
-        [gradient], [q, *(symbol for symbol, _ in efforts)], [mean, *(value for _, value in efforts)]
+    ends = sum(_vectors(element, q1, tangent), ca.SX.zeros(axes))
+    spin = ca.mtimes(ca.jacobian(ends, ca.vec(q1)), basis)
+    results = [ca.densify(part) for part in (ca.vertcat(*moments) + work, near, mean_spin, spin)]
+    return ca.Function(
+        f"conserving_{'space' if element.space else 'plane'}_{n}", [q0, q1, stiffness, tangent, pull], results
     )
-    return ca.mtimes(_basis(mean).T, gradient)
+
+
+def _strain(row: Array, k: int, q: ca.SX) -> ca.SX:
+    """Half the curvature times the length at node k, in the plane all of it."""
+    if q.shape[0] == 1:
+        return sum((float(row[j]) * (q[j] - q[k]) for j in range(len(row)) if j != k), ca.SX(0))
+    parts = [float(row[j]) * _times(_conjugate(q[:, k]), q[:, j])[1:] for j in range(len(row)) if j != k]
+    return sum(parts[1:], parts[0])
+
+
+def _effort(element: Element, strain: ca.SX, stiffness: ca.SX) -> ca.SX:
+    """Derivative of the strain energy of a point by that strain."""
+    if not element.space:
+        return stiffness * strain
+    c = ca.vertsplit(stiffness)
+    full = ca.vertcat(ca.horzcat(c[0], c[1], c[2]), ca.horzcat(c[1], c[3], c[4]), ca.horzcat(c[2], c[4], c[5]))
+    return 4.0 * ca.mtimes(full, strain)
+
+
+def _at_mean(element: Element, q0: ca.SX, q1: ca.SX, stiffness: ca.SX) -> ca.SX:
+    """Elastic moments by the derivatives of strains at the mean quaternions."""
+    n, slopes = element.order + 1, differentiation(element.nodes)
+    q, work = ca.SX.sym("q", element.components, n), ca.SX(0)
+    efforts = [ca.SX.sym(f"effort_{k}", element.turns) for k in range(n)]
+    for k, effort in enumerate(efforts):
+        work += ca.dot(effort, _strain(slopes[k], k, q))
+    means = [0.5 * (_strain(slopes[k], k, q0) + _strain(slopes[k], k, q1)) for k in range(n)]
+    values = [_effort(element, mean, stiffness[:, k]) for k, mean in enumerate(means)]
+    middle = 0.5 * (q0 + q1)
+    (gradient,) = ca.substitute([ca.vec(ca.gradient(work, q))], [q, *efforts], [middle, *values])
+    return ca.mtimes(_basis(middle).T, gradient)
 
 
 @functools.cache
 def _between(kind: Connection) -> ca.Function:
     """(q0, u0, q1, u1, data, load, load_end, lam) -> gradient, its derivative, rows at the end, both spins.
 
-    The gradient is that of ``energy + lam.rows`` at the mean state, by rotations about the fixed axes and by
-    displacements; spins are the derivatives of the rows, of the mean state (rows, width) and of the end.
+    The gradient is that of ``energy + lam.rows``; spins are the derivatives of the rows, mean ones (rows, width) and
+    those at the end, by rotations about the fixed axes and displacements.
     """
     turns, places, rows, data_size, loads = kind.sizes
     q0, q1 = ca.SX.sym("q0", kind.components, turns), ca.SX.sym("q1", kind.components, turns)
@@ -254,21 +307,27 @@ def _between(kind: Connection) -> ca.Function:
         sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
         return kind.energy(*sides, data, given), ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, data, given))
 
+    def spins(q: ca.SX, u: ca.SX, given: ca.SX) -> tuple[ca.SX, ca.SX]:
+        energy, found = values(q, u, given)
+        x, basis = ca.vertcat(ca.vec(q), ca.vec(u)), ca.diagcat(_basis(q), ca.SX.eye(u.numel()))
+        return ca.mtimes(basis.T, ca.gradient(energy, x)), ca.mtimes(ca.jacobian(found, x), basis)
+
     q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
-    energy, found = values(q, u, load)
-    x = ca.vertcat(ca.vec(q), ca.vec(u))
-    derivative, jacobian = ca.gradient(energy, x), ca.jacobian(found, x)
-    mean = [0.5 * (q0 + q1), 0.5 * (u0 + u1)]
-    derivative, jacobian = ca.substitute([derivative, jacobian], [q, u], mean)
-    basis = ca.diagcat(_basis(mean[0]), ca.SX.eye(u.numel()))
-    if isinstance(kind, Axes) and not kind.space:
-        basis *= _swept(q0, q1)
-    mean_spin = ca.mtimes(jacobian, basis)
-    gradient = ca.mtimes(basis.T, derivative) + ca.mtimes(mean_spin.T, lam)
+    middle = 0.5 * (q0 + q1)
+    if kind.space:
+        middle = ca.horzcat(*[middle[:, i] / ca.norm_2(middle[:, i]) for i in range(turns)])
+    derivative, mean_spin = ca.substitute(list(spins(q, u, load)), [q, u], [middle, 0.5 * (u0 + u1)])
+    if isinstance(kind, Axes):
+        both = [ca.substitute([spins(q, u, load)[1]], [q], [at])[0] for at in (q0, q1)]
+        mean_spin = 0.5 * (both[0] + both[1])
+    if isinstance(kind, Hinge):
+        gain = _relative(q0[:, 0], q1[:, 0], q0[:, 1], q1[:, 1])[1:, :]
+        across = ca.vertcat(*[2.0 * ca.mtimes(data[3 * i : 3 * i + 3].T, gain) for i in range(rows)])
+        mean_spin = ca.horzcat(-across, across)
+    gradient = derivative + ca.mtimes(mean_spin.T, lam)
     end, of_end = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u.numel()))
-    there = values(q1, u1, load_end)[1]
     changed = ca.mtimes(ca.jacobian(gradient, end), of_end)
-    spin = ca.mtimes(ca.jacobian(there, end), of_end)
-    results = [ca.densify(part) for part in (gradient, changed, there, mean_spin, spin)]
+    results = [ca.densify(part) for part in (gradient, changed, values(q1, u1, load_end)[1], mean_spin)]
+    spin = ca.densify(ca.mtimes(ca.jacobian(values(q1, u1, load_end)[1], end), of_end))
     arguments = [q0, u0, q1, u1, data, load, load_end, lam]
-    return ca.Function(f"between_{name_of(kind)}", arguments, results)
+    return ca.Function(f"between_{name_of(kind)}", arguments, [*results, spin])

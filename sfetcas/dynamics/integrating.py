@@ -33,6 +33,8 @@ class Memory:
         Velocities first.
     near : ndarray
         Angles that count turns.
+    origin : tuple of ndarray
+        What ``y`` and ``x`` are counted from: of what flies far the places near it, so that no digit is lost.
     last : Taken or None
         The step before; None where the motion begins afresh.
     """
@@ -44,7 +46,12 @@ class Memory:
     x: Array
     rates: Array
     near: Array
+    origin: tuple[Array, Array] = (np.zeros(1), np.zeros(1))
     last: Taken | None = None
+
+    def moved(self, y: Array, x: Array) -> Memory:
+        """The same state counted from an origin that is further by y and x."""
+        return replace(self, y=self.y - y, x=self.x - x, origin=(self.origin[0] + y, self.origin[1] + x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +139,24 @@ class Stepper:
         self.count += 1
         q, lam, x = q.reshape(n.rotations, -1), lam.reshape(stages, n.lam), x.reshape(stages, n.x)
         near = system.model.winding.angles(q, memory.near) if n.near else memory.near
-        after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), near)
+        after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), near, memory.origin)
         change = float(size[0]) if np.isfinite(x).all() else np.inf
         parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
         taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))
-        return replace(taken, after=replace(after, last=taken))
+        return self._nearby(replace(taken, after=replace(after, last=taken)))
+
+    def _nearby(self, taken: Taken) -> Taken:
+        """The step counted from places near what flies freely."""
+        if self.system.floating is None or not np.isfinite(taken.after.y).all():
+            return taken
+        by_y, by_x = self.system.floating
+        far = np.rint(taken.after.y @ by_y / by_y.sum(axis=0))
+        if not far.any():
+            return taken
+        y, x = by_y @ far, by_x @ far
+        begin, after = taken.begin.moved(y, x), replace(taken.after.moved(y, x), last=None)
+        near = replace(taken, begin=begin, after=after, x=taken.x - x)
+        return replace(near, after=replace(after, last=near))
 
     def predicted(self, memory: Memory, h: float) -> Array:
         """Quantities after a step as the one before goes on."""

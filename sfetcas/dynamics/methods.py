@@ -54,6 +54,8 @@ class Method(abc.ABC):
         Places in the step at which it asks for loads and motions, the last so many of them those of the stages.
     kept : int
         Rates that go from step to step: the velocity first.
+    polished : bool
+        Whether one more iteration follows when Newton's method has converged: what keeps energy needs every digit.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Method(abc.ABC):
     places: Array
     loaded: Array
     kept: int
+    polished: bool = False
 
     @property
     def stages(self) -> int:

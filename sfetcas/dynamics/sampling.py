@@ -94,21 +94,25 @@ class Sampler:
 
 def _interpolated(steps: Sequence[Taken], own: Taken, t: float) -> Sample:
     begin, h = own.begin, own.h
-    nodes, x, y, turns = [(steps[0].begin.t - begin.t) / h], [steps[0].begin.x], [steps[0].begin.y], []
+    nodes, turns = [(steps[0].begin.t - begin.t) / h], []
+    # Each step may be counted from an origin of its own.
+    x = [steps[0].begin.x + steps[0].begin.origin[1]]
+    y = [steps[0].begin.y + steps[0].begin.origin[0]]
     turns.append(_from(begin.q, steps[0].begin.q))
     for taken in steps:
         nodes += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places]
-        x += list(taken.x)
-        y += list(taken.begin.y + taken.shifts)
+        x += list(taken.x + taken.begin.origin[1])
+        y += list(taken.begin.y + taken.shifts + taken.begin.origin[0])
         turns += [_from(begin.q, _turned(taken.begin.q, turn)) for turn in taken.turns]
     at, here = np.array(nodes), np.array([(t - begin.t) / h])
     row = evaluation(at, here)
     slopes = differentiation(at)
-    quantities = np.array(x) - own.after.x
+    middle = own.after.x + own.after.origin[1]
+    quantities = np.array(x) - middle
     q = _turned(begin.q, np.einsum("n,nra->ra", row[0], np.array(turns)))
     v = (row @ slopes @ quantities)[0] / h
     a = (row @ slopes @ slopes @ quantities)[0] / h**2
-    position = own.after.x + (row @ quantities)[0]
+    position = middle + (row @ quantities)[0]
     return Sample(t, q, (row @ np.array(y))[0], position, v, a, own.after.near)
 
 

@@ -448,6 +448,29 @@ class StageEquations:
         x, v = plain._rates(state.q.T, state.y, factors, state.wound, full)
         return np.array(x).ravel(), np.array(v).ravel()
 
+    @functools.cached_property
+    def floating(self) -> tuple[Array, Array] | None:
+        """What all displacements (y, axes) and quantities (x, axes) gain when everything moves by one along each axis.
+
+        None where the ground holds anything.
+        """
+        positions, axes = self.model.positions, self.axes
+        grounded = any((group.places < 0).any() for group in self.model.connections)
+        if grounded or positions.Y.shape[0] != len(positions.Y.value):
+            return None
+        y = np.zeros((self.layout.y, axes))
+        y[positions.Y.column, positions.Y.row % axes] = positions.Y.value
+        if any(np.abs(positions.W @ column).max(initial=0.0) > 0.0 for column in y.T):
+            return None
+        q, flat = ca.DM.ones(self.layout.components, self.layout.rotations), np.zeros(self.layout.near)
+        if self.model.space:
+            q[1:, :] = 0
+        arguments = [ca.MX.sym("y", self.layout.y)]
+        x = self.quantities(ca.MX(q), self.displacements(arguments[0], ca.MX.zeros(self.layout.factors)), ca.MX(flat))
+        values = ca.Function("moved", arguments, [x])
+        rest = np.array(values(np.zeros(self.layout.y))).ravel()
+        return y, np.stack([np.array(values(column)).ravel() - rest for column in y.T], axis=1)
+
     @staticmethod
     def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
         """A product with a constant sparse matrix, of full length."""

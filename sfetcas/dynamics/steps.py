@@ -46,7 +46,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     begin = [system.held(moved_by(system, q, first[i]), factors[:, i]) for i in range(s)]
     guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
     constants = method.constants(Begin(q, y, x, rates, near), h, loads)
-    newton = _newton(method.iteration(system, linear))
+    newton = _newton(method.iteration(system, linear), polished=method.polished)
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
     places = [system.displacements(moved[:, i], factors[:, i]) for i in range(s)]
@@ -80,13 +80,14 @@ def step_function(system: StageEquations, method: Method, linear: str = "csparse
     return ca.Function("step", arguments, results, names, out)
 
 
-def _newton(iteration: ca.Function) -> ca.Function:
+def _newton(iteration: ca.Function, *, polished: bool) -> ca.Function:
     """Newton's method from a guess: ``(q, y, lam, constants) -> (q, y, lam, size, iterations)``."""
     symbols = [ca.MX.sym(iteration.name_in(i), iteration.sparsity_in(i)) for i in range(iteration.n_in())]
     constants = symbols[3:]
     size, count = ca.MX.sym("size"), ca.MX.sym("count")
     arguments = [*symbols, size, count]
-    end = ca.Function("end", arguments, [*symbols[:3], size, count])
+    last = [*iteration(*symbols)[:3], size, count + 1] if polished else [*symbols[:3], size, count]
+    end = ca.Function("end", arguments, last)
     on = end
     for level in range(ITERATIONS):
         q, y, lam, change = iteration(*symbols)
