@@ -121,7 +121,7 @@ class Points:
         return kept - np.linalg.pinv(stiff) @ stiff @ kept
 
     def at(self, turn, w, t=0.0, spin=(0, 0, 0)):
-        """Places of the points (points, axes): w from rest, all turned, then going on by t spins about the origin."""
+        """The points (points, axes) and the numbers: w from rest, all turned, then by t spins about the origin."""
         r = quat.matrix(quat.from_rotation_vector(np.asarray(turn, float)))
         r = quat.matrix(quat.from_rotation_vector(t * np.asarray(spin, float))) @ r
         w = w.reshape(-1, 6)
@@ -135,16 +135,17 @@ class Points:
         if not self.space:
             q = [[(np.asarray(turn) + t * np.asarray(spin))[2] + a[5]] for a in w]
         found = np.array(self.function(np.array(q).T, u.T, self.data)).ravel()
-        return self.length * found.reshape(-1, self.kind.axes)
+        count = self.kind.axes * self.kind.points
+        return self.length * found[:count].reshape(-1, self.kind.axes), self.length * found[count:]
 
     def velocity(self, turn, w, spin=(0, 0, 0), start=None, step=1e-5):
-        """Velocities of the points at ``start`` for velocities w of the nodes seen from the frame."""
+        """Rates of both at ``start`` for velocities w of the nodes seen from the frame."""
         start = np.zeros(w.shape) if start is None else start
-        a, b = (self.at(turn, start + t * w, t, spin) for t in (step, -step))
-        return (a - b) / (2 * step)
+        two = zip(*(self.at(turn, start + t * w, t, spin) for t in (step, -step)), strict=True)
+        return [(a - b) / (2 * step) for a, b in two]
 
-    def energy(self, velocity):
-        return 0.5 * self.body.mass * float((velocity**2).sum())
+    def energy(self, rates):
+        return 0.5 * self.body.mass * sum(float((rate**2).sum()) for rate in rates)
 
 
 @pytest.fixture(params=BODIES)
@@ -187,11 +188,13 @@ def test_only_the_centre_has_momentum(points):
     w = points.possible(0.1 * rng.normal(size=6 * len(points.rest)))
     ahead = np.zeros(w.shape).reshape(-1, 6)
     ahead[:, :n] = step = rng.normal(size=n)
-    moved = points.at(np.zeros(3), w + ahead.ravel()) - points.at(np.zeros(3), w)
+    (after, same), (before, numbers) = points.at(np.zeros(3), w + ahead.ravel()), points.at(np.zeros(3), w)
+    moved = after - before
+    np.testing.assert_allclose(same, numbers, atol=1e-14)
     np.testing.assert_allclose(moved[0], step, atol=1e-14)
     np.testing.assert_allclose(moved[1:], 0.0, atol=1e-14)
     momentum = rigid_motions(points.rest)[:, :n].T @ mass_of(points.scene, "m") @ w
-    velocity = points.velocity(np.zeros(3), w)
+    velocity, _ = points.velocity(np.zeros(3), w)
     np.testing.assert_allclose(points.body.mass * velocity[0], momentum, atol=1e-9 * np.abs(momentum).max())
 
 
@@ -200,16 +203,19 @@ def test_points_turn_with_all(points):
     w = points.possible(0.1 * np.random.default_rng(4).normal(size=6 * len(points.rest)))
     turn = large(points)[1]
     r = quat.matrix(quat.from_rotation_vector(turn))[: points.kind.axes, : points.kind.axes]
-    np.testing.assert_allclose(points.at(turn, w), points.at(np.zeros(3), w) @ r.T, atol=1e-14)
+    (after, same), (before, numbers) = points.at(turn, w), points.at(np.zeros(3), w)
+    np.testing.assert_allclose(after, before @ r.T, atol=1e-14)
+    np.testing.assert_allclose(same, numbers, atol=1e-14)
 
 
 def test_points_are_as_few_as_they_can_be():
-    """A straight beam: a cubic has four moments; lumps: as many as they are, and nothing else."""
-    found = Points(BODIES["straight"])
-    assert found.kind.points == 4
-    assert Points(BODIES["straight, plane"]).kind.points == 3
-    for places in (PLACES, CORNERS):
-        assert Points(condensed(lumps((0.4, 1.1, 0.2, 0.6)[: len(places)]), places)).kind.points == len(places)
+    """A straight beam: its centre, its axis, two cubics in each plane; lumps: as many as they are, and nothing else."""
+    counts = {name: (kind.points, kind.numbers) for name in BODIES for kind in [Points(BODIES[name]).kind]}
+    assert counts["straight"] == (2, 4)
+    assert counts["straight, plane"] == (2, 2)
+    assert counts["lumps"] == (4, 0)
+    found = Points(condensed(lumps((0.4, 1.1, 0.2)), PLACES)).kind
+    assert (found.points, found.numbers) == (3, 0)
 
 
 # -- centrifugal forces ---------------------------------------------------------------------------------------

@@ -1,20 +1,21 @@
-"""Inertia of small members as that of a few points, which the frame of the body and its deformation carry.
+"""Inertia of small members as that of a few points and numbers, which the frame of the body and its deformation carry.
 
 With ``u_1`` the displacement of the first node, R the frame and e the deformation (numbers of
-:class:`~sfetcas.mechanics.joints.Body`) the points are
+:class:`~sfetcas.mechanics.joints.Body`) these are
 
-    X_0 = u_1 + R (x_0 + B_0 e),      X_j = R (x_j + B_j e),
+    X_0 = u_1 + R (x_0 + B_0 e),      X_j = R (x_j + B_j e),      z = N e,
 
-each with the whole mass of the body.  The first is its centre and alone carries momentum.  The next have the spread
-of the body along its principal axes, as far as it has any, and turn and stretch as the body does; the last begin at
-zero, and their squares sum up to what is left of the mass matrix.  So
+each with the whole mass of the body.  The first point is its centre and alone carries momentum.  The others have the
+spread of the body along its principal axes, as far as it has any, and turn and strain as the body does; the squares of
+the numbers sum up to what is left of the mass matrix.  So
 
-    1/2 sum m |X_j'|^2 = 1/2 w.M w
+    1/2 sum m |X_j'|^2 + 1/2 m |z'|^2 = 1/2 w.M w
 
 for velocities w of the nodes seen from the frame, of any large motion as long as e is small, and with it come the
-centrifugal forces on small deformations.  Those are quantities with constant masses, as all inertia here is.
+centrifugal forces on a body without deformation.  That these grow with the deformation is of the order of what a
+linear elasticity leaves out; it is left out as well, beside what the points tell of it.
 
-Source: the decomposition is ours; it is the pivoted factor of the moments of :class:`~sfetcas.mechanics.body_masses`.
+Source: ours; the points are a factor of the moments of :class:`~sfetcas.mechanics.body_masses.BodyMass`.
 """
 
 from __future__ import annotations
@@ -37,16 +38,17 @@ __all__ = ["BodyPoints", "points_of"]
 @final
 @dataclass(frozen=True)
 class BodyPoints(Connection):
-    """Points of a small member; data: rest vectors (nodes x axes), then of each point x (axes) and B (by columns).
+    """Points and numbers of a small member; data: rest vectors (nodes x axes), [x B] of each point, N, by columns.
 
     Attributes
     ----------
-    nodes, points : int
-        Number of macro-nodes and of points.
+    nodes, points, numbers : int
+        How many macro-nodes, points and numbers.
     """
 
     nodes: int
     points: int
+    numbers: int
 
     @property
     def _body(self) -> Body:
@@ -55,24 +57,27 @@ class BodyPoints(Connection):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The components of the points."""
-        data = self.axes * (self.nodes + self.points * (1 + self._body.freedoms))
-        return self.nodes, self.nodes, self.axes * self.points, data, 0
+        """The components of the points, and the numbers."""
+        n = self._body.freedoms
+        data = self.axes * (self.nodes + self.points * (1 + n)) + self.numbers * n
+        return self.nodes, self.nodes, self.axes * self.points + self.numbers, data, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The points as they are now, the first from the place of the first node in the undeformed scene."""
-        body, n, first = self._body, self.axes, self.axes * self.nodes
-        frame, e = body.frame(q), body.deformation(q, u, data[:first])
-        found = []
+        """The points as they are now, the first from the place of the first node in the undeformed scene; numbers."""
+        body, axes = self._body, self.axes
+        frame, e = body.frame(q), body.deformation(q, u, data[: axes * self.nodes])
+        carried, width, found = ca.vertcat(1.0, e), axes * (1 + e.numel()), []
         for j in range(self.points):
-            given = ca.reshape(data[first + j * n * (1 + e.numel()) :][: n * (1 + e.numel())], n, 1 + e.numel())
-            point = self.forth(frame, ca.vertsplit(ca.mtimes(given, ca.vertcat(1.0, e))))
+            begin = axes * self.nodes + j * width
+            seen = ca.mtimes(ca.reshape(data[begin : begin + width], axes, 1 + e.numel()), carried)
+            point = self.forth(frame, ca.vertsplit(seen))
             found += point if j else [a + b for a, b in zip(u[0], point, strict=True)]
-        return found
+        rows = ca.reshape(data[axes * self.nodes + self.points * width :], self.numbers, e.numel())
+        return [*found, *(ca.vertsplit(ca.mtimes(rows, e)) if self.numbers else ())]
 
 
 def points_of(name: str, body: BodyMass, space: bool, length: float) -> tuple[BodyPoints, Array]:
-    """The points of a small member, and their data with the unit ``length`` (m).
+    """The points and numbers of a small member, and their data with the unit ``length`` (m).
 
     Raises
     ------
@@ -89,7 +94,7 @@ def points_of(name: str, body: BodyMass, space: bool, length: float) -> tuple[Bo
             at.append(value * axis)
             by.append(np.einsum("a,abk->bk", axis, shear) / (body.mass * value))
     size = float(np.abs(body.rest).max())
-    rest, lowest = _factor(body.matrix[np.ix_(chosen, chosen)] / body.mass, by, np.where(chosen % 6 < 3, 1.0, size))
+    rows, lowest = _factor(body.matrix[np.ix_(chosen, chosen)] / body.mass, by, np.where(chosen % 6 < 3, 1.0, size))
     if min(float(values[0]) / values[-1], lowest) < -1e-6:
         found = ", ".join(f"{m:.6g}" for m in np.sort(np.trace(body.spread) - np.linalg.eigvalsh(body.spread)))
         raise SceneError(
@@ -97,13 +102,10 @@ def points_of(name: str, body: BodyMass, space: bool, length: float) -> tuple[Bo
             "the others",
             ("members", name),
         )
-    missing = -len(rest) % n
-    by += list(np.vstack([rest, np.zeros((missing, len(chosen)))]).reshape(-1, n, len(chosen)))
-    at += [np.zeros(n)] * (len(by) - len(at))
     unit = np.where(chosen % 6 < 3, length, 1.0) / length
     points = [np.column_stack([x / length, b * unit]).T.ravel() for x, b in zip(at, by, strict=True)]
-    data = np.concatenate([(body.rest[:, :n] / length).ravel(), *points])
-    return BodyPoints(space, len(body.rest), len(at)), data
+    data = np.concatenate([(body.rest[:, :n] / length).ravel(), *points, (rows * unit).T.ravel()])
+    return BodyPoints(space, len(body.rest), len(at), len(rows)), data
 
 
 def _factor(matrix: Array, taken: list[Array], unit: Array) -> tuple[Array, float]:

@@ -217,7 +217,7 @@ class _Weigher:
         return [Observables(kind, turns[:, None], places, data, mass / unit, np.zeros(mass.shape))]
 
     def _bodies(self, unit: float) -> list[Observables]:
-        """Points of the small members, those with as many nodes and points together."""
+        """Points and numbers of the small members, those of one kind together."""
         rotations, segments, scales = self.model.rotations, self.model.segments, self.model.scales
         found: dict[BodyPoints, list[tuple[Array, ...]]] = {}
         for name, body in self.bodies.items():
