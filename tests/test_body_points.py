@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes import UNLIKE, arc_across, made, model_of, textbook
 
+import sfetcas
 from sfetcas import SceneError
 from sfetcas.description.matrices import rigid_motions
 from sfetcas.dynamics.body_points import points_of
@@ -427,6 +428,84 @@ def test_members_with_as_many_points_stand_together():
     wanted = [body_of(model.scene, name).weight.total for name in "mno"]
     np.testing.assert_allclose(np.concatenate([g.mass[:, 0] for g in of_bodies]) * masses.mass, wanted, rtol=1e-12)
     assert masses.mass == pytest.approx(sum(wanted), rel=1e-12)
+
+
+# -- motions --------------------------------------------------------------------------------------------------
+
+
+def flight(name):
+    """A free body that begins with a rotation about the origin and a velocity: its motion, and these two."""
+    table = copy.deepcopy(BODIES[name])
+    space = table["dimension"] == "space"
+    spin = np.array([0.5, -1.0, 2.0]) * (1.0 if space else np.array([0, 0, 1.0]))
+    velocity = np.array([0.3, 0.1, -0.2]) * (1.0 if space else np.array([1.0, 1.0, 0]))
+    del table["nodes"]["A"]["support"]
+    for node in table["nodes"].values():
+        node["velocity"] = (velocity + np.cross(spin, node["position"])).tolist()
+    table["members"]["m"]["spin"] = spin.tolist() if space else spin[2]
+    table["analysis"] = {"type": "dynamic", "end": 1.0, "step": 0.01, "output": 0.25}
+    return sfetcas.solve(made(table)), spin, velocity
+
+
+@pytest.mark.parametrize("name", ["thick", "arc", "arc, plane", "particles", "thick lumps"])
+def test_a_free_body_keeps_its_momentum(name):
+    """Of the start both are those of the rigid body; then linear to rounding, angular to the error of the steps."""
+    motion, spin, velocity = flight(name)
+    body = body_mass(motion.scene, "m")
+    linear = body.mass * (velocity + np.cross(spin, body.centre))
+    angular = (np.trace(body.spread) * np.eye(3) - body.spread) @ spin
+    kinetic = 0.5 * (linear @ linear / body.mass + spin @ angular)
+    for i, step in enumerate(motion.steps):
+        # The first is read from the polynomial of the first step, the others have the error of the steps.
+        rel = 1e-4 if i else 1e-6
+        np.testing.assert_allclose(step.momentum["linear"], linear, atol=1e-9 * np.linalg.norm(linear))
+        np.testing.assert_allclose(step.momentum["angular"], angular, atol=rel * np.linalg.norm(angular))
+        assert step.energy["total"] == pytest.approx(kinetic, rel=rel)
+
+
+def test_momentum_of_a_small_member_is_that_of_a_flexible_one():
+    """A body that flies past, about a centre of mass that two members have together; seen where nothing bends yet."""
+    table = copy.deepcopy(BODIES["thick"])
+    del table["nodes"]["A"]["support"]
+    table["nodes"]["C"] = {"position": [1.5, 0.2, 0.1]}
+    table["members"]["n"] = {"nodes": ["B", "C"], "section": "s", "type": "flexible"}
+    spin = np.array([0.5, -1.0, 2.0])
+    for node in table["nodes"].values():
+        node["velocity"] = np.cross(spin, node["position"]).tolist()
+    table["analysis"] = {"type": "dynamic", "end": 0.01, "step": 0.005, "output": 0.01}
+    found = []
+    for kind in ("small", "flexible"):
+        table["members"]["m"] |= {"type": kind, "spin": spin.tolist()}
+        table["members"]["n"]["spin"] = spin.tolist()
+        found.append(sfetcas.solve(made(table)).steps[0].momentum)
+    for key in ("linear", "angular"):
+        # Both are read from the polynomial of the first step.
+        np.testing.assert_allclose(found[0][key], found[1][key], atol=1e-6 * np.linalg.norm(found[0][key]))
+
+
+def test_a_small_cantilever_vibrates_with_its_two_modes():
+    """A small load is cut: the tip follows the two modes of stiffness and mass of one beam element."""
+    ei, rho, force = UNLIKE["EI3"], UNLIKE["rhoA"], 1e-5
+    table = {
+        "dimension": "plane",
+        "sections": {"s": UNLIKE},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"m": {"nodes": ["A", "B"], "section": "s", "type": "small"}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, force]}},
+    }
+    k, m = textbook(1.0, 1.0, 1.0, 1.0, ei), textbook_mass(1.0, rho)
+    free = np.ix_([7, 11], [7, 11])
+    root = np.linalg.inv(np.linalg.cholesky(m[free]))
+    squares, modes = np.linalg.eigh(root @ k[free] @ root.T)
+    modes = root.T @ modes
+    start = np.linalg.solve(k[free], [force, 0])
+    period = 2 * np.pi / np.sqrt(squares[0])
+    table["analysis"] = {"type": "dynamic", "initial": "equilibrium", "cut": ["f"], "end": period, "step": period / 200}
+    motion = sfetcas.solve(made(table))
+    shares = modes.T @ m[free] @ start
+    wanted = modes[0] @ (shares[:, None] * np.cos(np.sqrt(squares)[:, None] * motion.times))
+    # Steps of fifth order, a few tens of them in a period of the second mode.
+    np.testing.assert_allclose(motion.positions("B")[:, 1], wanted, atol=1e-4 * abs(start[0]))
 
 
 # -- refusals -------------------------------------------------------------------------------------------------
