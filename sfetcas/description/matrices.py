@@ -17,6 +17,7 @@ from .records import say
 __all__ = [
     "Mass",
     "Stiffness",
+    "check_inertia",
     "check_mass",
     "check_rigid_motion",
     "check_stiffness",
@@ -219,10 +220,52 @@ def check_rigid_motion(matrix: ArrayLike, rest: Floats) -> None:
         force = np.abs(scaled @ mode).max() / np.abs(mode).max()
         if force > 1e-6 * largest:
             raise SceneError(f"resists the rigid motion {name}: {force / largest:.1e} of its largest", ("stiffness",))
+    _check_definite(scaled, "stiffness")
+
+
+def check_inertia(matrix: ArrayLike, rest: Floats) -> None:
+    """Refuse a mass that no body has: it differs by direction, has no centre, or gives a negative energy.
+
+    Parameters
+    ----------
+    matrix : (6 n, 6 n), kg, kg m, kg m2, in the member's own axes
+    rest : (n, 3), m - places of the nodes from the first one, in the same axes
+
+    Raises
+    ------
+    SceneError
+        Names the masses, the motion, or the shape of the negative eigenvalue; place within the member.
+    """
+    length = float(np.linalg.norm(rest, axis=1).max())
+    unit = np.tile([1.0, 1.0, 1.0, length, length, length], len(rest))
+    scaled = np.asarray(matrix) / unit[:, None] / unit[None, :]
+    if not scaled.any():
+        return
+    _check_definite(scaled, "mass")
+    modes = rigid_motions(rest / length)
+    block = modes.T @ scaled @ modes
+    mass = float(np.trace(block[:3, :3])) / 3.0
+    if mass <= 0.0 or np.abs(block[:3, :3] - mass * np.eye(3)).max() > 1e-6 * mass:
+        found = ", ".join(f"{m:.7g}" for m in np.diag(block)[:3])
+        coupled = float(np.abs(block[:3, :3] - np.diag(np.diag(block[:3, :3]))).max())
+        found += f" kg along {', '.join(AXES)}" + (
+            f", coupled by {coupled:.2g} kg" if coupled > 1e-6 * abs(mass) else ""
+        )
+        raise SceneError(f"found {found} in rigid motion, accepted: one mass along all", ("mass",))
+    turning = block[:3, 3:]
+    one_sided = np.abs(turning + turning.T)
+    if one_sided.max() > 1e-6 * max(mass, float(np.abs(turning).max())):
+        i, j = np.unravel_index(int(one_sided.argmax()), (3, 3))
+        message = f"has no centre of mass: turning about {AXES[j]} has momentum along {AXES[i]} that no centre gives"
+        raise SceneError(message, ("mass",))
+
+
+def _check_definite(scaled: Floats, key: str) -> None:
+    """Refuse a matrix, rotations times a length, with a negative eigenvalue."""
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    if values[0] < -1e-7 * largest:
+    if values[0] < -1e-7 * float(np.abs(scaled).max()):
         shape = ", ".join(f"{v + 0.0:.2g}" for v in vectors[:, 0])
-        raise SceneError(f"is indefinite: eigenvalue {values[0]:.3g} of the shape [{shape}]", ("stiffness",))
+        raise SceneError(f"is indefinite: eigenvalue {values[0]:.3g} of the shape [{shape}]", (key,))
 
 
 AXES = ("b1", "b2", "b3")

@@ -16,7 +16,7 @@ from ..mathematics.quaternion import matrix
 from .contacts import Contact
 from .dimension import out_of_plane
 from .loads import History, Load, Motion
-from .matrices import check_rigid_motion
+from .matrices import check_inertia, check_rigid_motion
 from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
 from .obstacles import check_start, members_of, obstacle
 from .records import Named, Record, Vector, say, unknown
@@ -294,7 +294,10 @@ def _check_bodies(scene: Scene) -> None:
         try:
             places = np.array([scene.nodes[node].position for node in member.nodes])
             frame = matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0]
-            check_rigid_motion(member.stiffness, (places - places[0]) @ frame)
+            rest = (places - places[0]) @ frame
+            check_rigid_motion(member.stiffness, rest)
+            if member.mass is not None:
+                check_inertia(member.mass, rest)
         except SceneError as error:
             raise error.within("members", name) from None
 

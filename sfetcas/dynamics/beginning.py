@@ -46,13 +46,18 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
     members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
     tables: dict[str, Any] = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
-    before = Scene(**{**dict(scene), **tables, "analysis": analysis, "expect": ()})
+    before = Scene(**{**_given_keys(scene), **tables, "analysis": analysis, "expect": ()})
     stopped = any(spring.stop is not None for spring in scene.springs.values())
     return (stops.solve_stopped(before, settings) if stopped else statics.solve(before, settings)).last
 
 
 DRIVEN = ("value", "displacement", "rotation")
 """Keys of loads and motions that a history multiplies."""
+
+
+def _given_keys(scene: Scene) -> dict[str, Any]:
+    """Values by key, without what a scene has found of itself meanwhile."""
+    return {key: getattr(scene, key) for key in type(scene).model_fields}
 
 
 def _scaled(value: Any, factor: float) -> Any:
@@ -71,7 +76,7 @@ def moving(scene: Scene) -> Scene:
     motions = {name: motion for name, motion in scene.motions.items() if motion.node not in released}
     analysis = scene.analysis.model_copy(update={"cut": (), "release": ()})
     tables: dict[str, Any] = {"loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis}
-    return Scene(**{**dict(scene), **tables})
+    return Scene(**{**_given_keys(scene), **tables})
 
 
 FREE = {"support": "free", "rotation": "fixed"}
@@ -228,8 +233,10 @@ def _given(system: StageEquations, equations: Equations, state: State) -> tuple[
     for name, member in scene.members.items():
         if member.spin is None:
             continue
-        chain = model.chain(name) if name in model.beams.first else np.array(model.rotations.ends[name])
-        x = model.along(name)
+        slender = name in model.beams.first
+        chain = model.chain(name) if slender else np.array(model.rotations.ends[name])
+        # Of a small member the nodes, as many as it has, stand for equal parts.
+        x = model.along(name) if slender else np.linspace(0.0, 1.0, len(chain))
         chain, first = np.unique(chain, return_index=True)
         spins = _spins(member.spin, x[first], model.space) * unit
         for number, spin in zip(chain.tolist(), spins, strict=True):

@@ -13,6 +13,7 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.joints import by_turning
 from ..mechanics.loading import Loading, carried
+from .body_points import BodyPoints
 from .masses import Observables
 from .observed import Axes
 from .stages import StageEquations
@@ -33,6 +34,9 @@ class Inertia:
         self._rest = np.zeros((system.linear // axes, axes))
         for name in model.nodes:
             self._rest[model.segments.place(name)] = np.asarray(model.scene.nodes[name].position)[:axes]
+        for (name, i), end in model.segments.ends.items():
+            node = model.scene.members[name].nodes[i]
+            self._rest[model.segments.place(end)] = np.asarray(model.scene.nodes[node].position)[:axes]
         for name in model.members:
             self._place(name)
         self._rest /= model.scales.length
@@ -98,9 +102,19 @@ class Inertia:
         first, mass = weights @ positions, float(weights.sum())
         angular = np.cross(positions, three(linear)).sum(axis=0)
         for group, value, momentum in zip(self._masses.observables, others, groups, strict=True):
-            vectors, its = (three(part.reshape(-1, self._system.axes)) for part in (value, momentum))
-            if isinstance(group.kind, Axes):
-                angular = angular + np.cross(vectors, its).sum(axis=0)
+            if not isinstance(group.kind, Axes | BodyPoints):
+                continue
+            # Numbers beside the points of a small member have no momentum.
+            kept = self._system.axes * group.kind.points if isinstance(group.kind, BodyPoints) else None
+            parts = (part.reshape(len(group.data), -1)[:, :kept] for part in (value, momentum))
+            vectors, its = (three(part.reshape(len(group.data), -1, self._system.axes)) for part in parts)
+            if isinstance(group.kind, BodyPoints):
+                # The first point of each is a place, seen from where the first node was.
+                vectors = vectors.copy()
+                vectors[:, 0] += three(self._rest[group.places[:, 0]])
+                own = group.mass[:, 0]
+                total, first, mass = total + its[:, 0].sum(axis=0), first + own @ vectors[:, 0], mass + own.sum()
+            angular = angular + np.cross(vectors, its).sum(axis=(0, 1))
         return total, angular - np.cross(first / mass, total)
 
     # -- as loads ---------------------------------------------------------------------------------------

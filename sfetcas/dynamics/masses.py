@@ -1,7 +1,8 @@
 """Masses and dampers of a model: what the rates of positions, section axes and strains cost, dimensionless.
 
 Masses of flexible members are lumped at the nodes of their elements (Lobatto quadrature: diagonal, constant, and as
-accurate as the elements); a rigid member has its own consistent mass between its ends, which is exact.
+accurate as the elements); a rigid member has its own consistent mass between its ends, which is exact; a small one
+that of a few points which move with it (see :mod:`~sfetcas.dynamics.body_points`).
 
 The unit of time is that in which the whole mass is one: ``sqrt(mass length^2 / moment)`` of the units of the model.
 """
@@ -18,8 +19,10 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from ..mathematics.interpolation import differentiation, lobatto
 from ..mathematics.linear import SparseMap
+from ..mechanics.body_masses import BodyMass, body_mass, euler_weights
 from ..mechanics.joints import Connection, LineSpring, Spring, TurnSpring
 from ..mechanics.model import Model
+from .body_points import BodyPoints, points_of
 from .observed import Axes, Gap, SpringAngle, Strains, Travel
 
 __all__ = ["Masses", "Observables", "masses_of"]
@@ -89,11 +92,6 @@ def masses_of(model: Model) -> Masses:
     return _Weigher(model).all()
 
 
-def _euler(inertia: Array) -> Array:
-    """Weights of the axes (..., 3) for moments of inertia (..., 3) about them."""
-    return 0.5 * inertia.sum(axis=-1, keepdims=True) - inertia
-
-
 class _Weigher:
     """Collects the masses, in SI units."""
 
@@ -106,6 +104,7 @@ class _Weigher:
         self.inner, self.inner_drag = np.zeros(model.beams.weight.shape), np.zeros(model.beams.weight.shape)
         # Of each rotation the sum of weight times b b^T over the axes b that turn with it.
         self.spread = np.zeros((len(model.rotations.kind), 3, 3))
+        self.bodies: dict[str, BodyMass] = {}
         self.total = 0.0
 
     def all(self) -> Masses:
@@ -116,6 +115,9 @@ class _Weigher:
                 self._add_flexible(name)
             elif member.type == "rigid" and member.section is not None:
                 self._add_rigid(name)
+            elif member.type == "small" and (found := body_mass(scene, name)) is not None:
+                self.bodies[name] = found
+                self.total += found.mass
         for name, node in scene.nodes.items():
             number = model.segments.place(name)
             self._at(number, number, node.mass)
@@ -132,7 +134,7 @@ class _Weigher:
         of_drag = mass / time
         row, column, value = (np.array(part) for part in zip(*self.entries, strict=True))
         size = (len(self.drag), len(self.drag))
-        groups = [*self._axes(mass * length**2), *self._strains(time), *self._springs(time)]
+        groups = [*self._axes(mass * length**2), *self._bodies(mass), *self._strains(time), *self._springs(time)]
         return Masses(
             time=time,
             mass=mass,
@@ -148,7 +150,7 @@ class _Weigher:
 
     def _turning(self, turn: int, axes: Array, inertia: Array) -> None:
         """Moments of inertia (3,), kg m2, about axes (columns) that turn with a rotation."""
-        self.spread[turn] += axes @ np.diag(_euler(inertia)) @ axes.T
+        self.spread[turn] += axes @ np.diag(euler_weights(inertia)) @ axes.T
 
     # -- members --------------------------------------------------------------------------------
 
@@ -171,7 +173,7 @@ class _Weigher:
         inertia = section.inertia(x.ravel())
         if inertia.any():
             frames = quaternion.matrix(line.quaternions(x.ravel()))
-            parts = _euler(inertia * weights.ravel()[:, None])
+            parts = euler_weights(inertia * weights.ravel()[:, None])
             spread = np.einsum("nij,nj,nkj->nik", frames, parts, frames)
             np.add.at(self.spread, model.rotations.turns[part].ravel(), spread)
 
@@ -213,6 +215,21 @@ class _Weigher:
         kind = Axes(self.space)
         places = np.zeros((len(turns), 0), dtype=np.intp)
         return [Observables(kind, turns[:, None], places, data, mass / unit, np.zeros(mass.shape))]
+
+    def _bodies(self, unit: float) -> list[Observables]:
+        """Points and numbers of the small members, those of one kind together."""
+        rotations, segments, scales = self.model.rotations, self.model.segments, self.model.scales
+        found: dict[BodyPoints, list[tuple[Array, ...]]] = {}
+        for name, body in self.bodies.items():
+            kind, data = points_of(name, body, self.space, scales.length)
+            places = [segments.place(segments.ends[name, i]) for i in range(kind.nodes)]
+            mass = np.full(kind.sizes[2], body.mass / unit)
+            found.setdefault(kind, []).append((np.array(rotations.ends[name]), np.array(places), data, mass))
+        groups = []
+        for kind, members in found.items():
+            turns, sides, numbers, masses = (np.array(part) for part in zip(*members, strict=True))
+            groups.append(Observables(kind, turns, sides, numbers, masses, np.zeros(masses.shape)))
+        return groups
 
     def _strains(self, time: float) -> list[Observables]:
         """Kelvin-Voigt damping of the flexible members that have any."""

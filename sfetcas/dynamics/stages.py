@@ -141,8 +141,7 @@ class StageEquations:
         self.groups = tuple(model.groups)
         self._calls, self._kernels = calls, kernels
         self.given = [
-            ca.DM(part.reshape(self.elements * self.points, -1).T)
-            for part in (model.beams.stiffness, model.beams.tangent)
+            ca.DM(part.reshape(-1, part.shape[-1]).T) for part in (model.beams.stiffness, model.beams.tangent)
         ]
         self.rest = model.beams.tangent.ravel()
         self._number()
@@ -178,7 +177,8 @@ class StageEquations:
         self.gather = _sparse(unknown[used], used, weight[used], (self.total, self.full))
         self._turning = self.gather.T[: self.of_places, :]
         turns = np.arange(self.turns)
-        self.cells = (self.turns * model.rotations.turns[:, :, None] + turns).reshape(self.elements, -1)
+        cells = self.turns * model.rotations.turns[:, :, None] + turns
+        self.cells = cells.reshape(self.elements, self.turns * self.points)
         moments = np.arange(self.cells.size)
         ones = np.ones(self.cells.size)
         self.onto_rotations = _sparse(self.cells.ravel(), moments, ones, (self.of_places, self.cells.size))
@@ -727,7 +727,7 @@ class _Stage:
         gaps = system.open_gaps(y, factors)
         turning = -_times(system.moment, factors)
         if system.elements:
-            pull = _times(system.pull, factors) + _times(system.closing.T, lam[:closings])
+            pull = _times(system.pull, factors) + _times(system.closing.T, lam[:closings, :])
             pull += _times(system.by_tangent.T, linear) + system.carried(q, factors)
             found = system.many(model.element.turning, system.elements)(
                 q[:, model.rotations.turns.ravel().tolist()],
@@ -770,7 +770,7 @@ class _Stage:
         pushed, turned_by, followed = system.followed(q, factors)
         entries += followed
         turning, on_places = turning + turned_by, on_places + pushed
-        self.residual = system.gathered(turning, on_places, full, lam[:closings], rows)
+        self.residual = system.gathered(turning, on_places, full, lam[:closings, :], rows)
         self.entries = ca.vertcat(*entries, ca.MX(1))
 
     def coupled(self, other: _Stage, c: ca.MX, b: ca.MX) -> ca.MX:

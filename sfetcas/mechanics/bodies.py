@@ -9,7 +9,8 @@ exactly up to quadrature; the stiffness is the inverse of C where it has one, an
 of a straight member) are rows.
 
 Loads along a member are a profile times a vector fixed in space.  What they do to a body in a frame is given by
-their sum, their first moment, and consistent forces at its ends: those that hold the ends still.
+their sum, their first moment, and consistent forces at its ends: those that hold the ends still.  These are the
+transpose of the shapes that the ends give the member.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..description.matrices import rigid_motions
 from ..description.scene import Scene
@@ -25,7 +27,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.interpolation import gauss, integration
 
-__all__ = ["BodyData", "Lever", "body_of", "lever_along", "own_axes", "quadrature"]
+__all__ = ["BodyData", "Lever", "body_of", "lever_along", "own_axes", "quadrature", "shapes_along"]
 
 PANELS, POINTS = 24, 6
 """Quadrature along a member: exact for polynomials of degree 11 a panel, and no panel turns by much."""
@@ -66,12 +68,15 @@ class BodyData:
         Deformations that do not exist, unit rows with rotations times the size of the body.
     weight : Lever or None
         Mass; None where none is given.
+    mass : ndarray (6 n, 6 n) or None
+        Condensed mass; None without one.
     """
 
     rest: Array
     stiffness: Array
     stiff: Array
     weight: Lever | None
+    mass: Array | None = None
 
 
 def body_of(scene: Scene, name: str) -> BodyData:
@@ -82,10 +87,14 @@ def body_of(scene: Scene, name: str) -> BodyData:
     if member.stiffness is None:
         return _from_section(scene, name, rest)
     turn = np.kron(np.eye(2 * len(rest)), own_axes(scene, name))
-    stiffness = turn @ np.asarray(member.stiffness) @ turn.T
-    mass = None if member.mass is None else turn @ np.asarray(member.mass) @ turn.T
+
+    def fixed(matrix: ArrayLike) -> Array:
+        own = np.asarray(matrix, dtype=float)
+        return np.asarray(turn @ (0.5 * (own + own.T)) @ turn.T)
+
+    mass = None if member.mass is None else fixed(member.mass)
     weight = None if mass is None else _lever_of_mass(mass, rest)
-    return BodyData(rest, 0.5 * (stiffness + stiffness.T), np.zeros((0, 6 * len(rest))), weight)
+    return BodyData(rest, fixed(member.stiffness), np.zeros((0, 6 * len(rest))), weight, mass)
 
 
 def own_axes(scene: Scene, name: str) -> Array:
@@ -165,7 +174,7 @@ def _from_section(scene: Scene, name: str, rest: Array) -> BodyData:
     moves = values > RIGID * values[-1]
     at_end = (vectors[:, moves] / values[moves]) @ vectors[:, moves].T / unit[:, None] / unit[None, :]
     # Deformations are those of the second end seen from the first: E takes all freedoms to them.
-    to_end = np.hstack([-_carried(rest[1]), np.eye(6)])
+    to_end = _seen_from_first(rest[1])
     stiff = (vectors[:, ~moves].T / unit) @ to_end
     density = scene.sections[str(scene.members[name].section)]
     weight = None if density.missing(["rhoA"]) else lever_along(scene, name, density.mass(x), x, w)
@@ -179,18 +188,25 @@ def _carried(arm: Array) -> Array:
     return matrix
 
 
+def _seen_from_first(arm: Array) -> Array:
+    """Displacement and rotation of the second end against what the first one carries, (6, 12)."""
+    return np.hstack([-_carried(arm), np.eye(6)])
+
+
 def _cross_all(r: Array) -> Array:
     """Columns ``r x e_i``, (n, 3, 3)."""
     return np.asarray(np.cross(r[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1))
 
 
-def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> Lever:
-    """Lever of a profile at places x with weights w (fractions of the length) along a member with a section."""
+def shapes_along(scene: Scene, name: str, x: Array) -> Array:
+    """Displacement and rotation at places x by those of the ends of a member with a section, (n, 6, 12).
+
+    With the first end held, a wrench at the second one moves a place as by Betti a force there moves the second end.
+    What the ends cannot do against each other moves no place.
+    """
     line = scene.center_lines[name]
     places, end = line.positions(x), line.positions(np.array([1.0]))[0]
-    share = profile * w * line.length
     start = line.positions(np.array([0.0]))[0]
-    total, first = float(share.sum()), share @ (places - start)
     q, qw = quadrature(scene, name)
     here, edges = line.positions(q), _edges(scene, name)
     softness = compliance_along(scene, name, q) * line.length
@@ -198,12 +214,20 @@ def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> 
     compliance = np.einsum("nji,njk,nkl,n->il", b, softness, b, qw)
     # A unit force at x bends what is before it by (r(x) - r(s)) x e_i; its work on that is linear in r(x).
     bent = np.einsum("nji,njk->nik", b, softness)
-    by_place, by_origin = _integrals(edges, bent, x), _integrals(edges, bent @ _cross_all(here), x)
-    free = np.einsum("n,nia->ai", share, by_place @ _cross_all(places) - by_origin)
+    by_moment, by_origin = _integrals(edges, bent, x), _integrals(edges, bent @ _cross_all(here), x)
+    by_wrench = np.concatenate([by_moment @ _cross_all(places) - by_origin, by_moment], axis=2).transpose(0, 2, 1)
     size = float(np.abs(end - start).max())
     unit = np.array([size, size, size, 1.0, 1.0, 1.0])
-    second = free / unit @ np.linalg.pinv(compliance / unit[:, None] / unit[None, :], rcond=RIGID) / unit
-    # What the first end takes: the rest of the force, and moments about it in balance.
-    force, moment = total * np.eye(3) - second[:, :3], np.cross(first[None, :], np.eye(3))
-    moment = moment - second[:, 3:] - np.cross((end - start)[None, :], second[:, :3])
-    return Lever(total, first, np.hstack([force, moment, second]))
+    inverse = np.linalg.pinv(compliance / unit[:, None] / unit[None, :], rcond=RIGID) / unit[:, None] / unit[None, :]
+    shapes = by_wrench @ inverse @ _seen_from_first(end - start)
+    shapes[:, :, :6] += np.array([_carried(arm) for arm in places - start])
+    return np.asarray(shapes)
+
+
+def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> Lever:
+    """Lever of a profile at places x with weights w (fractions of the length) along a member with a section."""
+    line = scene.center_lines[name]
+    share = profile * w * line.length
+    first = share @ (line.positions(x) - line.positions(np.array([0.0]))[0])
+    # What forces do at the ends is what the ends do where they act.
+    return Lever(float(share.sum()), first, np.einsum("n,nij->ij", share, shapes_along(scene, name, x)[:, :3]))

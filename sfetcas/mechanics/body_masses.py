@@ -1,0 +1,153 @@
+"""Inertia of small members: masses of linear beam theory, or condensed ones, and how deformations displace them.
+
+A body is taken as particles that its freedoms ``w`` (displacements and rotations at its nodes) displace linearly.
+Rigid motions and small deformations, and the centrifugal forces on these, know of the particles
+
+    sum m,   sum m x,   sum m x x^T,   sum m d(w),   sum m x d(w)^T,   sum m |d(w)|^2 = w^T M w.
+
+From a section all follow by quadrature; rotary inertia is that of particles on the section axes with Euler's weights.
+Of a condensed mass only M is known, and with it all but the symmetric part of ``sum m x d^T``, which tells of
+centrifugal forces that strain the body.  A strain is taken to displace particles as it displaces the nodes, which is
+true of lumped masses and of all finite elements without rotations at their nodes that pass the patch test.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.matrices import rigid_motions
+from ..description.scene import Scene
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from .bodies import BodyData, body_of, quadrature, shapes_along
+
+__all__ = ["SMALLEST", "BodyMass", "body_mass", "euler_weights", "mass_of"]
+
+SMALLEST = 1e-12
+"""Inertia below this share of the largest is none: rounding is four digits below it."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMass:
+    """Inertia of a small member in SI units and the fixed axes of the undeformed scene.
+
+    Attributes
+    ----------
+    rest : ndarray (n, 3)
+        Nodes from the first one.
+    mass : float
+    centre : ndarray (3,)
+        From the first node.
+    spread : ndarray (3, 3)
+        Sum of ``m x x^T`` about the centre.
+    shift : ndarray (3, 6 n)
+        Displacement of the centre by the freedoms.
+    shear : ndarray (3, 3, 6 n)
+        Sum of ``m x_a d_b`` about the centre, by the freedoms.
+    matrix : ndarray (6 n, 6 n)
+        The mass matrix.
+    """
+
+    rest: Array
+    mass: float
+    centre: Array
+    spread: Array
+    shift: Array
+    shear: Array
+    matrix: Array
+
+
+def euler_weights(inertia: Array) -> Array:
+    """Weights of the axes (..., 3) for moments of inertia (..., 3) about them."""
+    return np.asarray(0.5 * inertia.sum(axis=-1, keepdims=True) - inertia)
+
+
+def mass_of(scene: Scene, name: str) -> Array:
+    """Mass matrix (6 n, 6 n) of a small member in the fixed axes of the undeformed scene, zero without mass."""
+    found = body_mass(scene, name)
+    size = 6 * len(scene.members[name].nodes)
+    return np.zeros((size, size)) if found is None else found.matrix
+
+
+def body_mass(scene: Scene, name: str) -> BodyMass | None:
+    """Inertia of a small member; None where it has no mass."""
+    body = body_of(scene, name)
+    if body.weight is None or body.weight.total <= 0.0:
+        return None
+    if body.mass is None:
+        return _from_section(scene, name, body)
+    return _from_matrix(body.mass, body.rest, body.weight.total, body.weight.first / body.weight.total)
+
+
+def _from_section(scene: Scene, name: str, body: BodyData) -> BodyMass:
+    line, section = scene.center_lines[name], scene.sections[str(scene.members[name].section)]
+    x, w = quadrature(scene, name)
+    shapes = shapes_along(scene, name, x) @ _possible(body.stiff, body.rest)
+    moved, turned = shapes[:, :3], shapes[:, 3:]
+    share, places = section.mass(x) * w * line.length, line.positions(x) - line.positions(np.array([0.0]))[0]
+    mass = float(share.sum())
+    centre = share @ places / mass
+    arms = places - centre
+    # Rotary inertia: particles on the section axes, which turn with the section.
+    inertia, axes = section.inertia(x) * (w * line.length)[:, None], quaternion.matrix(line.quaternions(x))
+    weights = euler_weights(inertia)
+    spins = np.cross(turned[:, :, None, :], axes[:, :, :, None], axis=1)
+    return BodyMass(
+        rest=body.rest,
+        mass=mass,
+        centre=centre,
+        spread=np.einsum("n,na,nb->ab", share, arms, arms) + np.einsum("ni,nai,nbi->ab", weights, axes, axes),
+        shift=np.einsum("n,nak->ak", share, moved) / mass,
+        shear=np.einsum("n,na,nbk->abk", share, arms, moved) + np.einsum("ni,nai,nbik->abk", weights, axes, spins),
+        matrix=np.einsum("n,nak,nal->kl", share, moved, moved)
+        + np.einsum("ni,nai,nak,nbi,nbl->kl", inertia, axes, turned, axes, turned, optimize=True),
+    )
+
+
+def _possible(stiff: Array, rest: Array) -> Array:
+    """What is left of the freedoms (6 n, 6 n) without deformations that do not exist, which moves as one."""
+    size = float(np.abs(rest).max())
+    unit = np.tile([size, size, size, 1.0, 1.0, 1.0], len(rest))
+    rows = stiff * unit
+    kept = np.eye(len(unit)) - np.linalg.pinv(rows) @ rows
+    return np.asarray(unit[:, None] * kept / unit)
+
+
+def _from_matrix(matrix: Array, rest: Array, mass: float, centre: Array) -> BodyMass:
+    motions = rigid_motions(rest)
+    ends = motions.T @ matrix
+    shift, across = ends[:3] / mass, np.cross(np.eye(3), centre).T
+    # About the centre: moments of inertia, angular momentum of the freedoms, and the rotation that has the same.
+    inertia = ends[3:] @ motions[:, 3:] - mass * across.T @ across
+    momentum = ends[3:] - mass * across.T @ shift
+    turning = np.linalg.pinv(inertia, rcond=SMALLEST, hermitian=True) @ momentum
+    spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    spins = np.cross(turning[:, None, :], np.eye(3)[:, :, None], axis=0)
+    shear = np.einsum("aj,bjk->abk", spread, spins)
+    relative = matrix - mass * shift.T @ shift - momentum.T @ turning
+    shear = shear + _strained(relative, spread, rest - centre)
+    return BodyMass(rest, mass, centre, spread, shift, shear, matrix)
+
+
+def _strained(relative: Array, spread: Array, arms: Array) -> Array:
+    """Symmetric part of the shear (3, 3, 6 n): strains in the principal axes, which displace the nodes as all else.
+
+    ``relative`` is the mass without rigid motions.  Of each strain it holds a mass k, and particles of this spread have
+    another, c, the same where nodes and particles do move alike; the smaller one keeps the rest of the energy positive.
+    """
+    values, axes = np.linalg.eigh(spread)
+    present = np.flatnonzero(values > SMALLEST * values[-1])
+    shear, left = np.zeros((3, 3, len(relative))), relative
+    for i, j in itertools.combinations_with_replacement(present, 2):
+        dyad = np.outer(axes[:, i], axes[:, j])
+        # A shear of particles beside the rotation that it has: their reduced spread.
+        strain, own = (dyad, values[i]) if i == j else (dyad + dyad.T, 4.0 / (1.0 / values[i] + 1.0 / values[j]))
+        moved = np.hstack([arms @ strain, np.zeros_like(arms)]).ravel()
+        momentum = left @ moved
+        momentum = momentum * own / max(own, float(moved @ momentum))
+        shear += np.multiply.outer(strain if i == j else 0.5 * strain, momentum)
+        left = left - np.outer(momentum, momentum) / own
+    return shear
