@@ -1,4 +1,4 @@
-"""What a scene asks for is what is done: statics or a path."""
+"""What a scene asks for is what is done: statics, a path or modes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from .description.scene import Scene, check_loaded
+from .dynamics.modes import Modes, find_modes
 from .dynamics.motion import Motion
 from .dynamics.simulation import simulate
 from .equilibria import statics, stops
@@ -15,10 +16,13 @@ from .mechanics.resistance import check_resistance
 from .paths import paths
 from .paths.path import Path
 
-__all__ = ["solve"]
+__all__ = ["Answer", "solve"]
+
+Answer = Solution | Path | Motion | Modes
+"""What an analysis may give."""
 
 
-def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Solution | Path | Motion:
+def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Answer:
     """The answer of a scene, by the type of its analysis.
 
     Parameters
@@ -29,7 +33,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
 
     Returns
     -------
-    Solution, Path or Motion
+    Solution, Path, Motion or Modes
         All have ``steps``, ``last``, ``status`` and ``to_dict``.
 
     Raises
@@ -51,5 +55,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Sol
     check_resistance(scene)
     if scene.analysis.type == "path":
         return paths.follow_path(scene, settings)
+    if scene.analysis.type == "modes":
+        return find_modes(scene, settings)
     stopped = any(spring.stop is not None for spring in scene.springs.values())
     return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from .analyses import Answer
 from .description.records import nearest, say
 from .description.scene import Expect, Scene
+from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Motion
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
@@ -39,7 +41,7 @@ class Check:
     passed: bool
 
 
-def check(scene: Scene, solution: Solution | Path | Motion) -> list[Check]:
+def check(scene: Scene, solution: Answer) -> list[Check]:
     """Compare the answers with all expectations of the scene, in their order.
 
     Raises
@@ -55,7 +57,7 @@ def check(scene: Scene, solution: Solution | Path | Motion) -> list[Check]:
         except SceneError as error:
             raise error.within("expect", str(i)) from None
         try:
-            value = look_up(entry, expect.quantity, expect.at)
+            value = _value(solution, entry, expect)
         except SceneError as error:
             raise error.within("expect", str(i), "quantity") from None
         try:
@@ -70,7 +72,7 @@ def check(scene: Scene, solution: Solution | Path | Motion) -> list[Check]:
     return checks
 
 
-def _entry_of(solution: Solution | Path | Motion, expect: Expect) -> Equilibrium | Instant:
+def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | Instant:
     """The answer that an expectation speaks of."""
     if isinstance(solution, Path):
         return _entry_on_path(solution, expect)
@@ -97,6 +99,14 @@ def _numbered(entries: Sequence[Equilibrium], number: int, key: str) -> Equilibr
     if number > len(entries):
         raise SceneError(f"found {number}, but the path has {len(entries)}", (key,))
     return entries[number - 1]
+
+
+def _value(solution: Answer, entry: Equilibrium | Instant, expect: Expect) -> Any:
+    """What the answer says; of modes as of equilibria."""
+    kind, _, key = expect.quantity.partition(".")
+    if kind == "modes" and isinstance(solution, Modes):
+        return _entry(solution.values(), key)
+    return look_up(entry, expect.quantity, expect.at)
 
 
 def look_up(step: Equilibrium | Instant, quantity: str, at: float | None = None) -> Any:
@@ -147,7 +157,7 @@ def look_up(step: Equilibrium | Instant, quantity: str, at: float | None = None)
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 
 
-def _assigned(scene: Scene, solution: Solution | Path | Motion) -> dict[int, tuple[Equilibrium, bool]]:
+def _assigned(scene: Scene, solution: Answer) -> dict[int, tuple[Equilibrium, bool]]:
     """Entry of each expect, by its place, where a search listed several of one factor; whether it is its own.
 
     Numbers of ``equilibrium`` go to different entries so that as many as possible are met; an expect without one

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .analyses import solve
+from .analyses import Answer, solve
 from .checks import Check, check
 from .description.records import counted
 from .description.scene import Scene
@@ -23,6 +23,7 @@ from .description.scenefile import load
 from .dynamics.motion import Motion
 from .equilibria.solution import Equilibrium, Solution
 from .equilibria.statics import Settings, pilot_of
+from .dynamics.modes import Modes
 from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import Model, assemble
@@ -129,7 +130,7 @@ def _run(options: argparse.Namespace) -> int:
         raise SceneError(f"{options.plot}: found for --json and for --plot, accepted: two files")
     drawing = _drawing(options.plot, scene.analysis.type == "path")
 
-    def told(solution: Solution | Course | Motion) -> None:
+    def told(solution: Answer) -> None:
         if options.json is not None:
             _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
         if drawing is not None:
@@ -147,7 +148,7 @@ def _run(options: argparse.Namespace) -> int:
     return SOLVED if solution.status is Status.SOLVED and all(c.passed for c in checks) else SHORT
 
 
-def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Solution | Course | Motion, list[Check]]:
+def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Answer, list[Check]]:
     """The answer of a scene and its comparisons."""
     solution = _named(file, lambda: solve(scene, settings))
     return solution, _named(file, lambda: check(scene, solution))
@@ -208,13 +209,15 @@ def _umask() -> int:
     return mask
 
 
-def _report(solution: Solution | Course | Motion, seconds: float) -> None:
+def _report(solution: Answer, seconds: float) -> None:
     model = solution.last.model
     print(solution.scene.title or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(f"  {_flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
     if isinstance(solution, Course):
         _report_path(solution)
+    if isinstance(solution, Modes):
+        _report_modes(solution)
     if isinstance(solution, Motion):
         _report_motion(solution)
     else:
@@ -265,6 +268,18 @@ def _report_motion(motion: Motion) -> None:
         print(f"  note: {note}")
 
 
+def _report_modes(modes: Modes) -> None:
+    estimate = f"estimated relative error {modes.error_estimate:.1e}"
+    print(f"{counted(len(modes.modes), 'mode')}, {counted(modes.rigid, 'rigid motion')} left out; {estimate}")
+    for number, mode in enumerate(modes.modes, start=1):
+        faded = f", damping ratio {mode.damping:.6g}" if modes.damped else ""
+        print(f"  mode {number}: {mode.omega:.9g} rad/s ({mode.omega / (2.0 * np.pi):.6g} Hz){faded}")
+    for rate in modes.growing:
+        print(f"  leaves the equilibrium at a rate of {rate:.9g} 1/s")
+    for note in modes.notes:
+        print(f"  note: {note}")
+
+
 def _report_events(branch: Branch, counts: dict[str, int]) -> None:
     """Limit points and bifurcations of a branch, numbered on from those of the branches before, as in ``expect``."""
     for kind, entries in (("limit point", branch.limit_points), ("bifurcation", branch.bifurcations)):
@@ -278,7 +293,7 @@ def _report_events(branch: Branch, counts: dict[str, int]) -> None:
                 print(f"    note: {note}")
 
 
-def _places(solution: Solution | Course) -> list[str]:
+def _places(solution: Answer) -> list[str]:
     """Which of several equilibria of its factor each entry is, in words; empty where one was asked for."""
     factors = [step.factor for step in solution.steps]
     if isinstance(solution, Course):

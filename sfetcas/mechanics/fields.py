@@ -22,7 +22,7 @@ from .equations import Equations, State
 from .loading import Loading
 from .mesh import Touch
 
-__all__ = ["Fields", "rotations_along", "transferred"]
+__all__ = ["Fields", "rotations_along", "transferred", "turned_tangents"]
 
 
 class Fields:
@@ -34,7 +34,7 @@ class Fields:
         self._equations = equations
         self.q = state.q
         model = self.model
-        self.turned = _turned_tangents(equations, state)
+        self.turned = turned_tangents(equations, state)
         reach = self.turned.sum(axis=1)
         nodal, _ = equations.displacements(state, loading, reach)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
@@ -469,7 +469,7 @@ def _cross(a: Array, b: Array) -> Array:
     return np.cross(_three(a), _three(b))
 
 
-def _turned_tangents(equations: Equations, state: State) -> Array:
+def turned_tangents(equations: Equations, state: State) -> Array:
     """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
     model, element = equations.model, equations.model.element
     q = state.q[model.rotations.turns]

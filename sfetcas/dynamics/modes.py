@@ -1,0 +1,420 @@
+"""Modes: frequencies and shapes of small motions about the equilibrium of a scene, to the accuracy asked for.
+
+1. The equilibrium of the loads is that of statics; a scene without loads is at rest undeformed, supported or not.
+2. It is put on a mesh with a place at every cut, which masses need, and corrected there by Newton's method.
+3. All elements are halved until the frequencies change by less than the accuracy, relative to themselves.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..description.supports import check_floating
+from ..equilibria import statics
+from ..equilibria.meshing import Meshing
+from ..equilibria.settings import Settings
+from ..equilibria.single import finished
+from ..equilibria.solution import Equilibrium
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.linear import SparseSolver, smallest
+from ..mathematics.threads import single_threaded
+from ..mechanics.equations import Equations, State
+from ..mechanics.fields import Fields, transferred
+from ..mechanics.loading import Loading
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import Model, assemble
+from ..solvers.newton import Corrected
+from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.stability import Stability
+from .small_motion import Eigenmotions, SmallMotion
+
+__all__ = ["Mode", "Modes", "find_modes", "prepared_for_motion", "put_on"]
+
+ORDER = 6
+"""Order of the elements: the error of a frequency falls by 2 to the power of twice this at each halving."""
+
+HALVINGS = 7
+"""Halvings of the mesh at most."""
+
+MOST_ELEMENTS = 4000
+"""A mesh that is halved does not grow beyond this."""
+
+STEP = 1e-5
+"""Step of the central difference that gives shapes: its square is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """One mode, its largest displacement 1 (m), or its largest rotation (rad) where nothing is displaced.
+
+    Attributes
+    ----------
+    omega : float
+        Angular frequency, rad/s.
+    damping : float
+        Damping ratio; below zero for motions that grow.
+    mass : float
+        Modal mass, kg: twice the kinetic energy at a velocity of 1 m/s of what moves most.
+    nodes : mapping
+        ``position`` (3,) m and, where a node turns, ``rotation`` (3,) rad by name; complex with damping.
+    members : mapping
+        ``s`` and ``position`` (n, 3) along each member.
+    """
+
+    omega: float
+    damping: float
+    mass: float
+    nodes: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    members: Mapping[str, Mapping[str, Array]] = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As an entry of ``shapes`` in the JSON answer."""
+        answer: dict[str, Any] = {"mass": self.mass}
+        for kind, table in (("nodes", self.nodes), ("members", self.members)):
+            answer[kind] = {name: _plain(entry) for name, entry in table.items()}
+        return answer
+
+
+def _plain(entry: Mapping[str, Array]) -> dict[str, Any]:
+    """Real parts, and imaginary ones with their own names where there are any."""
+    answer = {}
+    for key, values in entry.items():
+        answer[key] = values.real.tolist()
+        if np.iscomplexobj(values):
+            answer[f"{key}_imaginary"] = values.imag.tolist()
+    return answer
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The answer of a scene whose analysis is ``modes``.
+
+    Attributes
+    ----------
+    status : Status
+        SOLVED, or SHORT where the frequencies are not as accurate as was asked for.
+    last : Equilibrium
+        About which the motions are.
+    modes : tuple of Mode
+        By rising frequency; rigid motions are left out.
+    rigid : int
+        Motions with mass that nothing resists.
+    growing : tuple of float
+        Rates, 1/s, of motions that leave an unstable equilibrium without oscillating.
+    error_estimate : float
+        Largest estimated relative error of the frequencies.
+    motion : SmallMotion
+        Matrices, dimensionless.
+    notes : tuple of str
+    seconds : mapping
+        Time spent on models and on solving.
+    """
+
+    scene: Scene = field(repr=False)
+    status: Status
+    last: Equilibrium
+    modes: tuple[Mode, ...]
+    rigid: int
+    growing: tuple[float, ...]
+    error_estimate: float
+    motion: SmallMotion = field(repr=False)
+    notes: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+    @property
+    def steps(self) -> tuple[Equilibrium, ...]:
+        """The equilibrium, as the one entry of a list."""
+        return (self.last,)
+
+    @property
+    def omega(self) -> Array:
+        """Angular frequencies (modes,), rad/s."""
+        return np.array([mode.omega for mode in self.modes])
+
+    @property
+    def damped(self) -> bool:
+        """Whether motions fade or grow."""
+        return not self.motion.plain or any(mode.damping for mode in self.modes)
+
+    def values(self) -> dict[str, Any]:
+        """What the answer says under ``modes``, but shapes."""
+        answer: dict[str, Any] = {"omega": self.omega.tolist(), "rigid": self.rigid}
+        if self.damped:
+            answer["damping"] = [mode.damping for mode in self.modes]
+        if self.growing:
+            answer["growing"] = list(self.growing)
+        return {**answer, "error_estimate": self.error_estimate}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON answer."""
+        model = self.motion.model
+        return {
+            "status": self.status.value,
+            "title": self.scene.title,
+            "dimension": model.dimension,
+            "unknowns": model.unknowns,
+            "seconds": dict(self.seconds),
+            "steps": [self.last.to_dict()],
+            "modes": {**self.values(), "shapes": [mode.to_dict() for mode in self.modes], "notes": list(self.notes)},
+        }
+
+
+@single_threaded
+def find_modes(scene: Scene, settings: Settings) -> Modes:
+    """The modes of a scene.
+
+    Raises
+    ------
+    SceneError
+        The scene asks for what cannot be modelled.
+    SolveError
+        Its equilibrium, or the frequencies, could not be found.
+    """
+    return _Run(scene, settings).modes()
+
+
+class _Run:
+    """One run: the equilibrium, then finer and finer meshes."""
+
+    def __init__(self, scene: Scene, settings: Settings) -> None:
+        if settings.gauss:
+            raise SceneError("integration: found 'gauss', accepted: 'nodes' with modes, as masses stand at the nodes")
+        self.scene, self.settings = scene, settings
+        self.meshing = Meshing(scene, settings)
+        self.accuracy = self.meshing.accuracy
+        self.count = scene.analysis.count_of_modes
+        self.seconds = {"model": 0.0, "solve": 0.0}
+        self.rest = self._equilibrium()
+
+    def _equilibrium(self) -> Equilibrium | None:
+        """The equilibrium of the loads; None where there are none."""
+        scene = self.scene
+        sprung = any(spring.rest or spring.length is not None for spring in scene.springs.values())
+        everywhere = scene.gravity is not None or scene.rotating is not None
+        if not scene.loads and not scene.motions and not everywhere and not sprung:
+            return None
+        check_floating(scene.nodes, scene.members, scene.springs, scene.motions, scene.resolved_dimension)
+        found = statics.solve(scene, self.settings)
+        self.seconds = dict(found.seconds)
+        return found.last
+
+    def _mesh(self) -> Mesh:
+        named = self.settings.element or any(member.element for member in self.scene.members.values())
+        mesh = self.meshing.target
+        if self.rest is not None:
+            mesh = replace(mesh, cuts=self.rest.model.mesh.cuts)
+        return replace(mesh, order=mesh.order if named else ORDER, places=True)
+
+    def modes(self) -> Modes:
+        """Frequencies on finer and finer meshes."""
+        begin = time.perf_counter()
+        fixed, mesh = self.meshing.fixed, self._mesh()
+        flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
+        motion, found = self._found(mesh)
+        error, answer = np.inf, (motion, found)
+        for _ in range(HALVINGS):
+            marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
+            # Where all is prescribed the error is that beside a mesh which only estimates it.
+            prescribed = fixed.issuperset(flexible)
+            finer = mesh.refined(None if prescribed else marks)
+            if not flexible:
+                error = 0.0
+                break
+            other, there = self._found(finer)
+            error = _difference(found, there)
+            if prescribed:
+                break
+            mesh, found, answer = finer, there, (other, there)
+            if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
+                break
+        self.seconds["solve"] += time.perf_counter() - begin
+        return self._answered(*answer, error)
+
+    def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
+        prepared, corrected, loading = put_on(self.scene, mesh, self.rest)
+        motion = SmallMotion(prepared.equations, corrected.state, loading, corrected.point)
+        negative = 0 if self.rest is None else self.rest.certificate.negative
+        try:
+            return motion, motion.eigenmotions(self.count, negative)
+        except np.linalg.LinAlgError as error:
+            raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
+
+    def _answered(self, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
+        notes = []
+        asked = self.meshing.asked
+        status = Status.SOLVED if error <= self.accuracy or not asked else Status.SHORT
+        if len(found.exponents) < self.count:
+            notes.append(f"{len(found.exponents)} modes found: on this mesh nothing else with mass oscillates")
+        if len(found.growing):
+            notes.append("the equilibrium is unstable: some motions leave it without oscillating, at the rates listed")
+        last = self.rest
+        if last is None:
+            last = _undeformed(motion, bool(found.rigid))
+        modes = tuple(_mode(motion, found, i) for i in range(len(found.exponents)))
+        growing = tuple((found.growing / motion.masses.time).tolist())
+        return Modes(
+            self.scene, status, last, modes, found.rigid, growing, error, motion, tuple(notes), self.seconds
+        )
+
+
+def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
+    """The undeformed scene as an equilibrium; what is free to move is neither stable nor unstable."""
+    prepared = Prepared(motion.model)
+    corrected = Corrected(motion.state, motion.point, True, 0, 0.0, 0.0, 0.0)
+    if free:
+        equations = prepared.equations
+        shapes = np.zeros(equations.turning_unknowns), np.zeros(equations.displacement_unknowns)
+        stability = Stability("neutral", 0, 0.0, *shapes)
+    else:
+        stability = prepared.stability(corrected)
+    return finished(prepared, corrected, motion.loading, 1.0, stability, estimate=0.0)
+
+
+def _difference(coarse: Eigenmotions, fine: Eigenmotions) -> float:
+    """Largest relative difference of frequencies; what a coarse mesh does not have is as far off as can be."""
+    if len(coarse.omega) != len(fine.omega) or coarse.rigid != fine.rigid:
+        return 1.0
+    sizes = np.maximum(np.abs(fine.exponents), TINY)
+    return float((np.abs(coarse.exponents - fine.exponents) / sizes).max(initial=0.0))
+
+
+TINY = 1e-300
+"""Keeps zero by zero from being asked for."""
+
+
+# -- the equilibrium on a mesh with masses -------------------------------------------------------------
+
+
+def prepared_for_motion(scene: Scene, mesh: Mesh) -> Prepared:
+    """A model with a place at every cut."""
+    return Prepared(assemble(scene, replace(mesh, places=True), assembly="nodal"))
+
+
+def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared, Corrected, Loading]:
+    """An equilibrium, or the undeformed scene (None), on a mesh with a place at every cut.
+
+    Raises
+    ------
+    SolveError
+        It is none there.
+    """
+    prepared = prepared_for_motion(scene, mesh)
+    loading = prepared.model.loading(1.0 if rest is None else rest.factor)
+    state = prepared.equations.start(loading)
+    if rest is not None:
+        state = _carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
+    corrected = prepared.correct(state, loading, iterations=30)
+    if not corrected.converged and not corrected.residual <= SOLVED:
+        detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
+        raise SolveError(Status.FAILED, detail, state)
+    return prepared, corrected, loading
+
+
+def _carried(equations: Equations, state: State, loading: Loading) -> State:
+    """The state with displacements that close the members, and multipliers that balance it as far as these can."""
+    positions, unknowns = equations.model.positions, equations.unknowns
+    state = equations.holding(state, loading)
+    if len(positions.rows):
+        gaps = equations.at(state, loading).residual[unknowns : unknowns + len(positions.rows)]
+        state = replace(state, y=state.y + smallest(positions.W, -gaps, np.ones(len(state.y))))
+    state = replace(state, lam=np.zeros(equations.rows))
+    point = equations.at(state, loading)
+    entries = point.entries.copy()
+    entries[(equations.row < unknowns) & (equations.column < unknowns)] = 0.0
+    entries[equations.diagonal[:unknowns]] = 1.0
+    entries[equations.diagonal[unknowns:]] = -SOFT
+    solver = SparseSolver(equations.total, equations.row, equations.column, equations.rows)
+    solver.factor(entries)
+    right = np.concatenate([-point.residual[:unknowns], np.zeros(equations.rows)])
+    return replace(state, lam=solver.solve(right)[unknowns:])
+
+
+SOFT = 1e-12
+"""Softness of rows that may depend on each other."""
+
+
+# -- shapes -------------------------------------------------------------------------------------------
+
+
+def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:
+    shape, exponent = found.shapes[:, number], complex(found.exponents[number])
+    parts = [shape.real] + ([shape.imag] if np.iscomplexobj(shape) else [])
+    tables = [_displaced(motion, part) for part in parts]
+    nodes, members = (
+        {
+            name: {key: _joined([table[kind][name][key] for table in tables]) for key in tables[0][kind][name]}
+            for name in tables[0][kind]
+        }
+        for kind in (0, 1)
+    )
+    moved = np.concatenate(
+        [entry["position"] for entry in nodes.values()] + [e["position"].ravel() for e in members.values()]
+    )
+    turned = np.concatenate([np.zeros(1), *(entry["rotation"] for entry in nodes.values() if "rotation" in entry)])
+    # A shape that is nearly all twist has displacements that are rounding.
+    values = moved if np.abs(moved).max() > STEP * motion.model.scales.length * np.abs(turned).max() else turned
+    unit = values[np.argmax(np.abs(values) > 0.999 * np.abs(values).max())]
+    kinetic = float((shape.conj() @ (motion.mass @ shape.real + 1j * (motion.mass @ shape.imag))).real)
+    scales, masses = motion.model.scales, motion.masses
+    size = abs(exponent)
+    return Mode(
+        omega=exponent.imag / masses.time,
+        damping=-exponent.real / size if abs(exponent.real) > STILL * size else 0.0,
+        mass=masses.mass * scales.length**2 * kinetic / abs(unit) ** 2,
+        nodes={n: {k: v / unit for k, v in e.items()} for n, e in nodes.items()},
+        members={n: {"s": motion_places(motion.model, n), "position": e["position"] / unit} for n, e in members.items()},
+    )
+
+
+STILL = 1e-9
+"""Real parts below this share of an exponent are rounding."""
+
+
+def _joined(parts: list[Array]) -> Array:
+    return parts[0] if len(parts) == 1 else parts[0] + 1j * parts[1]
+
+
+def motion_places(model: Model, member: str) -> Array:
+    """Fractions of the length at which shapes are told."""
+    return model.along(member)
+
+
+def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, Array]], dict[str, dict[str, Array]]]:
+    """Displacements (m) and rotations of nodes, and displacements along members, of a change of the unknowns."""
+    equations, model = motion.equations, motion.model
+    size = float(np.abs(shape).max(initial=0.0)) or 1.0
+    step = np.zeros(equations.total)
+    step[: motion.unknowns] = STEP / size * shape
+    sides = [
+        Fields(equations, equations.moved(motion.state, sign * step), motion.loading) for sign in (1.0, -1.0)
+    ]
+    scale = size / (2.0 * STEP)
+    nodes: dict[str, dict[str, Array]] = {}
+    for name in model.nodes:
+        ahead, behind = (side.position(name) for side in sides)
+        nodes[name] = {"position": scale * (ahead - behind)}
+        turn = model.rotations.node_turn[name]
+        if turn is not None:
+            nodes[name]["rotation"] = _rotation(equations, turn, shape)
+    members = {}
+    for name in model.scene.members:
+        places = motion_places(model, name)
+        ahead, behind = (side.along(name, places)["position"] for side in sides)
+        members[name] = {"position": scale * (ahead - behind)}
+    return nodes, members
+
+
+def _rotation(equations: Equations, turn: int, shape: Array) -> Array:
+    """Rotation vector (3,) of a rotation in a change of the unknowns."""
+    vector = np.append(shape, 0.0)[equations.number[turn]]
+    basis = equations.basis(turn)
+    if basis is not None:
+        return np.asarray(basis @ vector)
+    return np.concatenate([np.zeros(3 - len(vector)), vector])

@@ -1,0 +1,350 @@
+"""Small motions about an equilibrium: the matrices of mass, damping, stiffness and constraints, and their eigenvalues.
+
+The unknowns are those of :class:`~sfetcas.mechanics.equations.Equations`: rotation vectors about the fixed axes,
+displacements, multipliers.  With the Jacobian ``J`` of the quantities that carry mass (see
+:mod:`~sfetcas.dynamics.observed`) by the unknowns, ``K`` the Newton matrix at the equilibrium and ``G`` the rows,
+
+    J^T m J x'' + J^T c J x' + K x + G^T mu = 0,      G x = 0.
+
+The mass matrix is singular (multipliers, and rotations without inertia, have none), which a shifted and inverted
+pencil bears: ``(K - s M)^-1 M`` on the constraints has the eigenvalues ``1 / (omega^2 - s)``.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array, Index
+from ..mathematics.kernels import Batch
+from ..mathematics.linear import SparseMap, SparseSolver
+from ..mathematics.spectra import largest
+from ..mechanics.equations import Equations, Point, State
+from ..mechanics.fields import turned_tangents
+from ..mechanics.joints import by_turning
+from ..mechanics.loading import Loading
+from .masses import masses_of
+from .stages import StageEquations
+
+__all__ = ["Eigenmotions", "SmallMotion"]
+
+SOFT = 1e-14
+"""Softness of rows that may depend on each other, beside entries of the size of one."""
+
+PROXIMAL = 1e-13
+"""Stiffness, over that of the rotation itself, of what neither mass nor stiffness holds, as a straight rod's spin."""
+
+RIGID = 1e-11
+"""Squares of frequencies below this share of what was added up, or of the units of the model, are zero: rounding."""
+
+NEARER = 0.5
+"""Share of the lowest square of a frequency by which the last shift lies below zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Eigenmotions:
+    """Solutions ``x exp(lambda t)`` of the equations of small motion, dimensionless.
+
+    Attributes
+    ----------
+    exponents : ndarray (n,) complex
+        lambda, those that oscillate, by rising imaginary part.
+    shapes : ndarray (unknowns, n)
+        Real where there is neither damping nor turning and all loads have a potential.
+    rigid : int
+        Motions with mass that nothing resists.
+    growing : ndarray
+        Real exponents above zero: about an unstable equilibrium.
+    fading : ndarray
+        Real exponents below zero beside those of ``growing``: damped so much that they do not oscillate.
+    """
+
+    exponents: Array
+    shapes: Array
+    rigid: int
+    growing: Array
+    fading: Array
+
+    @property
+    def omega(self) -> Array:
+        """Angular frequencies."""
+        return np.asarray(self.exponents.imag)
+
+
+class SmallMotion:
+    """The equations of small motion about one equilibrium of a model with a place at every cut.
+
+    Parameters
+    ----------
+    equations : Equations
+    state, loading, point
+        The equilibrium.
+
+    Raises
+    ------
+    SceneError
+        Nothing has mass.
+    """
+
+    def __init__(self, equations: Equations, state: State, loading: Loading, point: Point) -> None:
+        self.equations, self.state, self.loading, self.point = equations, state, loading, point
+        self.model = equations.model
+        self.masses = masses_of(self.model)
+        self._system = StageEquations(equations, self.masses, "interpreted")
+        self.unknowns = equations.unknowns
+        jacobian = self._jacobian()
+        self.mass = _symmetric(jacobian, self._weights("mass"))
+        self.damping = _symmetric(jacobian, self._weights("damping"))
+
+    # -- matrices -------------------------------------------------------------------------------
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether all loads have a potential."""
+        return self.model.has_potential
+
+    @property
+    def plain(self) -> bool:
+        """Whether squares of frequencies are eigenvalues: nothing depends on velocities."""
+        return not len(self.damping.value)
+
+    @functools.cached_property
+    def stiffness(self) -> SparseMap:
+        """The Newton matrix of the unknowns alone."""
+        return self._part(slice(0, self.unknowns))
+
+    @functools.cached_property
+    def constraints(self) -> SparseMap:
+        """The rows: what they say of a change of the unknowns."""
+        return self._part(slice(self.unknowns, self.equations.total))
+
+    def _part(self, rows: slice) -> SparseMap:
+        equations = self.equations
+        chosen = (equations.row >= rows.start) & (equations.row < rows.stop) & (equations.column < self.unknowns)
+        row, column = equations.row[chosen] - rows.start, equations.column[chosen]
+        return SparseMap(row, column, self.point.entries[chosen], (rows.stop - rows.start, self.unknowns))
+
+    def _jacobian(self) -> ca.DM:
+        """Quantities by unknowns."""
+        system, model, axes = self._system, self.model, self.model.element.axes
+        q = self.state.q
+        turned = turned_tangents(self.equations, self.state).reshape(-1, axes)
+        # The derivative of a turned vector by a rotation vector is the cross product with it.
+        if model.space:
+            x, y, z = turned.T
+            zero = np.zeros(len(turned))
+            spin = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
+        else:
+            spin = np.stack([-turned[:, 1], turned[:, 0]], axis=1)[:, :, None]
+        turns = model.element.turns
+        points = np.arange(len(turned))
+        row = np.broadcast_to((points[:, None] * axes + np.arange(axes))[:, :, None], spin.shape)
+        cells = model.rotations.turns.ravel()[:, None] * turns + np.arange(turns)
+        column = np.broadcast_to(cells[:, None, :], spin.shape)
+        tangents = _sparse(row, column, spin, (len(turned) * axes, system.full))
+        # Displacements of the places stand after the rotations in full coordinates.
+        width = axes * system.places
+        onto = _sparse(np.arange(width), system.of_places + np.arange(width), np.ones(width), (width, system.full))
+        parts = [ca.mtimes(system.by_place, onto)]
+        if system.elements:
+            parts[0] += ca.mtimes(system.by_tangent, tangents)
+        places = np.vstack([self._nodal, np.zeros((1, axes))])
+        q = np.vstack([q, [[1.0, 0.0, 0.0, 0.0]] if model.space else [[0.0]]])
+        for group, sides in zip(self.masses.observables, system.observed, strict=True):
+            rows, n = group.kind.sizes[2], len(group.data)
+            batch = Batch(by_turning(group.kind), n)
+            given = (q[group.turns], places[group.places], group.data, None, np.zeros((n, rows)))
+            for i, values in enumerate(given):
+                if values is not None and values.size:
+                    batch.set(i, values)
+            slopes = batch()[5].reshape(n, sides.shape[1], rows)
+            r = np.broadcast_to(np.arange(n * rows).reshape(n, 1, rows), slopes.shape)
+            c = np.broadcast_to(sides[:, :, None], slopes.shape)
+            used = c >= 0
+            parts.append(_sparse(r[used], c[used], slopes[used], (n * rows, system.full)))
+        return ca.mtimes(ca.vertcat(*parts), system.gather.T)[:, : self.unknowns]
+
+    @functools.cached_property
+    def _nodal(self) -> Array:
+        nodal = self.equations.places(self.state, self.loading)
+        return nodal.reshape(len(self.model.segments.places), -1)
+
+    def _weights(self, what: str) -> ca.DM:
+        """Masses or dampers of all quantities."""
+        system = self._system
+        own = [getattr(group, what).ravel() for group in self.masses.observables]
+        linear = system.mass if what == "mass" else system.drag
+        return ca.sparsify(ca.diagcat(linear, *[ca.diag(ca.DM(part)) for part in own]))
+
+    # -- eigenvalues ----------------------------------------------------------------------------
+
+    def eigenmotions(self, count: int, unstable: int = 0) -> Eigenmotions:
+        """The lowest ``count`` motions that oscillate; fewer where there are no more.
+
+        Parameters
+        ----------
+        unstable : int
+            Motions that grow without oscillating, to be looked for beside these.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            The pencil cannot be solved.
+        """
+        if not self.plain:
+            return self._quadratic(count, unstable)
+        shift, wanted = -1.0, count + unstable
+        for _ in range(ATTEMPTS):
+            squares, shapes, exhausted = self._near(shift, wanted)
+            rigid = np.abs(squares) <= self._rounding(shapes)
+            elastic = squares[~rigid]
+            if not exhausted and len(elastic) < count + unstable:
+                wanted = count + unstable + int(rigid.sum())
+                continue
+            if not len(elastic) or shift != -1.0:
+                break
+            # The nearer the shift to what is looked for the less rounding leaves of it.
+            shift = -NEARER * float(np.abs(elastic).min())
+        return _sorted(squares, shapes, rigid, count, real=self.symmetric)
+
+    def _near(self, shift: float, wanted: int) -> tuple[Array, Array, bool]:
+        """Squares of frequencies nearest to the shift, shapes, and whether there are no more."""
+        self._factor(-shift, 0.0)
+        n = self.unknowns
+
+        def apply(block: Array) -> Array:
+            return self._solved(_times(self.mass, block))
+
+        inner = functools.partial(_times, self.mass)
+        inverse, shapes = largest(apply, n, wanted, inner if self.symmetric else None)
+        exhausted = len(inverse) < wanted
+        found = np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0)
+        return shift + 1.0 / inverse[found], shapes[:, found], exhausted or not found.all()
+
+    def _quadratic(self, count: int, unstable: int) -> Eigenmotions:
+        """The same with damping: exponents nearest to a small number above zero."""
+        n = self.unknowns
+        shift, wanted = 1.0, 2 * count + unstable
+        for _ in range(ATTEMPTS):
+            self._factor(shift**2, shift)
+
+            def apply(block: Array, shift: float = shift) -> Array:
+                f, g = block[:n], block[n:]
+                moved = _times(self.damping, f) + shift * _times(self.mass, f) + _times(self.mass, g)
+                x = -self._solved(moved)
+                return np.concatenate([x, f + shift * x])
+
+            inverse, vectors = largest(apply, 2 * n, wanted)
+            exhausted = len(inverse) < wanted
+            found = np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0)
+            exponents, shapes = shift + 1.0 / inverse[found], vectors[:n, found]
+            rigid = np.abs(exponents) ** 2 <= self._rounding(shapes)
+            waves = exponents.imag > SLOW * np.abs(exponents)
+            if int((waves & ~rigid).sum()) >= count or exhausted:
+                break
+            wanted = int(1.5 * wanted) + int(rigid.sum())
+        return _sorted_exponents(exponents, shapes, rigid, count)
+
+    def _rounding(self, shapes: Array) -> Array:
+        """What rounding leaves of squares of frequencies of shapes."""
+        sizes = np.abs(shapes)
+        added = (sizes * _times(self.stiffness.absolute, sizes)).sum(axis=0)
+        kinetic = (shapes.conj() * _times(self.mass, shapes)).sum(axis=0).real
+        return RIGID * (1.0 + added / np.maximum(kinetic, TINY))
+
+    def _factor(self, mass: float, damping: float) -> None:
+        """Factors of ``K + damping C + mass M`` with the rows."""
+        where, k, m, c = self._entries
+        solver, diagonal = where
+        entries = k + mass * m + damping * c
+        entries[diagonal[: self.unknowns]] += PROXIMAL * self.equations.noise[: self.unknowns]
+        entries[diagonal[self.unknowns :]] -= SOFT
+        solver.factor(entries)
+
+    def _solved(self, block: Array) -> Array:
+        rows = np.zeros((self.equations.rows, block.shape[1]))
+        return np.asarray(self._entries[0][0].solve(np.concatenate([block, rows]))[: self.unknowns])
+
+    @functools.cached_property
+    def _entries(self) -> tuple[tuple[SparseSolver, Index], Array, Array, Array]:
+        """A solver of the pattern of all matrices, its diagonal, and the entries of each in that pattern."""
+        equations, total = self.equations, self.equations.total
+        flat = [
+            column * total + row
+            for row, column in (
+                (equations.row, equations.column),
+                (self.mass.row, self.mass.column),
+                (self.damping.row, self.damping.column),
+            )
+        ]
+        places = np.unique(np.concatenate(flat))
+        row, column = places % total, places // total
+        values = (self.point.entries, self.mass.value, self.damping.value)
+        found = []
+        for part, value in zip(flat, values, strict=True):
+            entries = np.zeros(len(places))
+            entries[np.searchsorted(places, part)] = value
+            found.append(entries)
+        solver = SparseSolver(total, row, column, equations.rows, symmetric=self.symmetric)
+        return (solver, np.flatnonzero(row == column)), found[0], found[1], found[2]
+
+
+ATTEMPTS = 6
+"""Spaces at most: one to find the size of what is looked for, one with rigid motions beside it, one at the end."""
+
+VANISHING = 1e-13
+"""Inverses below this share of the largest are those of motions without mass."""
+
+SLOW = 1e-9
+"""Imaginary parts below this share of an exponent are rounding."""
+
+TINY = 1e-300
+"""Keeps zero by zero from being asked for."""
+
+
+def _sorted(squares: Array, shapes: Array, rigid: Array, count: int, *, real: bool) -> Eigenmotions:
+    """Eigenmotions of squares of frequencies: of what is unsymmetric these may be complex, one way growing."""
+    squares = np.where(np.abs(squares.imag) <= SLOW * np.abs(squares), squares.real, squares)
+    grows = ~rigid & (squares.imag == 0.0) & (squares.real < 0.0)
+    waves = np.flatnonzero(~rigid & ~grows)
+    exponents = 1j * np.sqrt(squares[waves].astype(complex))
+    exponents = np.where(exponents.imag < 0.0, -exponents, exponents)
+    order = np.argsort(exponents.imag, kind="stable")[:count]
+    shapes = shapes[:, waves[order]]
+    growing = np.sort(np.sqrt(-squares[grows].real))
+    return Eigenmotions(exponents[order], shapes.real if real else shapes, int(rigid.sum()), growing, -growing)
+
+
+def _sorted_exponents(exponents: Array, shapes: Array, rigid: Array, count: int) -> Eigenmotions:
+    waves = np.flatnonzero(~rigid & (exponents.imag > SLOW * np.abs(exponents)))
+    order = waves[np.argsort(exponents[waves].imag, kind="stable")][:count]
+    alone = exponents[~rigid & (np.abs(exponents.imag) <= SLOW * np.abs(exponents))].real
+    # A free motion without damping is a double zero.
+    return Eigenmotions(
+        exponents[order], shapes[:, order], int(rigid.sum()) // 2, np.sort(alone[alone > 0.0]), alone[alone < 0.0]
+    )
+
+
+def _times(matrix: SparseMap, block: Array) -> Array:
+    """A product with the columns of a block."""
+    if not len(matrix.value):
+        return np.zeros((matrix.shape[0], block.shape[1]), dtype=block.dtype)
+    rows, starts = np.unique(matrix.row, return_index=True)
+    found = np.zeros((matrix.shape[0], block.shape[1]), dtype=block.dtype)
+    found[rows] = np.add.reduceat(matrix.value[:, None] * block[matrix.column], starts, axis=0)
+    return found
+
+
+def _sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> ca.DM:
+    return ca.DM.triplet(np.ravel(row).tolist(), np.ravel(column).tolist(), ca.DM(np.ravel(value)), *shape)
+
+
+def _symmetric(jacobian: ca.DM, weights: ca.DM) -> SparseMap:
+    """``J^T m J``, exactly symmetric."""
+    found = ca.mtimes(jacobian.T, ca.mtimes(weights, jacobian))
+    row, column = (np.array(part, dtype=np.intp) for part in found.sparsity().get_triplet())
+    value = 0.5 * np.array(found.nonzeros())
+    return SparseMap(np.append(row, column), np.append(column, row), np.append(value, value), found.shape)
