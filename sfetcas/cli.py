@@ -20,10 +20,10 @@ from .checks import Check, check
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load
+from .dynamics.modes import Modes
 from .dynamics.motion import Motion
 from .equilibria.solution import Equilibrium, Solution
 from .equilibria.statics import Settings, pilot_of
-from .dynamics.modes import Modes
 from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import Model, assemble

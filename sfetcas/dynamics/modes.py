@@ -29,7 +29,7 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
-from ..mechanics.model import Model, assemble
+from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
@@ -259,9 +259,7 @@ class _Run:
             last = _undeformed(motion, bool(found.rigid))
         modes = tuple(_mode(motion, found, i) for i in range(len(found.exponents)))
         growing = tuple((found.growing / motion.masses.time).tolist())
-        return Modes(
-            self.scene, status, last, modes, found.rigid, growing, error, motion, tuple(notes), self.seconds
-        )
+        return Modes(self.scene, status, last, modes, found.rigid, growing, error, motion, tuple(notes), self.seconds)
 
 
 def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
@@ -330,7 +328,8 @@ def _carried(equations: Equations, state: State, loading: Loading) -> State:
     entries[(equations.row < unknowns) & (equations.column < unknowns)] = 0.0
     entries[equations.diagonal[:unknowns]] = 1.0
     entries[equations.diagonal[unknowns:]] = -SOFT
-    solver = SparseSolver(equations.total, equations.row, equations.column, equations.rows)
+    symmetric = equations.model.has_potential
+    solver = SparseSolver(equations.total, equations.row, equations.column, equations.rows, symmetric=symmetric)
     solver.factor(entries)
     right = np.concatenate([-point.residual[:unknowns], np.zeros(equations.rows)])
     return replace(state, lam=solver.solve(right)[unknowns:])
@@ -369,7 +368,7 @@ def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:
         damping=-exponent.real / size if abs(exponent.real) > STILL * size else 0.0,
         mass=masses.mass * scales.length**2 * kinetic / abs(unit) ** 2,
         nodes={n: {k: v / unit for k, v in e.items()} for n, e in nodes.items()},
-        members={n: {"s": motion_places(motion.model, n), "position": e["position"] / unit} for n, e in members.items()},
+        members={n: {"s": motion.model.along(n), "position": e["position"] / unit} for n, e in members.items()},
     )
 
 
@@ -381,20 +380,13 @@ def _joined(parts: list[Array]) -> Array:
     return parts[0] if len(parts) == 1 else parts[0] + 1j * parts[1]
 
 
-def motion_places(model: Model, member: str) -> Array:
-    """Fractions of the length at which shapes are told."""
-    return model.along(member)
-
-
 def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, Array]], dict[str, dict[str, Array]]]:
     """Displacements (m) and rotations of nodes, and displacements along members, of a change of the unknowns."""
     equations, model = motion.equations, motion.model
     size = float(np.abs(shape).max(initial=0.0)) or 1.0
     step = np.zeros(equations.total)
     step[: motion.unknowns] = STEP / size * shape
-    sides = [
-        Fields(equations, equations.moved(motion.state, sign * step), motion.loading) for sign in (1.0, -1.0)
-    ]
+    sides = [Fields(equations, equations.moved(motion.state, sign * step), motion.loading) for sign in (1.0, -1.0)]
     scale = size / (2.0 * STEP)
     nodes: dict[str, dict[str, Array]] = {}
     for name in model.nodes:
@@ -405,7 +397,7 @@ def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, A
             nodes[name]["rotation"] = _rotation(equations, turn, shape)
     members = {}
     for name in model.scene.members:
-        places = motion_places(model, name)
+        places = model.along(name)
         ahead, behind = (side.along(name, places)["position"] for side in sides)
         members[name] = {"position": scale * (ahead - behind)}
     return nodes, members

@@ -58,15 +58,12 @@ class Eigenmotions:
         Motions with mass that nothing resists.
     growing : ndarray
         Real exponents above zero: about an unstable equilibrium.
-    fading : ndarray
-        Real exponents below zero beside those of ``growing``: damped so much that they do not oscillate.
     """
 
     exponents: Array
     shapes: Array
     rigid: int
     growing: Array
-    fading: Array
 
     @property
     def omega(self) -> Array:
@@ -226,27 +223,38 @@ class SmallMotion:
 
     def _quadratic(self, count: int, unstable: int) -> Eigenmotions:
         """The same with damping: exponents nearest to a small number above zero."""
-        n = self.unknowns
-        shift, wanted = 1.0, 2 * count + unstable
-        for _ in range(ATTEMPTS):
-            self._factor(shift**2, shift)
+        n, shift = self.unknowns, 1.0
+        self._factor(shift**2, shift)
 
-            def apply(block: Array, shift: float = shift) -> Array:
-                f, g = block[:n], block[n:]
-                moved = _times(self.damping, f) + shift * _times(self.mass, f) + _times(self.mass, g)
-                x = -self._solved(moved)
-                return np.concatenate([x, f + shift * x])
+        def apply(block: Array) -> Array:
+            f, g = block[:n], block[n:]
+            moved = _times(self.damping, f) + shift * _times(self.mass, f) + _times(self.mass, g)
+            x = -self._solved(moved)
+            return np.concatenate([x, f + shift * x])
 
-            inverse, vectors = largest(apply, 2 * n, wanted)
-            exhausted = len(inverse) < wanted
-            found = np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0)
-            exponents, shapes = shift + 1.0 / inverse[found], vectors[:n, found]
-            rigid = np.abs(exponents) ** 2 <= self._rounding(shapes)
-            waves = exponents.imag > SLOW * np.abs(exponents)
-            if int((waves & ~rigid).sum()) >= count or exhausted:
-                break
-            wanted = int(1.5 * wanted) + int(rigid.sum())
-        return _sorted_exponents(exponents, shapes, rigid, count)
+        def pick(inverse: Array) -> tuple[Index, bool]:
+            """Waves with the smallest exponents, zeros, and motions that grow; of crowds that fade, none."""
+            exponents = _exponents(shift, inverse)
+            size = np.abs(exponents)
+            waves = np.flatnonzero((exponents.imag > WAVES * size) & (size > NOTHING))
+            waves = waves[np.argsort(size[waves], kind="stable")][:count]
+            alone = (size <= NOTHING) | ((np.abs(exponents.imag) <= WAVES * size) & (exponents.real > 0.0))
+            picked = np.concatenate([waves, np.flatnonzero(alone)[: unstable + MOST_FREE]])
+            return picked, len(waves) == count
+
+        inverse, vectors = largest(apply, 2 * n, count + unstable, pick=pick)
+        exponents, shapes = _exponents(shift, inverse), vectors[:n]
+        rigid = np.abs(exponents) ** 2 <= self._rounding(shapes)
+        return _sorted_exponents(exponents, shapes, self._independent(shapes[:, rigid]), rigid, count)
+
+    def _independent(self, shapes: Array) -> int:
+        """Number of motions among shapes: one without damping has the exponent zero twice."""
+        parts = np.hstack([shapes.real, shapes.imag])
+        kinetic = parts.T @ _times(self.mass, parts)
+        sizes = np.sqrt(np.maximum(np.diag(kinetic), TINY))
+        used = sizes > SAME * sizes.max(initial=0.0)
+        values = np.linalg.eigvalsh((kinetic / np.outer(sizes, sizes))[np.ix_(used, used)])
+        return int((values > SAME * values.max(initial=0.0)).sum())
 
     def _rounding(self, shapes: Array) -> Array:
         """What rounding leaves of squares of frequencies of shapes."""
@@ -261,12 +269,16 @@ class SmallMotion:
         solver, diagonal = where
         entries = k + mass * m + damping * c
         entries[diagonal[: self.unknowns]] += PROXIMAL * self.equations.noise[: self.unknowns]
+        # Beside rows of the size of one: loads may make the stiffness as large as any number.
+        self._size = float(np.abs(entries[self._inside]).max(initial=TINY))
+        entries[self._inside] /= self._size
         entries[diagonal[self.unknowns :]] -= SOFT
         solver.factor(entries)
 
     def _solved(self, block: Array) -> Array:
         rows = np.zeros((self.equations.rows, block.shape[1]))
-        return np.asarray(self._entries[0][0].solve(np.concatenate([block, rows]))[: self.unknowns])
+        right = np.concatenate([block / self._size, rows])
+        return np.asarray(self._entries[0][0].solve(right)[: self.unknowns])
 
     @functools.cached_property
     def _entries(self) -> tuple[tuple[SparseSolver, Index], Array, Array, Array]:
@@ -288,6 +300,7 @@ class SmallMotion:
             entries = np.zeros(len(places))
             entries[np.searchsorted(places, part)] = value
             found.append(entries)
+        self._inside = np.flatnonzero((row < self.unknowns) & (column < self.unknowns))
         solver = SparseSolver(total, row, column, equations.rows, symmetric=self.symmetric)
         return (solver, np.flatnonzero(row == column)), found[0], found[1], found[2]
 
@@ -299,7 +312,19 @@ VANISHING = 1e-13
 """Inverses below this share of the largest are those of motions without mass."""
 
 SLOW = 1e-9
-"""Imaginary parts below this share of an exponent are rounding."""
+"""Imaginary parts below this share of a square of a frequency are rounding."""
+
+WAVES = 1e-5
+"""Share of an exponent that its imaginary part has to be: exponents crowd where damping stops all waves."""
+
+NOTHING = 1e-4
+"""Exponents below this may be zeros, of which two that fall together are known to the root of rounding."""
+
+MOST_FREE = 40
+"""Zero exponents that are looked for at most."""
+
+SAME = 1e-6
+"""Shapes of zero exponents that differ by a smaller share, squared, are the same motion."""
 
 TINY = 1e-300
 """Keeps zero by zero from being asked for."""
@@ -315,17 +340,23 @@ def _sorted(squares: Array, shapes: Array, rigid: Array, count: int, *, real: bo
     order = np.argsort(exponents.imag, kind="stable")[:count]
     shapes = shapes[:, waves[order]]
     growing = np.sort(np.sqrt(-squares[grows].real))
-    return Eigenmotions(exponents[order], shapes.real if real else shapes, int(rigid.sum()), growing, -growing)
+    return Eigenmotions(exponents[order], shapes.real if real else shapes, int(rigid.sum()), growing)
 
 
-def _sorted_exponents(exponents: Array, shapes: Array, rigid: Array, count: int) -> Eigenmotions:
-    waves = np.flatnonzero(~rigid & (exponents.imag > SLOW * np.abs(exponents)))
+def _exponents(shift: float, inverse: Array) -> Array:
+    """Exponents of eigenvalues of the inverse; those of what has no mass lie beyond all numbers."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = shift + 1.0 / inverse.astype(complex)
+    return np.where(np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0), found, -1.0 / VANISHING)
+
+
+def _sorted_exponents(exponents: Array, shapes: Array, free: int, rigid: Array, count: int) -> Eigenmotions:
+    """Eigenmotions of the exponents themselves, of which ``free`` motions have zeros."""
+    size = np.abs(exponents)
+    waves = np.flatnonzero(~rigid & (exponents.imag > WAVES * size))
     order = waves[np.argsort(exponents[waves].imag, kind="stable")][:count]
-    alone = exponents[~rigid & (np.abs(exponents.imag) <= SLOW * np.abs(exponents))].real
-    # A free motion without damping is a double zero.
-    return Eigenmotions(
-        exponents[order], shapes[:, order], int(rigid.sum()) // 2, np.sort(alone[alone > 0.0]), alone[alone < 0.0]
-    )
+    alone = np.sort(exponents[~rigid & (np.abs(exponents.imag) <= WAVES * size)].real)
+    return Eigenmotions(exponents[order], shapes[:, order], free, alone[alone > 0.0])
 
 
 def _times(matrix: SparseMap, block: Array) -> Array:

@@ -11,27 +11,50 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Index
 
-__all__ = ["Operator", "largest"]
+__all__ = ["Operator", "Pick", "largest"]
 
 Operator = Callable[[Array], Array]
 """Takes a block of columns (n, k) to another."""
 
+Pick = Callable[[Array], tuple[Index, bool]]
+"""Takes eigenvalues to the numbers of those that are meant, and whether these are enough."""
+
 CONVERGED = 1e-11
-"""Residual of an eigenpair over its eigenvalue: with symmetric operators eigenvalues are then known to its square."""
+"""Residual of an eigenpair over its eigenvalue."""
+
+SYMMETRIC = 1e-8
+"""The same with an inner product in which the operator is symmetric: eigenvalues are then known to its square."""
 
 ROUNDING = 1e-14
 """The same over the largest eigenvalue, at which there is nothing left to gain."""
 
+STALLED = 4
+"""Blocks after which a residual that has not become smaller by half is that of rounding, if it is small at all."""
+
+SMALL = 1e-5
+"""What small is, over the eigenvalue."""
+
+TINY = 1e-300
+"""Keeps zero by zero from being asked for."""
+
 DROPPED = 1e-11
 """What is left of a column by orthogonalisation, over the column, below which it is rounding."""
+
+MOST = 320
+"""Columns of a space at most."""
+
+LEAST_BLOCKS = 12
+"""Blocks of a space at least, before it is given up."""
 
 LEAST_BLOCK = 8
 """Columns of a block at least: so often an eigenvalue may repeat and is still found so often."""
 
 
-def largest(apply: Operator, size: int, wanted: int, inner: Operator | None = None) -> tuple[Array, Array]:
+def largest(
+    apply: Operator, size: int, wanted: int, inner: Operator | None = None, pick: Pick | None = None
+) -> tuple[Array, Array]:
     """Eigenvalues of an operator that are largest in size, falling, and their vectors as columns.
 
     Parameters
@@ -45,24 +68,40 @@ def largest(apply: Operator, size: int, wanted: int, inner: Operator | None = No
     inner : callable, optional
         Multiplies by the matrix of an inner product in which the operator is symmetric; the vectors are then real and
         orthonormal in it.  Left out: the operator is not symmetric, eigenvalues may be complex.
+    pick : callable, optional
+        Takes estimates of eigenvalues, falling, and gives the numbers of those that are meant instead of the largest.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        The operator gives no finite numbers.
+        The operator gives no finite numbers, or no eigenvalues were found.
     """
     start = np.random.default_rng(0).standard_normal((size, min(size, max(LEAST_BLOCK, wanted))))
     space = _Space(size, inner)
-    block = space.orthonormal(apply(start))
+    block, limit = space.orthonormal(apply(start)), CONVERGED if inner is None else SYMMETRIC
+    most = max(MOST, LEAST_BLOCKS * block.shape[1])
+    course: list[float] = []
+
+    def first(values: Array) -> tuple[Index, bool]:
+        return np.arange(min(wanted, len(values))), len(values) >= wanted
+
     while True:
         space.extend(block, apply(block))
-        values, vectors, residuals = space.pairs(wanted)
+        values, vectors, residuals, enough = space.pairs(pick or first)
         sizes = np.abs(values)
-        floor = ROUNDING * sizes.max(initial=0.0)
-        done = len(values) == wanted and bool((residuals <= np.maximum(CONVERGED * sizes, floor)).all())
+        shares = residuals / np.maximum(sizes, TINY)
+        good = (shares <= limit) | (residuals <= ROUNDING * sizes.max(initial=0.0))
+        course.append(float(shares.max(initial=0.0)))
+        stalled = course[-1] <= SMALL and course[-1] > 0.5 * min(course[:-STALLED], default=np.inf)
         block = space.orthonormal(space.images[:, -block.shape[1] :])
-        if done or not block.shape[1]:
+        if not block.shape[1] or (enough and (stalled or bool(good.all()))):
             return values, vectors
+        if space.columns.shape[1] > most:
+            # What has not come out by now is one of a crowd.
+            good |= shares <= SMALL
+            if not good.any():
+                raise np.linalg.LinAlgError("no eigenvalues found")
+            return values[good], vectors[:, good]
 
 
 class _Space:
@@ -103,17 +142,18 @@ class _Space:
         self.weighted = np.hstack([self.weighted, self._times(block)])
         self.images = np.hstack([self.images, images])
 
-    def pairs(self, wanted: int) -> tuple[Array, Array, Array]:
-        """The largest eigenvalues on the space, their vectors, and the lengths of their residuals."""
+    def pairs(self, pick: Pick) -> tuple[Array, Array, Array, bool]:
+        """Picked eigenvalues on the space, their vectors, lengths of their residuals, and whether they are enough."""
         small = self.weighted.T @ self.images
         if self._inner is not None:
             values, turn = np.linalg.eigh(0.5 * (small + small.T))
         else:
             values, turn = np.linalg.eig(small)
-        order = np.argsort(-np.abs(values), kind="stable")[:wanted]
+        order = np.argsort(-np.abs(values), kind="stable")
+        picked, enough = pick(values[order])
+        order = order[picked]
         values, turn = values[order], turn[:, order]
         vectors = self.columns @ turn
         left = self.images @ turn - vectors * values
         sizes = np.einsum("ni,ni->i", left.conj(), self._times(left)).real
-        return values, vectors, np.sqrt(np.maximum(sizes, 0.0))
-
+        return values, vectors, np.sqrt(np.maximum(sizes, 0.0)), enough
