@@ -106,6 +106,7 @@ ORDER = [
     "dynamics.stages",
     "dynamics.methods",
     "dynamics.steps",
+    "dynamics.conserving",
     "dynamics.integrating",
     "dynamics.beginning",
     "dynamics.inertia",
