@@ -103,7 +103,7 @@ class _Middle:
         entries, full, coupled = [], [], []
         if system.elements:
             turns = model.rotations.turns.ravel().tolist()
-            pull = system.times(system.pull, middle) + system.times(system.closing.T, lam[:n])
+            pull = system.times(system.pull, middle) + system.times(system.closing.T, lam[:n, :])
             pull += system.times(system.by_tangent.T, linear)
             pull = ca.reshape(pull, system.axes, system.elements * system.points)
             function = system.many(_element(model.element), system.elements)
@@ -145,7 +145,7 @@ class _Middle:
             entries.append(ca.vec(stiffness))
             weight = b * ca.DM(seen.mass.T) + c * ca.DM(seen.damping.T)
             observed.append(ca.vec(system.paired(width, mean.shape[1] // count, count)(mean, spin, weight)))
-        self.residual = system.gathered(turning, on_places, full, lam[:n], rows)
+        self.residual = system.gathered(turning, on_places, full, lam[:n, :], rows)
         places_of = [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
         self.entries = [*entries, ca.MX(1), *observed, *coupled, *places_of]
 

@@ -105,7 +105,7 @@ class Stepper:
         Linear solver of CasADi.
     """
 
-    def __init__(self, system: StageEquations, method: Method, linear: str = "csparse") -> None:
+    def __init__(self, system: StageEquations, method: Method, linear: str = "qr") -> None:
         self.system, self.method = system, method
         self.function = step_function(system, method, linear)
         self._batch = Batch(self.function, 1)

@@ -557,7 +557,7 @@ class StageEquations:
 
     # -- one Newton iteration ---------------------------------------------------------------------------
 
-    def iteration(self, stages: int, linear: str = "csparse") -> ca.Function:
+    def iteration(self, stages: int, linear: str = "qr") -> ca.Function:
         """One Newton iteration of all stages of a step.
 
         ``(q, y, lam, x0, v, a, C, B, factors, near) -> (q, y, lam, size)``: q (components, rotations * stages), y, lam,

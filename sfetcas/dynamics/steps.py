@@ -22,7 +22,7 @@ CONVERGED = 1e-8
 """Change, rad or lengths, below which it ends: convergence is quadratic, so the next one would be below rounding."""
 
 
-def step_function(system: StageEquations, method: Method, linear: str = "csparse") -> ca.Function:
+def step_function(system: StageEquations, method: Method, linear: str = "qr") -> ca.Function:
     """A step of a method.
 
     ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, near) -> (q, y, lam, turns, shifts, x, rates, size,
