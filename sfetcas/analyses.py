@@ -5,21 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from .checks import Answer, look_up
 from .description.scene import Scene, check_loaded
-from .dynamics.modes import Modes, find_modes
-from .dynamics.motion import Motion
+from .dynamics.modes import find_modes
 from .dynamics.simulation import simulate
 from .equilibria import statics, stops
-from .equilibria.solution import Solution
 from .equilibria.statics import Settings
 from .mechanics.resistance import check_resistance
 from .paths import paths
-from .paths.path import Path
 
-__all__ = ["Answer", "solve"]
-
-Answer = Solution | Path | Motion | Modes
-"""What an analysis may give."""
+__all__ = ["solve"]
 
 
 def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Answer:
@@ -50,7 +45,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Ans
     """
     settings = replace(settings or Settings(), **changes)
     if scene.analysis.type == "dynamic":
-        return simulate(scene, settings)
+        return simulate(scene, settings, look_up)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from .analyses import Answer
 from .description.records import nearest, say
 from .description.scene import Expect, Scene
 from .dynamics.modes import Modes
@@ -18,7 +17,11 @@ from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
 from .paths.path import Path
 
-__all__ = ["Check", "check", "look_up"]
+__all__ = ["Answer", "Check", "check", "look_up"]
+
+
+Answer = Solution | Path | Motion | Modes
+"""What an analysis may give."""
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .analyses import Answer, solve
-from .checks import Check, check
+from .analyses import solve
+from .checks import Answer, Check, check
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load

@@ -49,6 +49,11 @@ class Memory:
     origin: tuple[Array, Array] = (np.zeros(1), np.zeros(1))
     last: Taken | None = None
 
+    @property
+    def position(self) -> Array:
+        """The quantities from where the motion began."""
+        return self.x + self.origin[1]
+
     def moved(self, y: Array, x: Array) -> Memory:
         """The same state counted from an origin that is further by y and x."""
         return replace(self, y=self.y - y, x=self.x - x, origin=(self.origin[0] + y, self.origin[1] + x))
@@ -109,14 +114,8 @@ class Stepper:
         self.system, self.method = system, method
         self.function = step_function(system, method, linear)
         self._batch = Batch(self.function, 1)
-        self._histories = [None if name is None else system.model.scene.histories[name] for name in system.groups]
         self.time = system.masses.time
         self.count = 0
-
-    def factors(self, t: float) -> Array:
-        """Factors of the groups of loads at a time, dimensionless."""
-        seconds = t * self.time
-        return np.array([1.0 if history is None else history.factor(seconds) for history in self._histories])
 
     def step(self, memory: Memory, h: float) -> Taken:
         """A step of length h."""
@@ -124,7 +123,7 @@ class Stepper:
         stages, last = method.stages, memory.last
         # What jumps at the end of the step does so after it.
         times = np.minimum(memory.t + h * method.loaded, np.nextafter(memory.t + h, -np.inf))
-        factors = np.array([self.factors(t) for t in times])
+        factors = np.array([system.factors(t) for t in times])
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
@@ -304,7 +303,8 @@ class _Adaptive:
         if not taken.converged:
             return float(np.inf)
         positions = slice(0, self._stepper.system.linear)
-        missed = taken.after.x[positions] - self._stepper.predicted(memory, taken.h)[positions]
+        expected = self._stepper.predicted(memory, taken.h) + memory.origin[1]
+        missed = (taken.after.position - expected)[positions]
         return float(np.abs(missed).max()) / self._tolerance
 
     def _begun(self, memory: Memory, h: float, least: float) -> list[Taken]:
@@ -317,7 +317,7 @@ class _Adaptive:
             if whole.converged and half.converged:
                 other = stepper.step(half.after, 0.5 * h)
                 if other.converged:
-                    missed = whole.after.x[positions] - other.after.x[positions]
+                    missed = (whole.after.position - other.after.position)[positions]
                     error = float(np.abs(missed).max()) / self._tolerance
                     if error <= 1.0:
                         self.h = 0.5 * h

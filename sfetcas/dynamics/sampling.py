@@ -16,7 +16,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.interpolation import differentiation, evaluation
 from .integrating import Taken
 
-__all__ = ["Sample", "Sampler"]
+__all__ = ["Sample", "Sampler", "between"]
 
 NODES = 6
 """Intervals of the polynomials at least, where so many stages are smoothly connected."""
@@ -114,6 +114,19 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float) -> Sample:
     a = (row @ slopes @ slopes @ quantities)[0] / h**2
     position = middle + (row @ quantities)[0]
     return Sample(t, q, (row @ np.array(y))[0], position, v, a, own.after.near)
+
+
+def between(samples: Sequence[Sample], t: float) -> Sample:
+    """The sample at a time between others, by the polynomials through them."""
+    near = min(samples, key=lambda sample: abs(sample.t - t))
+    row = evaluation(np.array([sample.t for sample in samples]), np.array([t]))[0]
+    turns = np.array([_from(near.q, sample.q) for sample in samples])
+
+    def mean(part: str) -> Array:
+        return np.asarray(row @ np.array([getattr(sample, part) for sample in samples]))
+
+    q = _turned(near.q, np.einsum("n,nra->ra", row, turns))
+    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), near.near)
 
 
 def _turned(q: Array, turn: Array) -> Array:

@@ -1,0 +1,88 @@
+"""Motions that end at a condition: when a quantity first passes a value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..description.task import Until
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from .motion import Instant, Mover
+from .sampling import between
+
+__all__ = ["Measure", "Watch", "finer"]
+
+Measure = Callable[[Instant, str], Any]
+"""A quantity of an instant by its name."""
+
+
+class Watch:
+    """Looks for the end of a motion: the first time at which a quantity passes a value."""
+
+    def __init__(self, until: Until, measure: Measure, mover: Mover) -> None:
+        self._until, self._measure, self._mover = until, measure, mover
+        self._values: list[float] = []
+        self._last: int | None = None
+        self.ended = False
+
+    def passed(self, instants: Sequence[Instant]) -> bool:
+        """Whether the quantity has passed its value, and enough is known beyond it to say when."""
+        while len(self._values) < len(instants):
+            self._values.append(self._excess(instants[len(self._values)]))
+        if self._last is None and self._values[-1] >= 0.0:
+            self._last = len(self._values) - 1
+        self.ended = self._last is not None
+        return self._last is not None and (self._last == 0 or len(self._values) > self._last + AROUND // 2)
+
+    def _excess(self, instant: Instant) -> float:
+        """How far the quantity is beyond its value."""
+        until = self._until
+        try:
+            value = np.asarray(self._measure(instant, until.quantity), dtype=float)
+            if until.component is None and value.size != 1:
+                raise SceneError(f"found a quantity with {value.size} components, accepted: with the key 'component'")
+            number = float(value.ravel()[until.component or 0])
+        except SceneError as error:
+            raise error.within("analysis", "until", "quantity") from None
+        return number - until.above if until.above is not None else float(until.below or 0.0) - number
+
+    def up_to_end(self, instants: list[Instant], times: Array) -> list[Instant]:
+        """The instants at the times of the answer, and that of the end where it was met."""
+        wanted = [instant for instant in instants if np.isclose(instant.time, times, rtol=1e-12, atol=0.0).any()]
+        if self._last is None:
+            return wanted
+        end = self._end(instants)
+        return [*(instant for instant in wanted if instant.time < end.time), end]
+
+    def _end(self, instants: list[Instant]) -> Instant:
+        last = self._last
+        assert last is not None
+        if last == 0:
+            return instants[0]
+        first = max(0, min(last - AROUND // 2, len(instants) - AROUND))
+        samples = [instant.sample for instant in instants[first : first + AROUND]]
+        low, high = instants[last - 1].sample.t, instants[last].sample.t
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            beyond = self._excess(self._mover.instant(between(samples, middle))) >= 0.0
+            low, high = (low, middle) if beyond else (middle, high)
+        return self._mover.instant(between(samples, high))
+
+
+AROUND = 6
+"""States between which the end of a motion is interpolated."""
+
+HALVINGS = 40
+"""Of the time between two of them: down to rounding."""
+
+FINER = 8
+"""Parts of the spacing of the answers in which the end of a motion is looked for."""
+
+
+def finer(times: Array) -> Array:
+    """Times with further ones between them."""
+    parts = np.arange(FINER) / FINER
+    return np.append((times[:-1, None] + np.diff(times)[:, None] * parts).ravel(), times[-1])
