@@ -434,18 +434,20 @@ class StageEquations:
         q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
         factors, near, step = ca.MX.sym("factors", n.factors), ca.MX.sym("near", n.near), ca.MX.sym("step", self.total)
         along = ca.MX.sym("along")
-        spin = ca.reshape(_times(self._turning, along * step), self.turns, n.rotations)
+        spin = self.spins(along * step)
         shift = along * step[self.equations.turning_unknowns : self.equations.unknowns]
         x = self.quantities(moved_by(self, q, spin), self.displacements(y + shift, factors), near)
         rate = ca.substitute([x, ca.jtimes(x, along, ca.MX(1))], [along], [ca.MX(0)])
         return ca.Function("rates", [q, y, factors, near, step], rate)
 
+    def spins(self, step: ca.MX) -> ca.MX:
+        """Vectors (turns, rotations) about the fixed axes by which changes of the unknowns turn all rotations."""
+        return ca.reshape(_times(self._turning[:, : step.shape[0]], step), self.turns, self.layout.rotations)
+
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities at a state, and their rates where the unknowns have the rates ``step``."""
         full = np.concatenate([step, np.zeros(self.equations.rows)])
-        # Compiled functions have no derivatives.
-        plain = self if self._kernels == "interpreted" else StageEquations(self.equations, self.masses, "interpreted")
-        x, v = plain._rates(state.q.T, state.y, factors, state.wound, full)
+        x, v = self.interpreted._rates(state.q.T, state.y, factors, state.wound, full)
         return np.array(x).ravel(), np.array(v).ravel()
 
     @functools.cached_property
@@ -470,6 +472,11 @@ class StageEquations:
         values = ca.Function("moved", arguments, [x])
         rest = np.array(values(np.zeros(self.layout.y))).ravel()
         return y, np.stack([np.array(values(column)).ravel() - rest for column in y.T], axis=1)
+
+    @functools.cached_property
+    def interpreted(self) -> StageEquations:
+        """The same of which nothing is compiled: compiled functions have no derivatives."""
+        return self if self._kernels == "interpreted" else StageEquations(self.equations, self.masses, "interpreted")
 
     @staticmethod
     def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
@@ -602,9 +609,9 @@ class StageEquations:
         turning, unknowns = self.equations.turning_unknowns, self.equations.unknowns
         there, size = [], ca.MX(0)
         for i, part in enumerate(q):
-            spin = _times(self._turning, step[:, i])
-            there.append(moved_by(self, part, ca.reshape(spin, self.turns, self.layout.rotations)))
-            size = ca.fmax(size, ca.norm_inf(ca.vertcat(0.0, spin, step[turning:unknowns, i])))
+            spin = self.spins(step[:, i])
+            there.append(moved_by(self, part, spin))
+            size = ca.fmax(size, ca.norm_inf(ca.vertcat(0.0, ca.vec(spin), step[turning:unknowns, i])))
         return there, step[turning:unknowns, :], step[unknowns:, :], size
 
     def forces(self, rates: ca.MX, accelerations: ca.MX) -> ca.MX:
@@ -619,21 +626,47 @@ class StageEquations:
             parts.append(force)
         return ca.vertcat(*parts)
 
-    def _system(self, stages: int) -> _System:
-        """Pattern of the matrix of all stages, unknown by unknown, each with its stages."""
-        probe, w = _Places(self), self.model.positions.W
+    def stage(self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, factors: ca.MX, near: ca.MX) -> _Stage:
+        """Residual and entries at given inertia and damping forces."""
+        return _Stage(self, q, y, lam, self.displacements(y, factors), forces, factors, near)
+
+    def static_matrix(self, stage: _Stage) -> ca.MX:
+        """Derivative of a stage's residual by its unknowns at given inertia and damping forces, (total, total)."""
+        return self._summed(self._static, stage.entries)
+
+    def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
+        """Its derivative by rates (c) and accelerations (b) of the unknowns, (total, total)."""
+        return self._summed(self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
+
+    def _summed(self, places: tuple[Index, Index, Array, Index], entries: ca.MX) -> ca.MX:
+        row, column, weight, entry = places
+        cells, inverse = np.unique(column * self.total + row, return_inverse=True)
+        sums = _sparse(inverse.ravel(), entry, weight, (len(cells), entries.shape[0]))
+        return ca.MX(pattern(self.total, cells % self.total, cells // self.total), ca.mtimes(sums, entries))
+
+    @functools.cached_property
+    def _probe(self) -> _Places:
+        return _Places(self)
+
+    @functools.cached_property
+    def _static(self) -> tuple[Index, Index, Array, Index]:
+        """Places of the entries of a stage with those of the ties between displacements and rows."""
+        probe, w = self._probe, self.model.positions.W
         row, column, value, entry = probe.static.places
         ties = len(w.value)
         r, c = self.equations.unknowns + w.row, self.equations.turning_unknowns + w.column
-        one = probe.static.count
-        static = (
+        return (
             np.concatenate([row, r, c]),
             np.concatenate([column, c, r]),
             np.concatenate([value, np.tile(w.value, 2)]),
             # The entries of the ties between displacements and rows are one number, 1, after those of the stage.
-            np.concatenate([entry, np.full(2 * ties, one)]),
+            np.concatenate([entry, np.full(2 * ties, probe.static.count)]),
         )
-        coupled = probe.coupled.places
+
+    def _system(self, stages: int) -> _System:
+        """Pattern of the matrix of all stages, unknown by unknown, each with its stages."""
+        probe, static = self._probe, self._static
+        one, coupled = probe.static.count, probe.coupled.places
         rows, columns = (np.concatenate([static[k], coupled[k], np.arange(self.total)]) for k in (0, 1))
         both = np.unique(np.concatenate([columns * self.total + rows, rows * self.total + columns]))
         amd = pattern(self.total, both % self.total, both // self.total).amd()
