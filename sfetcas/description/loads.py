@@ -88,6 +88,24 @@ class History(Record):
         x = (t - self.t[i]) / span
         return sum(k * c * x ** (k - 1) for k, c in enumerate(self._terms(i)) if k) / span
 
+    def between(self, begin: float, end: float) -> tuple[float, ...]:
+        """The factor as a polynomial between two times in one interval of ``t``, or outside of all.
+
+        Returns
+        -------
+        terms : c0, c1, ... - of the powers of (t - begin)/(end - begin)
+        """
+        i = bisect_right(self.t, 0.5 * (begin + end)) - 1
+        if not 0 <= i < len(self.t) - 1:
+            return (self.factor(begin),)
+        span = self.t[i + 1] - self.t[i]
+        first, slope = (begin - self.t[i]) / span, (end - begin) / span
+        found = [0.0]
+        for c in reversed(self._terms(i)):
+            found = [first * a + slope * b for a, b in zip([*found, 0.0], [0.0, *found], strict=True)]
+            found[0] += c
+        return tuple(found[: len(self._terms(i))])
+
     def jumps(self) -> Iterator[tuple[float, float, float]]:
         """Where the factor or its rate jumps by more than rounding: t, jump of the factor, jump of the rate in 1/s.
 

@@ -16,6 +16,7 @@ the rest it is of the order of the turn in a step, and steps are short against a
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -72,7 +73,9 @@ class IndexOne:
         near = ca.MX.sym("near", n.near)
         q, y, factors = ca.vertsplit(at, np.cumsum([0, self.q_size, n.y, n.factors]).tolist())
         q = self._full(q, factors)
-        seen = ca.vertcat(system.quantities(q, system.displacements(y, factors), near), system.gaps(q, y, factors, near))
+        seen = ca.vertcat(
+            system.quantities(q, system.displacements(y, factors), near), system.gaps(q, y, factors, near)
+        )
         first = ca.jtimes(seen, at, rate)
         bend = ca.jtimes(first, ca.vertcat(at, rate), ca.vertcat(rate, second))
         return ca.Function("seen", [at, rate, second, near], [seen, first, bend])
@@ -120,7 +123,7 @@ class IndexOne:
         jacobian = ca.Function(
             "jac_balance", given, matrices, [*names, "out_missed"], [f"jac_missed_{name}" for name in names]
         )
-        options = {"custom_jacobian": jacobian, "never_inline": True, "enable_forward": False, "enable_reverse": False}
+        options: dict[str, Any] = {"custom_jacobian": jacobian, "never_inline": True, "enable_forward": False, "enable_reverse": False}
         return ca.Function("balance", symbols, [out], names, ["missed"], options)
 
     def _turns_of(self, q: ca.MX) -> ca.MX:
@@ -198,7 +201,11 @@ class IndexOne:
         a = z[: self.unknowns]
         spin, faster = self._curve(q, w, a)
         moved = slice(self.system.equations.turning_unknowns, self.unknowns)
-        at = ca.vertcat(q, y, factors[0]), ca.vertcat(spin, w[moved], factors[1]), ca.vertcat(faster, a[moved], factors[2])
+        at = (
+            ca.vertcat(q, y, factors[0]),
+            ca.vertcat(spin, w[moved], factors[1]),
+            ca.vertcat(faster, a[moved], factors[2]),
+        )
         seen = self._seen(*at, near)
         parts = [z, *(part[: n.x] for part in seen), seen[1][n.x :]]
         return ca.Function("answers", [x, s, p], parts, ["x", "s", "p"], ["z", "quantities", "v", "a", "opening"])

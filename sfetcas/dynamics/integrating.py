@@ -109,14 +109,8 @@ class Stepper:
         self.system, self.method = system, method
         self.function = step_function(system, method, linear)
         self._batch = Batch(self.function, 1)
-        self._histories = [None if name is None else system.model.scene.histories[name] for name in system.groups]
         self.time = system.masses.time
         self.count = 0
-
-    def factors(self, t: float) -> Array:
-        """Factors of the groups of loads at a time, dimensionless."""
-        seconds = t * self.time
-        return np.array([1.0 if history is None else history.factor(seconds) for history in self._histories])
 
     def step(self, memory: Memory, h: float) -> Taken:
         """A step of length h."""
@@ -124,7 +118,7 @@ class Stepper:
         stages, last = method.stages, memory.last
         # What jumps at the end of the step does so after it.
         times = np.minimum(memory.t + h * method.loaded, np.nextafter(memory.t + h, -np.inf))
-        factors = np.array([self.factors(t) for t in times])
+        factors = np.array([system.factors(t) for t in times])
         turns = np.zeros((stages, n.rotations, system.turns)) if last is None else last.turns
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])

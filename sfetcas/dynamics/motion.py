@@ -17,8 +17,8 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.model import Model
-from ..solvers.newton import DUAL
 from .inertia import Inertia
+from .projecting import factor_closings
 from .sampling import Sample
 
 __all__ = ["Instant", "Motion", "Mover"]
@@ -62,12 +62,8 @@ class Mover:
         point, n = equations.at(free, balanced), equations.unknowns
         if not equations.rows:
             return np.zeros(0)
-        # [1 G^T; G 0]: least squares of the residual, rows of the closings last.
-        mixed = (equations.row >= n) != (equations.column >= n)
-        entries = np.where(mixed, point.entries, 0.0)
-        entries[equations.diagonal[:n]] = 1.0
-        entries[equations.diagonal[n:]] = -DUAL
-        equations.solver.factor(entries)
+        # Least squares of the residual, rows of the closings last.
+        factor_closings(equations, point)
         right = np.concatenate([-point.residual[:n], np.zeros(equations.rows)])
         return np.asarray(equations.solver.solve(right)[n:])
 

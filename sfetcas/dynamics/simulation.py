@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,12 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
+from .idas import Idas
 from .inertia import Inertia
-from .integrating import Memory, Stepper, Taken, integrate
+from .integrators import Begun, Course, Integrator, Stages
 from .masses import masses_of
-from .methods import GeneralisedAlpha, Method, Radau
+from .methods import GeneralisedAlpha, Radau
 from .motion import Instant, Motion, Mover
-from .sampling import Sampler
 from .stages import StageEquations
 
 __all__ = ["simulate"]
@@ -33,8 +34,11 @@ __all__ = ["simulate"]
 USUAL = "radau-3"
 """Integrator where none is asked for: of all it needs the least time for an accuracy of 1e-2 or finer (measured)."""
 
-METHODS: dict[str, Method] = {m.name: m for m in (Radau(3), Radau(2), GeneralisedAlpha(), Conserving())}
-"""Methods with steps of their own, by name."""
+INTEGRATORS: dict[str, Callable[[StageEquations, Callable[[float], Any] | None], Integrator]] = {
+    **{m.name: partial(Stages, method=m) for m in (Radau(3), Radau(2), GeneralisedAlpha(), Conserving())},
+    "idas": Idas,
+}
+"""What integrates a system, by name; the second argument is told the time reached, s."""
 
 OUTPUTS = 100
 """Answers where no spacing is asked for."""
@@ -63,7 +67,7 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 
 @dataclass
 class _Run:
-    """What one run on one mesh with one tolerance gave."""
+    """What one run on one mesh gave."""
 
     instants: list[Instant]
     count: int
@@ -82,8 +86,7 @@ class _Simulation:
         if settings.gauss:
             raise SceneError("integration: found 'gauss', accepted with type 'dynamic': integration at the nodes")
         analysis = scene.analysis
-        name = analysis.integrator or USUAL
-        self.method = METHODS[name]
+        self.name = analysis.integrator or USUAL
         meshing = Meshing(self.scene, settings)
         self.accuracy, self.asked = meshing.accuracy, meshing.asked
         self.prescribed = meshing._prescribed
@@ -115,8 +118,8 @@ class _Simulation:
 
     # -- one run ----------------------------------------------------------------------------------------
 
-    def run(self, mesh: Mesh, tolerance: float) -> _Run:
-        """The motion on a mesh."""
+    def run(self, mesh: Mesh, rounds: int) -> _Run:
+        """The motion on a mesh, after so many coarser runs."""
         begin = time.perf_counter()
         model = assemble(self.scene, mesh, assembly="nodal")
         equations = Equations(model)
@@ -124,63 +127,48 @@ class _Simulation:
         built = time.perf_counter()
         analysis = self.scene.analysis
         system = StageEquations(equations, masses)
-        stepper = Stepper(system, self.method)
+        integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
-        memory, notes = self._memory(stepper)
-        mover = Mover(equations, Inertia(system), masses.time, stepper.factors)
-        sampler = Sampler(self.times / masses.time, self.method.stages)
-        step = None if analysis.step is None else analysis.step / masses.time
-        size = self.scene.size / model.scales.length
-        first = None if step is not None else FIRST * analysis.duration / masses.time
-        beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf) / masses.time
-        limits: dict[str, Any] = {"step": step, "tolerance": tolerance * size, "first": first, "beyond": beyond}
-        steps = integrate(stepper, memory, self._breaks(masses.time), **limits)
+        begun, notes = self._begun(system)
+        mover = Mover(equations, Inertia(system), masses.time, system.factors)
+        beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
+        course = Course(
+            times=self.times / masses.time,
+            breaks=self._breaks(masses.time),
+            beyond=beyond / masses.time,
+            accuracy=self.accuracy,
+            rounds=rounds,
+            size=self.scene.size / model.scales.length,
+            step=None if analysis.step is None else analysis.step / masses.time,
+        )
         run = _Run([], 0, 0.0, 0.0, notes, {})
         solving = time.perf_counter()
         try:
-            for taken in self._counted(steps, run, masses.time):
-                run.instants += [mover.instant(sample) for sample in sampler.feed(taken)]
+            for sample in integrator.samples(begun, course):
+                run.instants.append(mover.instant(sample))
         except KeyboardInterrupt:
             run.interrupted = True
         except SolveError as error:
             run.failure = error
-        run.instants += [mover.instant(sample) for sample in sampler.close()]
+        run.instants += [mover.instant(sample) for sample in integrator.rest()]
+        run.count, run.gap, run.norm = integrator.count, integrator.gap, integrator.norm
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
-    def _counted(self, steps: Iterator[Taken], run: _Run, unit: float) -> Iterator[Taken]:
-        for taken in steps:
-            if taken.begin.t * unit >= self.scene.analysis.duration * (1.0 - 1e-12):
-                yield taken
-                continue
-            run.count += 1
-            run.gap = max(run.gap, taken.gap)
-            if taken.after.q.shape[1] == 4:
-                run.norm = max(run.norm, float(np.abs(np.einsum("ij,ij->i", taken.after.q, taken.after.q) - 1.0).max()))
-            yield taken
-            if self.progress is not None:
-                self.progress(taken.after.t * unit)
-
-    def _memory(self, stepper: Stepper) -> tuple[Memory, tuple[str, ...]]:
+    def _begun(self, system: StageEquations) -> tuple[Begun, tuple[str, ...]]:
         """Where the motion begins."""
-        system, model = stepper.system, stepper.system.model
+        model = system.model
         state = at_rest(model)
         notes: tuple[str, ...] = ()
         if self.scene.analysis.initial == "equilibrium":
             before = self.before
             state, notes = posed(model, before), before.notes
-        equations = system.equations
-        loading = model.loading(0.0).scaled(0.0)
-        for name, factor in zip(system.groups, stepper.factors(0.0), strict=True):
-            loading = loading.plus(model.groups[name].scaled(float(factor)))
+        equations, factors = system.equations, system.factors(0.0)
+        loading = system.loading(factors)
         state = equations.holding(state, loading)
         rates, told = velocities(system, equations, state, equations.at(state, loading))
-        x, v = system.rates(state, stepper.factors(0.0), rates)
-        kept = np.zeros((self.method.kept, len(x)))
-        kept[0] = v
-        memory = Memory(0.0, state.q, state.y, state.lam, x, kept, state.wound)
-        return memory, (*notes, *told)
+        return Begun(state, rates, *system.rates(state, factors, rates)), (*notes, *told)
 
     @property
     def before(self) -> Equilibrium:
@@ -196,26 +184,19 @@ class _Simulation:
     def motion(self) -> Motion:
         """Runs until two agree."""
         analysis = self.scene.analysis
-        mesh, tolerance = self.mesh, self._tolerance(self.accuracy)
-        run, error = self.run(mesh, tolerance), None
+        mesh, error = self.mesh, None
+        run = self.run(mesh, 0)
         refinable = analysis.step is None or not self.prescribed
-        for _ in range(ROUNDS if refinable else 0):
+        for rounds in range(1, 1 + ROUNDS if refinable else 1):
             if run.failure is not None or run.interrupted:
                 break
             mesh = mesh if self.prescribed else mesh.refined()
-            tolerance = self._tolerance(0.0, tolerance)
-            finer = self.run(mesh, tolerance)
+            finer = self.run(mesh, rounds)
             error = self._difference(run, finer)
             run = finer
             if error <= self.accuracy:
                 break
         return self._answer(run, error)
-
-    def _tolerance(self, accuracy: float, before: float | None = None) -> float:
-        """Tolerance of steps for an accuracy, or a finer one: steps of about half the length."""
-        order, stages = self.method.order, self.method.stages
-        of_step = stages + 1 if stages > 1 else 3
-        return float((STRICT * accuracy) ** (of_step / order)) if before is None else before * 2.0**-of_step
 
     def _difference(self, coarse: _Run, fine: _Run) -> float:
         """Largest distance of nodes and middles of members, over the size of the scene."""
@@ -243,7 +224,7 @@ class _Simulation:
             status=status,
             steps=tuple(run.instants),
             seconds=dict(self.seconds),
-            integrator=self.method.name,
+            integrator=self.name,
             count=run.count,
             error_estimate=error,
             violation={"norms": run.norm, "closings": run.gap},
@@ -255,10 +236,3 @@ class _Simulation:
                 run.failure.reached = motion
             raise run.failure
         return motion
-
-
-FIRST = 1e-3
-"""First step that is tried, over the span."""
-
-STRICT = 5.0
-"""Steps are chosen for an error of this times the accuracy: a finer run follows."""

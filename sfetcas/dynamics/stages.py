@@ -23,6 +23,7 @@ from typing import TypeVar
 import casadi as ca
 import numpy as np
 
+from ..description.loads import History
 from ..mathematics.arrays import Array, Index
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseMap, pattern
@@ -31,6 +32,7 @@ from ..mechanics.connections import Group
 from ..mechanics.elements import Element
 from ..mechanics.equations import Equations, State
 from ..mechanics.joints import Connection, by_turning, name_of
+from ..mechanics.loading import Loading
 from ..mechanics.rotations import Turn
 from .masses import Masses, Observables
 
@@ -478,6 +480,21 @@ class StageEquations:
         """The same of which nothing is compiled: compiled functions have no derivatives."""
         return self if self._kernels == "interpreted" else StageEquations(self.equations, self.masses, "interpreted")
 
+    @functools.cached_property
+    def histories(self) -> tuple[History | None, ...]:
+        """Of the groups of loads; None of one whose factor is one."""
+        return tuple(None if name is None else self.model.scene.histories[name] for name in self.groups)
+
+    def factors(self, t: float) -> Array:
+        """Factors of the groups of loads at a time, dimensionless."""
+        seconds = t * self.masses.time
+        return np.array([1.0 if history is None else history.factor(seconds) for history in self.histories])
+
+    def loading(self, factors: Array) -> Loading:
+        """Loads and motions at factors of their groups."""
+        groups = [self.model.groups[name].scaled(float(f)) for name, f in zip(self.groups, factors, strict=True)]
+        return functools.reduce(Loading.plus, groups)
+
     @staticmethod
     def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
         """A product with a constant sparse matrix, of full length."""
@@ -881,7 +898,9 @@ def _exponential(phi: T) -> T:
     half = ca.sqrt(ca.fmax(square, 1e-30))
     # sin(x) / x to all digits also where the vector vanishes.
     ratio = ca.if_else(square < 1e-8, 1.0 - square / 6.0, ca.sin(half) / half)
-    return ca.vertcat(ca.cos(half), 0.5 * ratio * phi)
+    # As polynomial, so that second derivatives hold where the vector vanishes.
+    cosine = ca.if_else(square < 1e-8, 1.0 - 0.5 * square, ca.cos(half))
+    return ca.vertcat(cosine, 0.5 * ratio * phi)
 
 
 def moved_by(system: StageEquations, q: ca.MX, phi: ca.MX) -> ca.MX:

@@ -1,0 +1,178 @@
+"""What brings a motion from its begin to its end: integrators, one class each behind one interface."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mechanics.equations import State
+from .integrating import Memory, Stepper, Taken, integrate
+from .methods import Method
+from .sampling import Sample, Sampler
+from .stages import StageEquations
+
+__all__ = ["STRICT", "Begun", "Course", "Integrator", "Stages"]
+
+STRICT = 5.0
+"""Steps are chosen for an error of this times the accuracy: a finer run follows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """Where a motion begins, dimensionless.
+
+    Attributes
+    ----------
+    state : State
+    rates : ndarray (unknowns,)
+        Angular velocities about the fixed axes, velocities of displacements.
+    x, v : ndarray (quantities,)
+        Quantities and their rates.
+    """
+
+    state: State
+    rates: Array
+    x: Array
+    v: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What is asked for; times are dimensionless.
+
+    Attributes
+    ----------
+    times : ndarray
+        Of the answers, rising, the last of them the end.
+    breaks : list of float
+        Where loads or motions have a kink, and the end.
+    beyond : float
+        Time up to which all goes on smoothly after the end.
+    accuracy : float
+        Wanted error of the positions over the size of the scene.
+    rounds : int
+        How many coarser runs went before.
+    size : float
+        Of the scene, over the unit of length.
+    step : float or None
+        Prescribed length of steps.
+    """
+
+    times: Array
+    breaks: list[float]
+    beyond: float
+    accuracy: float
+    rounds: int
+    size: float
+    step: float | None
+
+    @property
+    def end(self) -> float:
+        """Of the motion."""
+        return self.breaks[-1]
+
+
+class Integrator(abc.ABC):
+    """An integrator of one system.
+
+    Parameters
+    ----------
+    system : StageEquations
+    progress : callable or None
+        Told the time reached, s.
+
+    Attributes
+    ----------
+    count : int
+        Steps so far.
+    gap, norm : float
+        Largest by which closings and norms were off at what the integrator reached.
+    """
+
+    def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
+        self.system, self._progress = system, progress
+        self.count, self.gap, self.norm = 0, 0.0, 0.0
+
+    @abc.abstractmethod
+    def samples(self, begun: Begun, course: Course) -> Iterator[Sample]:
+        """States at the times of the answers, as soon as they are known.
+
+        Raises
+        ------
+        SceneError
+            The integrator cannot take the scene.
+        SolveError
+            It does not get on; the states before have been given.
+        """
+
+    def rest(self) -> Iterator[Sample]:
+        """What is known of further states where the motion ended before its time."""
+        return iter(())
+
+    def told(self, t: float) -> None:
+        """A time has been reached."""
+        if self._progress is not None:
+            self._progress(t * self.system.masses.time)
+
+
+@final
+class Stages(Integrator):
+    """Steps of a method with stages."""
+
+    def __init__(
+        self, system: StageEquations, progress: Callable[[float], Any] | None = None, *, method: Method
+    ) -> None:
+        super().__init__(system, progress)
+        self._stepper, self._sampler = Stepper(system, method), Sampler([], method.stages)
+
+    def samples(self, begun: Begun, course: Course) -> Iterator[Sample]:
+        """Polynomials through the stages."""
+        stepper, method, state = self._stepper, self._stepper.method, begun.state
+        rates = np.zeros((method.kept, len(begun.x)))
+        rates[0] = begun.v
+        memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.wound)
+        self._sampler = Sampler(course.times, method.stages)
+        steps = integrate(
+            stepper,
+            memory,
+            course.breaks,
+            step=course.step,
+            tolerance=self._tolerance(course),
+            first=None if course.step is not None else FIRST * course.end,
+            beyond=course.beyond,
+        )
+        for taken in steps:
+            within = taken.begin.t < course.end * (1.0 - 1e-12)
+            if within:
+                self._judge(taken)
+            yield from self._sampler.feed(taken)
+            if within:
+                self.told(taken.after.t)
+        yield from self.rest()
+
+    def rest(self) -> Iterator[Sample]:
+        """Samples of the last steps."""
+        return self._sampler.close()
+
+    def _judge(self, taken: Taken) -> None:
+        self.count += 1
+        self.gap = max(self.gap, taken.gap)
+        q = taken.after.q
+        if q.shape[1] == 4:
+            self.norm = max(self.norm, float(np.abs(np.einsum("ij,ij->i", q, q) - 1.0).max()))
+
+    def _tolerance(self, course: Course) -> float:
+        """Tolerance of steps, in the unit of length; each round has steps of about half the length."""
+        order, stages = self._stepper.method.order, self._stepper.method.stages
+        of_step = stages + 1 if stages > 1 else 3
+        first = (STRICT * course.accuracy) ** (of_step / order)
+        return float(course.size * first * 2.0 ** (-of_step * course.rounds))
+
+
+FIRST = 1e-3
+"""First step that is tried, over the span."""
