@@ -123,7 +123,12 @@ class IndexOne:
         jacobian = ca.Function(
             "jac_balance", given, matrices, [*names, "out_missed"], [f"jac_missed_{name}" for name in names]
         )
-        options: dict[str, Any] = {"custom_jacobian": jacobian, "never_inline": True, "enable_forward": False, "enable_reverse": False}
+        options: dict[str, Any] = {
+            "custom_jacobian": jacobian,
+            "never_inline": True,
+            "enable_forward": False,
+            "enable_reverse": False,
+        }
         return ca.Function("balance", symbols, [out], names, ["missed"], options)
 
     def _turns_of(self, q: ca.MX) -> ca.MX:
