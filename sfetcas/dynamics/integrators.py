@@ -16,10 +16,7 @@ from .methods import Method
 from .sampling import Sample, Sampler
 from .stages import StageEquations
 
-__all__ = ["STRICT", "Begun", "Course", "Integrator", "Stages"]
-
-STRICT = 5.0
-"""Steps are chosen for an error of this times the accuracy: a finer run follows."""
+__all__ = ["Begun", "Course", "Integrator", "Stages"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,3 +173,6 @@ class Stages(Integrator):
 
 FIRST = 1e-3
 """First step that is tried, over the span."""
+
+STRICT = 5.0
+"""Steps are chosen for an error of this times the accuracy: a finer run follows."""

@@ -16,6 +16,7 @@ from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
@@ -48,6 +49,7 @@ ROUNDS = 6
 """Finer runs at most."""
 
 
+@single_threaded
 def simulate(
     scene: Scene, settings: Settings, measure: Measure, progress: Callable[[float], Any] | None = None
 ) -> Motion:
