@@ -53,6 +53,10 @@ class Memory:
         """The same state counted from an origin that is further by y and x."""
         return replace(self, y=self.y - y, x=self.x - x, origin=(self.origin[0] + y, self.origin[1] + x))
 
+    def beyond(self, other: Memory, x: Array) -> Array:
+        """How far the quantities are beyond others, which are counted from where another memory counts from."""
+        return np.asarray(self.x - x + (self.origin[1] - other.origin[1]))
+
 
 @dataclass(frozen=True, eq=False)
 class Taken:
@@ -304,7 +308,7 @@ class _Adaptive:
         if not taken.converged:
             return float(np.inf)
         positions = slice(0, self._stepper.system.linear)
-        missed = taken.after.x[positions] - self._stepper.predicted(memory, taken.h)[positions]
+        missed = taken.after.beyond(memory, self._stepper.predicted(memory, taken.h))[positions]
         return float(np.abs(missed).max()) / self._tolerance
 
     def _begun(self, memory: Memory, h: float, least: float) -> list[Taken]:
@@ -317,7 +321,7 @@ class _Adaptive:
             if whole.converged and half.converged:
                 other = stepper.step(half.after, 0.5 * h)
                 if other.converged:
-                    missed = whole.after.x[positions] - other.after.x[positions]
+                    missed = whole.after.beyond(other.after, other.after.x)[positions]
                     error = float(np.abs(missed).max()) / self._tolerance
                     if error <= 1.0:
                         self.h = 0.5 * h
