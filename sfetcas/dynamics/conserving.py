@@ -29,7 +29,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.interpolation import differentiation
 from ..mathematics.quaternion import product, turned
 from ..mechanics.elements import Element
-from ..mechanics.joints import Connection, Hinge, name_of
+from ..mechanics.joints import Connection, Hinge, TurnSpring, name_of
 from .methods import Begin, Method
 from .observed import Axes
 from .stages import StageEquations
@@ -99,6 +99,10 @@ class _Middle:
         linear = forces[: system.linear]
         on_places = system.times(system.by_place.T, linear) - system.times(system.force, middle)
         turning = -system.times(system.moment, middle)
+        if not model.space and system.moment.nnz():
+            # Moments in the plane have a potential, that of the angle.  What their factor changes of the matrix is small
+            # as the angle of a step: it is left out.
+            turning *= ca.vec(system.many(_share(), system.layout.rotations)(begin.q, q))
         gaps = system.open_gaps(y, end)
         entries, full, coupled = [], [], []
         if system.elements:
@@ -208,6 +212,13 @@ def _relative(a0: ca.SX, a1: ca.SX, b0: ca.SX, b1: ca.SX) -> ca.SX:
     return 0.5 * (_onward(a0, b0, of_a, of_b) + _onward(a1, b1, -of_a, -of_b))
 
 
+@functools.cache
+def _share() -> ca.Function:
+    """(q0, q1) -> gain of an angle in the plane over that of its Rodrigues vector."""
+    q0, q1, still = ca.SX.sym("q0"), ca.SX.sym("q1"), ca.SX(0)
+    return ca.Function("share", [q0, q1], [_relative(still, still, q0, q1)])
+
+
 def _vectors(element: Element, q: ca.SX, tangent: ca.SX) -> list[ca.SX]:
     """Turned tangents of an element at rotations."""
     if element.space:
@@ -314,7 +325,7 @@ def _between(kind: Connection) -> ca.Function:
 
     q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
     middle = 0.5 * (q0 + q1)
-    if kind.space:
+    if kind.space and turns:
         middle = ca.horzcat(*[middle[:, i] / ca.norm_2(middle[:, i]) for i in range(turns)])
     derivative, mean_spin = ca.substitute(list(spins(q, u, load)), [q, u], [middle, 0.5 * (u0 + u1)])
     if isinstance(kind, Axes):
@@ -324,6 +335,9 @@ def _between(kind: Connection) -> ca.Function:
         gain = _relative(q0[:, 0], q1[:, 0], q0[:, 1], q1[:, 1])[1:, :]
         across = ca.vertcat(*[2.0 * ca.mtimes(data[3 * i : 3 * i + 3].T, gain) for i in range(rows)])
         mean_spin = ca.horzcat(-across, across)
+    if isinstance(kind, TurnSpring) and not kind.space:
+        # Quadratic in the relative angle: its gain is exact with the derivative at the mean.
+        derivative *= _relative(q0[0], q1[0], q0[1], q1[1])
     gradient = derivative + ca.mtimes(mean_spin.T, lam)
     end, of_end = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u.numel()))
     changed = ca.mtimes(ca.jacobian(gradient, end), of_end)
