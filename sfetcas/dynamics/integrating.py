@@ -58,6 +58,42 @@ class Memory:
         """The same state counted from an origin that is further by y and x."""
         return replace(self, y=self.y - y, x=self.x - x, origin=(self.origin[0] + y, self.origin[1] + x))
 
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """A step.
+
+    Attributes
+    ----------
+    begin, after : Memory
+    h : float
+    places : ndarray (stages,)
+        Of the stages in it, the last of them 1.
+    turns : ndarray (stages, rotations, turns)
+        Rotation vectors since its begin.
+    shifts : ndarray (stages, displacements)
+    x : ndarray (stages, quantities)
+    lam : ndarray (stages, multipliers)
+    size : float
+        Last change of Newton's method.
+    iterations : int
+    gap : float
+        What closings miss at its end.
+    """
+
+    begin: Memory
+    after: Memory
+    h: float
+    places: Array
+    turns: Array
+    shifts: Array
+    x: Array
+    lam: Array
+    size: float
+    iterations: int
+    gap: float
+
+    @property
     def converged(self) -> bool:
         """Whether Newton's method has."""
         return self.size <= CONVERGED
