@@ -137,6 +137,7 @@ ORDER = [
     "pictures.charts",
     "checks",
     "analyses",
+    "benchmark_motion",
     "benchmark",
     "cli",
     "__init__",
@@ -144,7 +145,7 @@ ORDER = [
 ]
 """A module imports only from names to its left."""
 
-PROGRAMS = ("cli", "benchmark")
+PROGRAMS = ("cli", "benchmark", "benchmark_motion")
 """What is run and not imported: only these print."""
 
 PICTURES = ("pictures.sheet", "pictures.plotting", "pictures.charts")
@@ -213,7 +214,7 @@ def test_mechanics_and_solvers_know_no_more_than_they_need(name):
     if name.startswith("description"):
         assert "casadi" not in other, "descriptions need no solver"
     assert ("matplotlib" in other) == (name in PICTURES)
-    assert not {*PICTURES, *PROGRAMS} & own or name in ("cli", "__main__", *PICTURES)
+    assert not {*PICTURES, *PROGRAMS} & own or name in ("cli", "benchmark", "__main__", *PICTURES)
 
 
 @each

@@ -100,8 +100,8 @@ class _Middle:
         on_places = system.times(system.by_place.T, linear) - system.times(system.force, middle)
         turning = -system.times(system.moment, middle)
         if not model.space and system.moment.nnz():
-            # Moments in the plane have a potential, that of the angle.  What their factor changes of the matrix is small
-            # as the angle of a step: it is left out.
+            # Moments in the plane have a potential, that of the angle.  What their factor changes of the matrix is as
+            # small as the angle of a step: it is left out.
             turning *= ca.vec(system.many(_share(), system.layout.rotations)(begin.q, q))
         gaps = system.open_gaps(y, end)
         entries, full, coupled = [], [], []

@@ -167,12 +167,9 @@ class Stages(Integrator):
         """Tolerance of steps, in the unit of length; each round has steps of about half the length."""
         order, stages = self._stepper.method.order, self._stepper.method.stages
         of_step = stages + 1 if stages > 1 else 3
-        first = (STRICT * course.accuracy) ** (of_step / order)
+        first = (self._stepper.method.gain * course.accuracy) ** (of_step / order)
         return float(course.size * first * 2.0 ** (-of_step * course.rounds))
 
 
 FIRST = 1e-3
 """First step that is tried, over the span."""
-
-STRICT = 5.0
-"""Steps are chosen for an error of this times the accuracy: a finer run follows."""
