@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from motions import FLAT, THICK, Flight, cantilever, changed, moved, tip
+from motions import FLAT, SMOOTH, THICK, Flight, cantilever, changed, moved, tip
+
+import sfetcas
 
 PLANE = cantilever()
 SPACE = cantilever(THICK, (0.5, 1.0, 1.5))
@@ -33,14 +35,7 @@ def test_order_in_time(reference, integrator):
 
 @pytest.mark.parametrize(
     ("table", "p", "counts"),
-    [
-        (PLANE, 1, (8, 16)),
-        (PLANE, 2, (4, 8)),
-        (PLANE, 3, (3, 6)),
-        (PLANE, 4, (2, 4)),
-        (SPACE, 2, (4, 8)),
-        (SPACE, 3, (3, 6)),
-    ],
+    [(PLANE, 1, (8, 16)), (PLANE, 2, (4, 8)), (PLANE, 3, (3, 6)), (PLANE, 4, (2, 4)), (SPACE, 2, (4, 8)), (SPACE, 3, (3, 6))],
 )
 def test_order_in_space(table, p, counts):
     def end(order, elements):
@@ -57,10 +52,7 @@ def test_order_in_space(table, p, counts):
 def thrown(space):
     """A free strip thrown with a spin that bends it."""
     if space:
-        nodes = {
-            "A": {"position": [0, 0, 0], "velocity": [0, 0.3, 1]},
-            "B": {"position": [1, 0, 0], "velocity": [0, 3, -1]},
-        }
+        nodes = {"A": {"position": [0, 0, 0], "velocity": [0, 0.3, 1]}, "B": {"position": [1, 0, 0], "velocity": [0, 3, -1]}}
         member = {"nodes": ["A", "B"], "section": "s", "spin": [2.0, 2.0, 2.7]}
     else:
         nodes = {"A": {"position": [0, 0], "velocity": [0, 0.3]}, "B": {"position": [1, 0]}}
@@ -93,19 +85,16 @@ def chain(space):
 
 
 def kept(flight, h, count):
-    """Largest change of the momenta and all energies over that at the begin, by the size of what there is."""
-    energies, momenta = [], []
+    """Changes of the energy over the largest kinetic one, and the largest ones of the momenta over that of its size."""
+    energies, momenta, kinetic = [], [], 0.0
     for memory in flight.steps(h, count):
         energies.append(flight.energy(memory))
         momenta.append(flight.momentum(memory))
+        kinetic = max(kinetic, flight.inertia.kinetic(memory.rates[0]))
     energies = np.array(energies)
     linear, angular = (np.array(part) for part in zip(*momenta, strict=True))
-    size = np.sqrt(2.0 * flight.inertia.kinetic(flight.memory.rates[0]))
-    return (
-        energies / energies[0] - 1.0,
-        np.abs(linear - linear[0]).max() / size,
-        np.abs(angular - angular[0]).max() / size,
-    )
+    apart = [np.abs(part - part[0]).max() / np.sqrt(2.0 * kinetic) for part in (linear, angular)]
+    return (energies - energies[0]) / kinetic, *apart
 
 
 FLIGHTS = [thrown(False), thrown(True), chain(False), chain(True)]
