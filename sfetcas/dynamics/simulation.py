@@ -16,13 +16,13 @@ from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
+from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
 from .inertia import Inertia
 from .integrating import Memory, Stepper, Taken, integrate
-from .masses import masses_of
 from .methods import GeneralisedAlpha, Method, Radau
 from .motion import Instant, Motion, Mover
 from .sampling import Sampler
