@@ -114,6 +114,7 @@ ORDER = [
     "dynamics.motion",
     "dynamics.simulation",
     "dynamics.small_motion",
+    "dynamics.matrices",
     "dynamics.modes",
     "paths",
     "paths.path",
