@@ -11,7 +11,7 @@ from sfetcas.dynamics.beginning import at_rest, velocities
 from sfetcas.dynamics.conserving import Conserving
 from sfetcas.dynamics.inertia import Inertia
 from sfetcas.dynamics.integrating import Memory, Stepper
-from sfetcas.dynamics.masses import masses_of
+from sfetcas.mechanics.masses import masses_of
 from sfetcas.dynamics.methods import GeneralisedAlpha, Radau
 from sfetcas.dynamics.stages import StageEquations
 from sfetcas.mechanics.equations import Equations, State

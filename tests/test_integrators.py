@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from motions import FLAT, SMOOTH, THICK, Flight, cantilever, changed, moved, tip
-
-import sfetcas
+from motions import FLAT, THICK, Flight, cantilever, changed, moved, tip
 
 PLANE = cantilever()
 SPACE = cantilever(THICK, (0.5, 1.0, 1.5))
@@ -35,7 +33,14 @@ def test_order_in_time(reference, integrator):
 
 @pytest.mark.parametrize(
     ("table", "p", "counts"),
-    [(PLANE, 1, (8, 16)), (PLANE, 2, (4, 8)), (PLANE, 3, (3, 6)), (PLANE, 4, (2, 4)), (SPACE, 2, (4, 8)), (SPACE, 3, (3, 6))],
+    [
+        (PLANE, 1, (8, 16)),
+        (PLANE, 2, (4, 8)),
+        (PLANE, 3, (3, 6)),
+        (PLANE, 4, (2, 4)),
+        (SPACE, 2, (4, 8)),
+        (SPACE, 3, (3, 6)),
+    ],
 )
 def test_order_in_space(table, p, counts):
     def end(order, elements):
@@ -52,7 +57,10 @@ def test_order_in_space(table, p, counts):
 def thrown(space):
     """A free strip thrown with a spin that bends it."""
     if space:
-        nodes = {"A": {"position": [0, 0, 0], "velocity": [0, 0.3, 1]}, "B": {"position": [1, 0, 0], "velocity": [0, 3, -1]}}
+        nodes = {
+            "A": {"position": [0, 0, 0], "velocity": [0, 0.3, 1]},
+            "B": {"position": [1, 0, 0], "velocity": [0, 3, -1]},
+        }
         member = {"nodes": ["A", "B"], "section": "s", "spin": [2.0, 2.0, 2.7]}
     else:
         nodes = {"A": {"position": [0, 0], "velocity": [0, 0.3]}, "B": {"position": [1, 0]}}

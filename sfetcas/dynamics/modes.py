@@ -33,6 +33,7 @@ from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
+from .matrices import Matrices, matrices_of
 from .small_motion import Eigenmotions, SmallMotion
 
 __all__ = ["Mode", "Modes", "find_modes", "prepared_for_motion", "put_on"]
@@ -142,6 +143,10 @@ class Modes:
     def damped(self) -> bool:
         """Whether motions fade or grow."""
         return not self.motion.plain or any(mode.damping for mode in self.modes)
+
+    def matrices(self) -> Matrices:
+        """Mass, damping, stiffness and constraints of the small motions, by name and in SI units."""
+        return matrices_of(self.motion)
 
     def values(self) -> dict[str, Any]:
         """What the answer says under ``modes``, but shapes."""
