@@ -188,7 +188,7 @@ class Analysis(Record):
                 raise SceneError(f"found {spacing:g} s, accepted: up to the span of {self.end:g} s", (key,))
         if self.step is not None and self.integrator == "idas":
             raise SceneError(
-                f"found {self.step:g} s with 'idas', whose steps are its own, accepted: left out", ("step",)
+                f"found {self.step:g} s with 'idas', which chooses its steps itself, accepted: without 'step', or another integrator", ("step",)
             )
         if self.output is not None and self.end > MOST_ANSWERS * self.output:
             found = f"found {self.output:g} s, which gives {self.end / self.output:.3g} answers"
