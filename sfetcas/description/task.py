@@ -187,9 +187,9 @@ class Analysis(Record):
             if spacing is not None and spacing > self.end:
                 raise SceneError(f"found {spacing:g} s, accepted: up to the span of {self.end:g} s", (key,))
         if self.step is not None and self.integrator == "idas":
-            raise SceneError(
-                f"found {self.step:g} s with 'idas', whose steps are its own, accepted: left out", ("step",)
-            )
+            accepted = "without 'step', or another integrator"
+            message = f"found {self.step:g} s with 'idas', which chooses its steps itself, accepted: {accepted}"
+            raise SceneError(message, ("step",))
         if self.output is not None and self.end > MOST_ANSWERS * self.output:
             found = f"found {self.output:g} s, which gives {self.end / self.output:.3g} answers"
             raise SceneError(f"{found}, accepted: at most {MOST_ANSWERS}", ("output",))

@@ -41,7 +41,7 @@ def of_unit_length(q: Array) -> tuple[Array, float]:
 
 
 def closed(equations: Equations, state: State, loading: Loading) -> tuple[State, float]:
-    """A state with its closings met, and the largest gap before; the matrix is factored where it is."""
+    """A state with its closings met, and the largest gap before; the matrix is factored there."""
     n = equations.unknowns
     if not equations.rows:
         return state, 0.0
@@ -51,10 +51,11 @@ def closed(equations: Equations, state: State, loading: Loading) -> tuple[State,
     for _ in range(ROUNDS):
         step = np.concatenate([shortest(equations, point.residual[n:]), np.zeros(equations.rows)])
         moved = equations.moved(state, step)
-        point = equations.at(moved, loading)
-        left = float(np.abs(point.residual[n:]).max())
+        there = equations.at(moved, loading)
+        left = float(np.abs(there.residual[n:]).max())
         # What no longer falls is rounding.
         if left >= gap:
             break
-        state, gap = moved, left
+        state, point, gap = moved, there, left
+    factor_closings(equations, point)
     return state, before
