@@ -162,7 +162,9 @@ class Stepper:
         last = memory.last
         assert last is not None
         if self.method.stages == 1:
-            velocity, _, acceleration = memory.rates
+            velocity = memory.rates[0]
+            mean = (velocity - last.begin.rates[0]) / last.h
+            acceleration = memory.rates[2] if self.method.kept > 1 else mean
             return np.asarray(memory.x + h * velocity + 0.5 * h * h * acceleration)
         nodes = np.array([0.0, *self.method.places])
         row = evaluation(nodes, 1.0 + h / last.h)[0]
