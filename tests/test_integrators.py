@@ -85,15 +85,16 @@ def chain(space):
 
 
 def kept(flight, h, count):
-    """Largest change of the momenta and all energies over that at the begin, by the size of what there is."""
-    energies, momenta = [], []
+    """Changes of the energy over the largest kinetic one, and the largest ones of the momenta over that of its size."""
+    energies, momenta, kinetic = [], [], 0.0
     for memory in flight.steps(h, count):
         energies.append(flight.energy(memory))
         momenta.append(flight.momentum(memory))
+        kinetic = max(kinetic, flight.inertia.kinetic(memory.rates[0]))
     energies = np.array(energies)
     linear, angular = (np.array(part) for part in zip(*momenta, strict=True))
-    size = np.sqrt(2.0 * flight.inertia.kinetic(flight.memory.rates[0]))
-    return energies / energies[0] - 1.0, np.abs(linear - linear[0]).max() / size, np.abs(angular - angular[0]).max() / size
+    apart = [np.abs(part - part[0]).max() / np.sqrt(2.0 * kinetic) for part in (linear, angular)]
+    return (energies - energies[0]) / kinetic, *apart
 
 
 FLIGHTS = [thrown(False), thrown(True), chain(False), chain(True)]

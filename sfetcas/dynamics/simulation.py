@@ -175,7 +175,7 @@ class _Simulation:
         for name, factor in zip(system.groups, stepper.factors(0.0), strict=True):
             loading = loading.plus(model.groups[name].scaled(float(factor)))
         state = equations.holding(state, loading)
-        rates, told = velocities(system, equations, state, equations.at(state, loading))
+        rates, told = velocities(system, equations, state)
         x, v = system.rates(state, stepper.factors(0.0), rates)
         kept = np.zeros((self.method.kept, len(x)))
         kept[0] = v
