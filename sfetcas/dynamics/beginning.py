@@ -13,7 +13,7 @@ from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mechanics.equations import Equations, Point, State
+from ..mechanics.equations import Equations, State
 from ..mechanics.fields import rotations_along
 from ..mechanics.model import Model
 from .stages import StageEquations
@@ -145,7 +145,7 @@ def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
 
 
 def velocities(
-    system: StageEquations, equations: Equations, state: State, point: Point
+    system: StageEquations, equations: Equations, state: State
 ) -> tuple[Array, tuple[str, ...]]:
     """Rates of all unknowns at the begin, and notes.
 
@@ -162,13 +162,13 @@ def velocities(
     if not len(wanted) or not np.abs(wanted).max():
         return rates, ()
     n, closings = equations.unknowns, equations.rows
+    # Without loads: theirs depend on what a rotation is measured by, and what is left open must not.
+    free = State(state.q, state.y, np.zeros(closings), state.wound)
     full = np.zeros((equations.total, equations.total))
-    full[equations.row, equations.column] = point.entries
+    full[equations.row, equations.column] = equations.at(free, model.loading(0.0).scaled(0.0)).entries
     stiffness = 0.5 * (full[:n, :n] + full[:n, :n].T)
     values, vectors = np.linalg.eigh(stiffness)
-    stiffness = (vectors * np.abs(values)) @ vectors.T
-    size = float(np.abs(stiffness).max())
-    weight = stiffness / size + OPEN * np.eye(n)
+    weight = (vectors * np.abs(values)) @ vectors.T + OPEN * np.eye(n)
     held = full[n:, :n]
     both = np.vstack([held, rows])
     right = np.concatenate([np.zeros(closings), wanted])
@@ -195,7 +195,7 @@ def velocities(
 
 
 OPEN = 1e-8
-"""Weight of turning and moving as such beside that of bending."""
+"""Weight of turning and moving as such beside that of bending, in the units of the model."""
 
 RANK = 1e-13
 """Singular values below this share of the largest are none."""

@@ -186,7 +186,7 @@ class _Simulation:
         equations, factors = system.equations, system.factors(0.0)
         loading = system.loading(factors)
         state = equations.holding(state, loading)
-        rates, told = velocities(system, equations, state, equations.at(state, loading))
+        rates, told = velocities(system, equations, state)
         return Begun(state, rates, *system.rates(state, factors, rates)), (*notes, *told)
 
     @property
