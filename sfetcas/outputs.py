@@ -1,0 +1,123 @@
+"""The files that a run writes: the answer as JSON, pictures, animations, files for ParaView; none half-written."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .description.scene import Scene
+from .errors import SceneError
+
+__all__ = ["Output", "outputs_of"]
+
+Writer = Callable[[Any, Path], Any]
+"""What writes an answer to a file."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file that an option of the command line asks for.
+
+    Attributes
+    ----------
+    option, path
+    writer : callable
+        Writes an answer to a path with the same ending.
+    """
+
+    option: str
+    path: Path
+    writer: Writer
+
+    def write(self, answer: Any) -> None:
+        """Write an answer.
+
+        Raises
+        ------
+        SceneError
+            It could not be written; what was there before is left.
+        """
+        _write(self.path, lambda path: self.writer(answer, path))
+
+
+def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
+    """What the options ask for, before anything is solved.
+
+    Raises
+    ------
+    SceneError
+        It cannot be written, or not of such a scene.
+    """
+    makers: dict[str, Callable[[Path, Scene], Writer]] = {"json": _json, "plot": _plot}
+    found: list[Output] = []
+    for key, maker in makers.items():
+        path = getattr(options, key)
+        if path is None:
+            continue
+        _check_writable(path)
+        if path.exists() and path.samefile(options.file):
+            raise SceneError(f"{path}: is the scene itself, accepted: another file")
+        for other in found:
+            if other.path.resolve() == path.resolve():
+                raise SceneError(f"{path}: found for {other.option} and for --{key}, accepted: two files")
+        found.append(Output(f"--{key}", path, maker(path, scene)))
+    return found
+
+
+def _json(path: Path, scene: Scene) -> Writer:
+    return lambda answer, there: there.write_text(json.dumps(answer.to_dict(), allow_nan=False) + "\n")
+
+
+def _plot(path: Path, scene: Scene) -> Writer:
+    # Matplotlib costs more than most solves: only a picture pays for it.
+    from .pictures.charts import save_chart
+    from .pictures.plotting import ENDINGS, save_picture
+
+    _check_ending(path, ENDINGS, "a picture")
+    return save_chart if scene.analysis.type == "path" else save_picture
+
+
+def _check_ending(path: Path, accepted: tuple[str, ...], kind: str) -> None:
+    if path.suffix.lower() not in accepted:
+        raise SceneError(f"{path}: found the ending {path.suffix!r} of {kind}, accepted: {', '.join(accepted)}")
+
+
+def _check_writable(path: Path) -> None:
+    try:
+        plain = not path.is_symlink() and (path.is_file() or not path.exists())
+        # What permissions say is not all: some folders take no files from anybody.
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except (OSError, ValueError):
+        plain = False
+    if not plain:
+        accepted = "a plain file in a folder that exists and can be written"
+        raise SceneError(f"{path}: cannot be written; accepted: {accepted}")
+
+
+def _write(path: Path, writer: Callable[[Path], Any]) -> None:
+    """Write beside the final name first, so that nothing half-written is ever seen."""
+    name = ""
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
+        os.close(handle)
+        writer(Path(name))
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except (OSError, ValueError, ArithmeticError) as error:
+        raise SceneError(f"{path}: could not be written: {error}") from None
+    finally:
+        if name:
+            Path(name).unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
