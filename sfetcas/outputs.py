@@ -77,15 +77,21 @@ def _json(path: Path, scene: Scene) -> Writer:
 def _plot(path: Path, scene: Scene) -> Writer:
     # Matplotlib costs more than most solves: only a picture pays for it.
     from .pictures.charts import save_chart
-    from .pictures.plotting import ENDINGS, save_picture
+    from .pictures.files import check_ending
+    from .pictures.motions import save_motion
+    from .pictures.plotting import save_picture
 
-    _check_ending(path, ENDINGS, "a picture")
-    return save_chart if scene.analysis.type == "path" else save_picture
+    _placed(path, lambda: check_ending(path))
+    writers: dict[str, Writer] = {"path": save_chart, "dynamic": save_motion}
+    return writers.get(scene.analysis.type, save_picture)
 
 
-def _check_ending(path: Path, accepted: tuple[str, ...], kind: str) -> None:
-    if path.suffix.lower() not in accepted:
-        raise SceneError(f"{path}: found the ending {path.suffix!r} of {kind}, accepted: {', '.join(accepted)}")
+def _placed(path: Path, check: Callable[[], object]) -> None:
+    """A check whose sentence begins with the file."""
+    try:
+        check()
+    except SceneError as error:
+        raise SceneError(str(error), (str(path),)) from None
 
 
 def _check_writable(path: Path) -> None:

@@ -120,9 +120,11 @@ ORDER = [
     "pictures.limits",
     "pictures.glyphs",
     "pictures.looks",
+    "pictures.files",
     "pictures.sheet",
     "pictures.plotting",
     "pictures.charts",
+    "pictures.motions",
     "analyses",
     "checks",
     "benchmark",
@@ -137,7 +139,7 @@ ORDER = [
 PROGRAMS = ("cli", "reports", "benchmark")
 """What is run and not imported: only these print."""
 
-PICTURES = ("pictures.sheet", "pictures.plotting", "pictures.charts")
+PICTURES = ("pictures.files", "pictures.sheet", "pictures.plotting", "pictures.charts", "pictures.motions")
 """What needs matplotlib, which a run pays for only when a picture is asked for."""
 
 
