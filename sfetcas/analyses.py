@@ -1,7 +1,8 @@
-"""What a scene asks for is what is done: statics, a path or modes."""
+"""What a scene asks for is what is done: statics, a path, modes or a motion."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +18,13 @@ from .paths import paths
 __all__ = ["solve"]
 
 
-def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Answer:
+def solve(
+    scene: Scene,
+    settings: Settings | None = None,
+    *,
+    progress: Callable[[float], object] | None = None,
+    **changes: Any,
+) -> Answer:
     """The answer of a scene, by the type of its analysis.
 
     Parameters
@@ -25,6 +32,9 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Ans
     scene : Scene
     settings : Settings, optional
         Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
+    progress : callable, optional
+        Of a motion: told the time reached, s, after each step.  Times start anew with each finer run; what it raises
+        ends the motion, and where that is KeyboardInterrupt the answers up to there are returned.
 
     Returns
     -------
@@ -45,7 +55,7 @@ def solve(scene: Scene, settings: Settings | None = None, **changes: Any) -> Ans
     """
     settings = replace(settings or Settings(), **changes)
     if scene.analysis.type == "dynamic":
-        return simulate(scene, settings, look_up)
+        return simulate(scene, settings, look_up, progress)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":

@@ -292,7 +292,7 @@ def test_half_a_character_is_no_json(scene, capsys):
 
 @pytest.mark.parametrize("out", ["/proc/answer.json", "n" * 300 + ".json", "/dev/null"])
 def test_places_that_take_no_file_are_refused_before_anything_is_solved(scene, capsys, monkeypatch, out):
-    monkeypatch.setattr("sfetcas.cli.solve", lambda *_: pytest.fail("solved"))
+    monkeypatch.setattr("sfetcas.cli.solve", lambda *_, **__: pytest.fail("solved"))
     assert main(["run", str(scene()), "--json", out]) == 2
     assert "cannot be written; accepted: a plain file" in capsys.readouterr().err
 
@@ -318,7 +318,7 @@ def test_answer_and_picture_are_two_files(scene, tmp_path, capsys):
 def test_a_mistake_of_the_program_is_told_as_one(scene, tmp_path, capsys, monkeypatch, error):
     """Neither an answer nor "no solution": a traceback, a sentence that asks to report it, a code of its own."""
 
-    def broken(*_):
+    def broken(*_, **__):
         raise error
 
     monkeypatch.setattr("sfetcas.cli.solve", broken)
@@ -333,7 +333,7 @@ def test_a_mistake_of_the_program_is_told_as_one(scene, tmp_path, capsys, monkey
 
 
 def test_a_mistake_while_a_scene_is_made_is_no_syntax_error(scene, capsys, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise ValueError("shapes do not fit")
 
     monkeypatch.setattr("sfetcas.description.scenefile.Scene.from_dict", broken)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scenes
 from motions import FLAT, cantilever, changed, moved
+from sfetcas.mechanics.masses import masses_of
 
 import sfetcas
 from sfetcas import Scene, SceneError, Settings, SolveError, Status, assemble, uniform_mesh
@@ -17,7 +18,6 @@ from sfetcas.dynamics import idas
 from sfetcas.dynamics.idas import _interrupts
 from sfetcas.dynamics.index_one import IndexOne
 from sfetcas.dynamics.inertia import Inertia
-from sfetcas.dynamics.masses import masses_of
 from sfetcas.dynamics.projecting import closed
 from sfetcas.dynamics.simulation import simulate
 from sfetcas.dynamics.stages import StageEquations

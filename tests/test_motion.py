@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from motions import FLAT, SMOOTH, THICK, cantilever, changed, moved, tip
 
-import sfetcas
 from sfetcas.mathematics import quaternion as quat
 
 SAME = 1e-10
@@ -63,14 +62,18 @@ def spatial():
             "two": {"nodes": ["B", "C"], "section": "s"},
             "three": {"nodes": ["C", "D"], "section": "s", "type": "rigid"},
         },
-        "springs": {"knee": {"node": "B", "stiffness": 2.0, "axis": [0.0, 1.0, 0.3], "between": ["one", "two"], "damping": 0.02}},
+        "springs": {
+            "knee": {"node": "B", "stiffness": 2.0, "axis": [0.0, 1.0, 0.3], "between": ["one", "two"], "damping": 0.02}
+        },
         "loads": {
             "push": {"type": "force", "node": "D", "value": [0.3, 1.0, -0.4], "history": "on"},
             "follow": {"type": "force", "node": "C", "value": [0.0, -0.3, 0.3], "frame": "follower", "history": "on"},
             "spread": {"type": "distributed", "member": "two", "value": [0.4, -0.7, 0.2], "history": "on"},
             "twist": {"type": "moment", "node": "C", "value": [0.1, 0.2, 0.4], "history": "on"},
         },
-        "motions": {"foot": {"node": "A", "displacement": [0.1, 0.2, 0.3], "rotation": [0.2, -0.3, 0.4], "history": "on"}},
+        "motions": {
+            "foot": {"node": "A", "displacement": [0.1, 0.2, 0.3], "rotation": [0.2, -0.3, 0.4], "history": "on"}
+        },
         "histories": {"on": SMOOTH},
     }
 

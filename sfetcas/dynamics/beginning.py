@@ -144,9 +144,7 @@ def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
 # -- velocities -------------------------------------------------------------------------------------------
 
 
-def velocities(
-    system: StageEquations, equations: Equations, state: State
-) -> tuple[Array, tuple[str, ...]]:
+def velocities(system: StageEquations, equations: Equations, state: State) -> tuple[Array, tuple[str, ...]]:
     """Rates of all unknowns at the begin, and notes.
 
     What is given holds; what is left open follows from the joints with the least rates of bending and turning.

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
@@ -19,18 +18,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..paths.path import Branch, Path
+from .files import DPI, check_ending, save_figure
 from .glyphs import sketch_holds
 from .looks import dashes_of
-from .sheet import DOTTED, DPI, Sheet, axes_on
+from .sheet import DOTTED, Sheet, axes_on, plot_line
 from .sketch import REST, Course, Sketch, course_of, view_of
 
-__all__ = ["ENDINGS", "chart", "save_chart"]
-
-ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
-"""Endings of the files that :func:`save_chart` writes."""
+__all__ = ["chart", "save_chart"]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
 STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-.", "not defined": ":"}
@@ -52,12 +48,10 @@ def save_chart(path: Path, file: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The ending is none of :data:`ENDINGS`.
+        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`.
     """
-    ending = File(file).suffix.lower()
-    if ending not in ENDINGS:
-        raise SceneError(f"found the ending {ending!r} of a picture, accepted: {', '.join(ENDINGS)}")
-    chart(path).savefig(file, dpi=DPI)
+    check_ending(file)
+    save_figure(chart(path), file)
 
 
 def chart(path: Path) -> Figure:
@@ -244,7 +238,7 @@ def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     handles, _ = axes.get_legend_handles_labels()
     place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, below)}
     paper.legend(handles=handles, fontsize=8, ncols=columns, frameon=False, **place)
-    Sheet(paper.figure, axes, paper, sketch).finish(loaded=False)
+    Sheet(paper.figure, axes, paper, sketch).finish()
 
 
 def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
@@ -258,5 +252,4 @@ def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
         looks.append((lines, shape.label, style))
     for lines, label, style in looks:
         for i, line in enumerate(lines):
-            seen = line if hasattr(axes, "get_zlim") else line[:, :2]
-            axes.plot(*seen.T, label=label if i == 0 else None, scalex=False, scaley=False, **style)
+            plot_line(axes, line, label=label if i == 0 else None, **style)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,15 +17,13 @@ from matplotlib.figure import Figure
 from ..description.records import say
 from ..equilibria.solution import Solution
 from ..errors import SceneError
+from .files import check_ending, save_figure
 from .glyphs import sketch_all
 from .looks import looks_of_equilibria, looks_of_steps, number_of
-from .sheet import DPI, Colour, sheet_of
+from .sheet import Colour, sheet_of
 from .sketch import Sketch, course_of, view_of
 
-__all__ = ["ENDINGS", "picture", "save_picture"]
-
-ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
-"""Endings of the files that :func:`save_picture` writes."""
+__all__ = ["picture", "save_picture"]
 
 COLOURS = ("moment", "magnitude", "none")
 MOST_STEPS = 40
@@ -39,14 +36,10 @@ def save_picture(solution: Solution, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The ending is none of :data:`ENDINGS`.
+        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`.
     """
-    ending = Path(path).suffix.lower()
-    if ending not in ENDINGS:
-        found = f"found the ending {ending!r}" if ending else "found no ending"
-        raise SceneError(f"{found} of a picture, accepted: {', '.join(ENDINGS)}")
-    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    picture(solution).savefig(path, dpi=DPI, metadata=dates.get(ending))
+    check_ending(path)
+    save_figure(picture(solution), path)
 
 
 def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: Colour = "moment") -> Figure:
@@ -83,7 +76,7 @@ def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: C
     several = solution.scene.analysis.equilibria == "all"
     looks = looks_of_equilibria(sketch, solution, numbers) if several else looks_of_steps(chosen)
     sheet = sheet_of(sketch, looks, colour)
-    sheet.finish()
+    sheet.finish(gravity=sketch.step.factor)
     return sheet.figure
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
@@ -28,6 +29,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # typ
 
 from ..description.structure import unit
 from ..mathematics.arrays import Array
+from .files import DPI
 from .sketch import (
     BEHIND,
     LOAD,
@@ -47,12 +49,12 @@ from .sketch import (
     thinned,
 )
 
-__all__ = ["DOTTED", "DPI", "Colour", "Sheet", "axes_on", "sheet_of"]
+__all__ = ["DOTTED", "Colour", "Sheet", "axes_on", "plot_line", "sheet_of", "title_of"]
 
 Colour = Literal["moment", "magnitude", "none"]
 DOTTED = (0, (1, 2))
 """Of the undeformed structure; dashes are for what is unstable."""
-WIDTH, HEIGHT, DPI = 7.0, 5.0, 150
+WIDTH, HEIGHT = 7.0, 5.0
 MANY = 14
 """Labels; of more than that, those with the same text as another are left out."""
 MOST_HIDDEN = 25.0
@@ -75,7 +77,7 @@ def sheet_of(sketch: Sketch, looks: Sequence[Look], colour: Colour) -> Sheet:
     lines, values = _add_lines(axes, sketch, looks)
     if values is not None:
         _add_bar(figure, paper, lines, values, sketch, colour)
-    title = _title(sketch.scene.title)
+    title = title_of(sketch.scene.title)
     if title:
         figure.suptitle(title, fontsize=11, parse_math=False)
     handles = _legend(sketch, looks)
@@ -94,7 +96,13 @@ def axes_on(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
     return paper
 
 
-def _title(text: str) -> str:
+def plot_line(axes: Any, line: Array, **style: Any) -> None:
+    """Draw a centre line (n, 3) in drawn units on axes that :func:`axes_on` made, whose limits stay."""
+    seen = line if hasattr(axes, "get_zlim") else line[:, :2]
+    axes.plot(*seen.T, scalex=False, scaley=False, **style)
+
+
+def title_of(text: str) -> str:
     """The title in up to three lines of about the same length; a white box for what the font does not have."""
     font = get_font(findfont(FontProperties()))
     known = " ".join("".join(c if c.isspace() or font.get_char_index(ord(c)) else "\ufffd" for c in text).split())
@@ -260,8 +268,8 @@ class Sheet:
     sketch: Sketch
     zoom: float = 1.0
 
-    def finish(self, *, loaded: bool = True) -> None:
-        """Fit the axes to all that is drawn, and draw it; ``loaded``: with gravity."""
+    def finish(self, *, gravity: float = 0.0) -> None:
+        """Fit the axes to all that is drawn, and draw it, with so many times the gravity."""
         for _ in range(4 if self.axes is self.paper else 6):
             self.figure.draw_without_rendering()
             self._fit()
@@ -275,9 +283,8 @@ class Sheet:
             self._fit()
             self.figure.draw_without_rendering()
         for mark in self.sketch.marks:
-            self._draw(mark)
-        gravity = self._gravity() if loaded else []
-        placed = self._placed(gravity)
+            self.draw(mark)
+        placed = self._placed(self._gravity(gravity))
         self._tell_left_out(len(self._labels()) - len(placed))
         for label, box in placed:
             self._write(box.centre, label.text, label.colour, label.name)
@@ -346,9 +353,10 @@ class Sheet:
         self.axes.set_box_aspect(limits @ [-0.5, 0.5], zoom=self.zoom)
         left, bottom, width, height = self.axes.get_position(original=True).bounds
         shift = (0.5 * (cell.min + cell.max - low - high)) / self.figure.bbox.size
-        self.axes.set_position((left + shift[0], bottom + shift[1], width, height))
         for axis in self._axes_in_space():
             self._space_out(axis)
+        # Last: up to the next drawing a new position is that of axes as wide as the figure.
+        self.axes.set_position((left + shift[0], bottom + shift[1], width, height))
 
     def _axes_in_space(self) -> tuple[Any, Any, Any]:
         return self.axes.xaxis, self.axes.yaxis, self.axes.zaxis
@@ -359,18 +367,19 @@ class Sheet:
         length, point = np.abs(line[1] - line[0]), self._point()
         width = 6.5 * max([4, *(len(label.get_text()) for label in self._tick_labels(axis))])
         # Labels along the axis are apart when they are either beside or above each other.
-        bins = min(6, max(1, int((length / (point * np.array([width + 10.0, 20.0]))).max())))
-        axis.set_major_locator(MaxNLocator(nbins=bins, steps=[1, 2, 2.5, 5, 10], min_n_ticks=min(2, bins)))
+        bins = min(6, max(2, int((length / (point * np.array([width + 10.0, 20.0]))).max())))
+        axis.set_major_locator(MaxNLocator(nbins=bins, steps=[1, 2, 2.5, 5, 10], min_n_ticks=2))
         off = self.axes.transData.transform(axis.label.get_position()) - line.mean(axis=0)
         across = np.abs(off) / norm(off)
-        tick = 5.0 + float(across @ [0.48 * width, 5.0])
+        tick = 5.0 + float(across @ [0.42 * width, 5.0])
         per_pad = norm(off) / (point * (axis.labelpad + 21.0))
         axis.set_tick_params(pad=tick / per_pad - 8.0)
-        axis.labelpad = (2.0 * tick + float(across @ [24.0, 8.0])) / per_pad - 21.0
+        axis.labelpad = (2.0 * tick + float(across @ [18.0, 8.0])) / per_pad - 21.0
 
     # -- marks ------------------------------------------------------------------------------------
 
-    def _draw(self, mark: Mark) -> None:
+    def draw(self, mark: Mark) -> Artist:
+        """Draw a mark; what it is in the figure."""
         if mark.level <= BEHIND and self.axes is not self.paper:
             return self._draw_behind(mark)
         points = self._projected(mark.points)
@@ -382,33 +391,37 @@ class Sheet:
         }
         if mark.kind == "area":
             patch = Polygon(points, facecolor=mark.fill, edgecolor=mark.colour, linewidth=mark.width, **style)
-            self.paper.add_patch(patch)
-        elif mark.kind == "arrow":
-            self.paper.add_patch(_arrow(points, mark, style))
-        else:
-            if mark.kind == "dot":
-                style |= {"marker": "o", "markersize": 5.5, "markerfacecolor": mark.fill}
-            line = Line2D(points[:, 0], points[:, 1], color=mark.colour, linewidth=mark.width, **style)
-            self.paper.add_line(line)
+            return self.paper.add_patch(patch)
+        if mark.kind == "arrow":
+            return self.paper.add_patch(_arrow(points, mark, style))
+        if mark.kind == "dot":
+            style |= {"marker": "o", "markersize": 5.5, "markerfacecolor": mark.fill}
+        line = Line2D(points[:, 0], points[:, 1], color=mark.colour, linewidth=mark.width, **style)
+        return self.paper.add_line(line)
 
-    def _draw_behind(self, mark: Mark) -> None:
+    def _draw_behind(self, mark: Mark) -> Artist:
         """Draw among the lines in space, which the paper is in front of."""
         style: dict[str, Any] = {"zorder": mark.level, "gid": mark.name, "clip_on": False, "linewidth": mark.width}
         if mark.kind == "area":
             area = Poly3DCollection([mark.points], facecolor=mark.fill, edgecolor=mark.colour, **style)
             self.axes.add_collection3d(area, autolim=False)
-        else:
-            self.axes.plot(*mark.points.T, color=mark.colour, **style)
+            return area
+        (line,) = self.axes.plot(*mark.points.T, color=mark.colour, **style)
+        return line
 
-    def _gravity(self) -> list[_Box]:
+    def _gravity(self, factor: float) -> list[_Box]:
         """Draw gravity in the corner that is the emptiest; what it covers."""
         gravity = self.sketch.scene.gravity
-        factor = self.sketch.step.factor
         if gravity is None or not any(gravity) or factor == 0.0:
             return []
         text, point = f"gravity {rounded(abs(factor) * norm(gravity)):g} m/s²", self._point()
         half = np.array([0.5 * _text_width(text) + 4.0, 28.0]) * point
-        box = min(self._corners(half), key=lambda corner: int(corner.holds(self._crowd()[0]).sum()))
+        crowd, writings = self._crowd()[0], self._writings()
+
+        def hidden(corner: _Box) -> int:
+            return int(corner.holds(crowd).sum()) + sum(len(crowd) * corner.meets(box) for box in writings)
+
+        box = min(self._corners(half), key=hidden)
         direction = flat_unit(self.sketch.view.flat(math.copysign(1.0, factor) * np.array(unit(gravity))), (0.0, -1.0))
         middle = box.centre + np.array([0.0, 7.0 * point])
         ends = np.array([middle - 17.0 * point * direction, middle + 17.0 * point * direction])

@@ -1,0 +1,294 @@
+"""What the command line prints of answers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .checks import Answer, Check
+from .description.records import counted
+from .dynamics.modes import Modes
+from .dynamics.motion import Instant, Motion
+from .equilibria.solution import Equilibrium
+from .mechanics.model import Model
+from .paths.path import Branch
+from .paths.path import Path as Course
+
+__all__ = ["flexible", "print_checks", "report"]
+
+WAYS = ("way out", "ways out")
+"""Negative eigenvalues in words."""
+
+MOST_NODES = 20
+"""Nodes in the printed report at most."""
+
+UNITS = {"moment": "N m", "force": "N"}
+"""Of what makes a motion."""
+
+
+def report(solution: Answer, seconds: float) -> None:
+    """Print an answer that took so many seconds, file and report included."""
+    model = solution.last.model
+    print(solution.scene.title or "untitled scene")
+    print(f"  {model.dimension}: {model.reason}")
+    print(f"  {flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
+    if isinstance(solution, Course):
+        _report_path(solution)
+    if isinstance(solution, Modes):
+        _report_modes(solution)
+    if isinstance(solution, Motion):
+        _report_motion(solution)
+    else:
+        for step, place in zip(solution.steps, _places(solution), strict=True):
+            _report_step(step, place)
+    split = ", ".join(f"{what} {spent:.3f} s" for what, spent in solution.seconds.items())
+    print(f"{solution.status.value} in {seconds:.3f} s ({split})")
+
+
+def _report_path(path: Course) -> None:
+    counts = {"limit point": 0, "bifurcation": 0}
+    for number, branch in enumerate(path.branches):
+        name = f"branch {number} at bifurcation {branch.bifurcation}, side {branch.side:+d}" if number else "path"
+        low, high = branch.factors.min(), branch.factors.max()
+        print(f"{name}: {counted(len(branch.points), 'point')}, factors {low:.6g} to {high:.6g}; {branch.end}")
+        for stable, first, last in branch.stretches():
+            # In contact the point where stability changes is not located: the last of its kind is that of a sample.
+            digits = 3 if path.scene.contacts else 9
+            ends = list(dict.fromkeys(f"{branch.points[i].factor:.{digits}g}" for i in (first, last)))
+            kind = {"True": "stable", "False": "unstable", "not defined": "stability not defined"}.get(
+                str(stable), "neutral"
+            )
+            where = f"from factor {ends[0]} to {ends[1]}" if len(ends) > 1 else f"at factor {ends[0]}"
+            if len(ends) == 1 and (first, last) == (0, len(branch.points) - 1):
+                # A closed branch ends where it begins.
+                where = "all along"
+            print(f"  {kind} {where}")
+        _report_events(branch, counts)
+    if path.error_estimate is not None:
+        print(f"  estimated error along it {path.error_estimate:.1e}")
+    for note in path.notes:
+        print(f"  note: {note}")
+
+
+def _report_motion(motion: Motion) -> None:
+    answers = counted(len(motion.steps), "answer")
+    print(f"  {motion.integrator}, {counted(motion.count, 'step')} in time, {answers} up to {motion.last.time:.9g} s")
+    ends = [motion.steps[0], motion.last] if len(motion.steps) > 1 else [motion.last]
+    for instant in ends:
+        _report_instant(instant)
+    if len(ends) > 1:
+        _report_course(motion)
+    worst = ", ".join(f"{kind} {value:.1e}" for kind, value in motion.violation.items())
+    error = motion.error_estimate
+    said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
+    print(f"  worst violation: {worst}; {said}")
+    for note in motion.notes:
+        print(f"  note: {note}")
+
+
+def _report_instant(instant: Instant) -> None:
+    print(f"at {instant.time:.9g} s")
+    for name in instant.model.nodes[:MOST_NODES]:
+        position, velocity = _vector(instant.position(name)), _vector(instant.velocity(name))
+        print(f"  node {name}: position {position} m, velocity {velocity} m/s")
+    _report_more_nodes(instant.model)
+    for name, node in instant.model.scene.nodes.items():
+        if node.support != "free":
+            force, moment = instant.reaction(name)
+            print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    energy = ", ".join(f"{kind} {value:.9g}" for kind, value in instant.energy.items())
+    print(f"  energy: {energy} N m")
+
+
+def _report_course(motion: Motion) -> None:
+    """What is largest over the answers, and what should stay as it is."""
+    print("over all answers")
+    _report_largest(motion)
+    total = motion.energies()
+    largest = float(motion.energies("kinetic").max())
+    print(
+        f"  total energy: from {total.min():.9g} to {total.max():.9g} N m, off its first value by at most "
+        f"{np.abs(total - total[0]).max():.1e} N m; largest kinetic energy {largest:.6g} N m"
+    )
+    if _floats(motion):
+        for kind, unit in (("linear", "kg m/s"), ("angular", "kg m2/s")):
+            values = np.array([step.momentum[kind] for step in motion.steps])
+            off = float(np.linalg.norm(values - values[0], axis=1).max())
+            print(f"  {kind} momentum: {_vector(values[0])} {unit} at first, off by at most {off:.1e}")
+
+
+def _report_largest(motion: Motion) -> None:
+    """Nodes that go the farthest and the fastest, and the largest reaction, with their times."""
+    nodes = motion.last.model.nodes
+    away = [np.linalg.norm(motion.positions(name) - motion.positions(name)[0], axis=1) for name in nodes]
+    speed = [np.linalg.norm(motion.velocities(name), axis=1) for name in nodes]
+    kinds = [("farthest from where it began", "node", nodes, away, "m"), ("fastest", "node", nodes, speed, "m/s")]
+    held = [name for name, node in motion.last.model.scene.nodes.items() if node.support != "free"]
+    forces = [np.array([np.linalg.norm(step.reaction(name)[0]) for step in motion.steps]) for name in held]
+    kinds += [("largest reaction", "at", tuple(held), forces, "N")] if held else []
+    for what, kind, names, values, unit in kinds:
+        table = np.array(values)
+        i, k = np.unravel_index(int(table.argmax()), table.shape)
+        if table[i, k] > 0.0:
+            print(f"  {what}: {kind} {names[i]}, {table[i, k]:.6g} {unit} at {motion.times[k]:.6g} s")
+
+
+def _floats(motion: Motion) -> bool:
+    """Whether nothing holds the structure while it moves."""
+    scene = motion.last.model.scene
+    grounded = any(
+        spring.to is None if spring.type == "translational" else not spring.between or "ground" in spring.between
+        for spring in scene.springs.values()
+    )
+    return not grounded and all(node.support == "free" for node in scene.nodes.values())
+
+
+def _report_more_nodes(model: Model) -> None:
+    if len(model.nodes) > MOST_NODES:
+        print(f"  ... and {counted(len(model.nodes) - MOST_NODES, 'more node')}, see --json")
+
+
+def _report_modes(modes: Modes) -> None:
+    estimate = f"estimated relative error {modes.error_estimate:.1e}"
+    print(f"{counted(len(modes.modes), 'mode')}, {counted(modes.rigid, 'rigid motion')} left out; {estimate}")
+    for number, mode in enumerate(modes.modes, start=1):
+        faded = f", damping ratio {mode.damping:.6g}" if modes.damped else ""
+        print(f"  mode {number}: {mode.omega:.9g} rad/s ({mode.omega / (2.0 * np.pi):.6g} Hz){faded}")
+    for rate in modes.growing:
+        print(f"  leaves the equilibrium at a rate of {rate:.9g} 1/s")
+    for note in modes.notes:
+        print(f"  note: {note}")
+
+
+def _report_events(branch: Branch, counts: dict[str, int]) -> None:
+    """Limit points and bifurcations of a branch, numbered on from those of the branches before, as in ``expect``."""
+    for kind, entries in (("limit point", branch.limit_points), ("bifurcation", branch.bifurcations)):
+        for entry in entries:
+            counts[kind] += 1
+            error = entry.certificate.error_estimate
+            said = "" if error is None else f", estimated error {error:.1e}"
+            ways = f", {counted(entry.certificate.negative, *WAYS)}" if entry.certificate.negative else ""
+            print(f"  {kind} {counts[kind]}: factor {entry.factor:.12g}{ways}{said}")
+            for note in entry.notes:
+                print(f"    note: {note}")
+
+
+def _places(solution: Answer) -> list[str]:
+    """Which of several equilibria of its factor each entry is, in words; empty where one was asked for."""
+    factors = [step.factor for step in solution.steps]
+    if isinstance(solution, Course):
+        named = [f", on branch {i}" if i else ", on the path" for i, b in enumerate(solution.branches) for _ in b.steps]
+        numbers = [factors[: i + 1].count(f) for i, f in enumerate(factors)]
+        several = len(solution.branches) > 1
+        return [
+            (f", crossing {number} of {factors.count(factor)}" if factors.count(factor) > 1 else "")
+            + (name if several else "")
+            for name, number, factor in zip(named, numbers, factors, strict=True)
+        ]
+    if solution.scene.analysis.equilibria == "one":
+        return [""] * len(factors)
+    return [f", equilibrium {factors[: i + 1].count(f)} of {factors.count(f)}" for i, f in enumerate(factors)]
+
+
+def _report_step(step: Equilibrium, place: str) -> None:
+    print(f"factor {step.factor:g}{place}")
+    for name in step.model.nodes[:MOST_NODES]:
+        angle = step.angle(name)
+        turned = f"  angle {angle:.9g} rad" if angle is not None else ""
+        print(f"  node {name}: position {_vector(step.position(name))} m{turned}")
+    _report_more_nodes(step.model)
+    for name, node in step.model.scene.nodes.items():
+        if node.support != "free":
+            force, moment = step.reaction(name)
+            print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    for name in step.model.scene.springs:
+        state = step.spring(name)
+        travel, *efforts = state.to_dict().items()
+        unit, unit_of_effort = ("rad", "N m") if state.rotational else ("m", "N")
+        told = [
+            f"{travel[0]} {travel[1]:.9g} {unit}",
+            *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts),
+        ]
+        print(f"  spring {name}: {', '.join(told)}")
+    for name in step.model.scene.motions:
+        told = [f"{key} {_effort(value)} {UNITS[key]}" for key, value in step.motion(name).items()]
+        print(f"  motion {name}: {', '.join(told)}")
+    for name, entry in step.contacts.items():
+        _report_contact(name, entry)
+    proof = step.certificate
+    error = proof.error_estimate
+    said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
+    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {said}")
+    for note in step.notes:
+        print(f"  note: {note}")
+
+
+def _kind(step: Equilibrium) -> str:
+    proof = step.certificate
+    if proof.stable == "not defined":
+        return "stability not defined, as loads have no potential"
+    kind = {"True": "stable", "False": f"unstable ({counted(proof.negative, *WAYS)})"}.get(str(proof.stable), "neutral")
+    return f"{kind}, smallest eigenvalue {proof.smallest:.4g} N" if np.isfinite(proof.smallest) else kind
+
+
+def _report_contact(name: str, entry: dict[str, Any]) -> None:
+    if entry["at"] is None:
+        print(f"  contact {name}: nothing touches it" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
+        return
+    several = isinstance(entry["member"], list)
+    for member, at, force in zip(
+        *(entry[k] if several else [entry[k]] for k in ("member", "at", "force")), strict=True
+    ):
+        lies = isinstance(at, list)
+        where = (
+            f"lies on it from {at[0]:.9g} to {at[1]:.9g}, force over this" if lies else f"touches it at {at:.9g}, force"
+        )
+        print(f"  contact {name}: {member} {where} {_vector(force)} N")
+
+
+def _effort(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else _vector(value)
+
+
+def _vector(values: Any) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.9g}" for value in values) + ")"
+
+
+def print_checks(checks: Sequence[Check]) -> None:
+    """Print comparisons as a table."""
+    if not checks:
+        return
+    head = ("quantity", "value", "reference", "error", "tolerance", "")
+    rows = [head, *(_row(c) for c in checks)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    for row in rows:
+        print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _row(c: Check) -> tuple[str, ...]:
+    expect = c.expect
+    place = "" if expect.at is None else f" at {expect.at:g}"
+    step = "" if expect.step is None else f" step {expect.step:g}"
+    step += "" if expect.time is None else f" time {expect.time:g}"
+    step += "" if expect.equilibrium is None else f" equilibrium {expect.equilibrium}"
+    for key in ("crossing", "limit_point", "bifurcation"):
+        number = getattr(expect, key)
+        step += "" if number is None else f" {key.replace('_', ' ')} {number}"
+    tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"
+    verdict = "ok" if c.passed else "FAILED"
+    return expect.quantity + place + step, _short(c.value), _short(expect.value), f"{c.error:.1e}", tolerance, verdict
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_short(entry) for entry in value) + "]"
+    return f"{value:.8g}" if isinstance(value, float) else str(value)
+
+
+def flexible(model: Model) -> str:
+    """The elements of flexible members: a rigid or small one is cut into none."""
+    cuts, members = model.mesh.cuts, model.scene.members
+    count = sum(len(cuts[name]) - 1 for name, member in members.items() if member.type == "flexible")
+    return f"{counted(count, 'element')} {model.element.name}" if count else "no flexible member"

@@ -1,0 +1,168 @@
+"""Pictures of motions: what is drawn is where the answer says, has a name and a unit, and nothing overlaps."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.text import Text
+from moving import FALLING, SPACE
+
+from sfetcas import Scene, SceneError, solve
+from sfetcas.pictures.files import ENDINGS
+from sfetcas.pictures.motions import histories, most_moving, motion_picture, save_histories, save_motion
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return {name: solve(Scene.from_dict(table)) for name, table in (("plane", FALLING), ("space", SPACE))}
+
+
+both = pytest.mark.parametrize("name", ["plane", "space"])
+
+
+def named(figure, name, kind=Line2D):
+    return [artist for artist in figure.findobj(kind) if artist.get_gid() == name]
+
+
+def data(line):
+    return np.stack(line.get_data_3d() if hasattr(line, "get_data_3d") else line.get_data(), axis=1)
+
+
+@both
+def test_positions_are_those_of_answers_evenly_over_the_time(motions, name):
+    motion = motions[name]
+    axes = 3 if motion.last.model.space else 2
+    lines = named(motion_picture(motion), "strobe")
+    members = list(motion.scene.members)
+    assert len(lines) == 10 * len(members)
+    wanted = np.linspace(0, motion.times[-1], 10)
+    for i, time in enumerate(wanted):
+        step = motion.at(time)
+        # Answers are 0.02 s apart: the nearest is drawn.
+        assert abs(step.time - time) <= 0.01 + 1e-12
+        for j, member in enumerate(members):
+            drawn = data(lines[i * len(members) + j])
+            for end, node in zip((0, -1), motion.scene.members[member].nodes, strict=True):
+                np.testing.assert_allclose(drawn[end], step.position(node)[:axes], atol=1e-12)
+    widths = [line.get_linewidth() for line in lines]
+    assert widths == sorted(widths)
+    assert widths[0] < widths[-1]
+    shades = [sum(line.get_color()[:3]) for line in lines[:: len(members)]]
+    assert shades == sorted(shades, reverse=True)
+
+
+def test_way_of_the_free_end_goes_through_all_answers(motions):
+    motion = motions["plane"]
+    figure = motion_picture(motion)
+    (way,) = named(figure, "way-B")
+    np.testing.assert_allclose(data(way), motion.positions("B")[:, :2], atol=1e-12)
+    assert [text.get_text() for text in named(figure, "way-B", Text)] == ["B"]
+    assert not named(figure, "way-A")
+
+
+@both
+def test_histories_and_energies_are_those_of_the_answer(motions, name):
+    motion = motions[name]
+    figure = motion_picture(motion)
+    above, below = (axes for axes in figure.axes if axes.get_ylabel().startswith(("position", "energy")))
+    node = "C" if name == "space" else "B"
+    assert most_moving(motion) == node
+    assert above.get_ylabel() == f"position of {node}, m"
+    assert below.get_ylabel() == "energy, N m"
+    assert below.get_xlabel() == "time, s"
+    for i, line in enumerate(above.get_lines()):
+        assert line.get_label() == "xyz"[i]
+        np.testing.assert_allclose(data(line), np.stack([motion.times, motion.positions(node)[:, i]], axis=1))
+    assert [line.get_label() for line in below.get_lines()] == ["kinetic", "elastic", "loads", "total"]
+    for line in below.get_lines():
+        np.testing.assert_allclose(data(line)[:, 1], motion.energies(line.get_label()))
+
+
+@both
+def test_supports_joints_and_gravity_are_drawn(motions, name):
+    figure = motion_picture(motions[name])
+    assert named(figure, "support-A")
+    assert len(named(figure, "joint-B")) == (name == "space")
+    # Gravity has no factor: at any time it is the whole.
+    assert [text.get_text() for text in named(figure, "gravity", Text)] == ["gravity 9.81 m/s²"]
+    assert len(named(figure, "gravity", FancyArrowPatch)) == 1
+
+
+def test_the_undeformed_scene_is_drawn_where_the_motion_begins_elsewhere(motions):
+    assert not named(motion_picture(motions["plane"]), "undeformed")
+    late = replace(motions["plane"], steps=motions["plane"].steps[8:])
+    (line,) = named(motion_picture(late), "undeformed")
+    np.testing.assert_allclose(data(line)[[0, -1]], [[0, 0], [1, 0]], atol=1e-12)
+
+
+def test_small_and_quick_motions_have_prefixes():
+    small = {
+        **FALLING,
+        "sections": {"strip": {"EI3": 1e-3, "rhoA": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [0.01, 0]}},
+        "analysis": {"type": "dynamic", "end": 0.02, "step": 0.001, "output": 0.002},
+    }
+    figure = motion_picture(solve(Scene.from_dict(small)))
+    labels = {axes.get_ylabel() for axes in figure.axes} | {axes.get_xlabel() for axes in figure.axes}
+    assert {"x, mm", "y, mm", "position of B, mm", "time, ms", "time of the position, ms"} <= labels
+    assert any(label.startswith("energy, ") and label.endswith("N m") and label != "energy, N m" for label in labels)
+
+
+@both
+@pytest.mark.parametrize("draw", [motion_picture, histories])
+def test_nothing_is_clipped_or_overlaps(motions, name, draw, monkeypatch):
+    figure, found, original = draw(motions[name]), [], Text.draw
+
+    def told(text, renderer):
+        if text.get_text() and text.get_visible():
+            found.append(text)
+        original(text, renderer)
+
+    monkeypatch.setattr(Text, "draw", told)
+    figure.draw_without_rendering()
+    boxes = [(text.get_text(), text.get_window_extent()) for text in found]
+    for text, box in boxes:
+        assert box.x0 >= 0, text
+        assert box.y0 >= 0, text
+        assert box.x1 <= figure.bbox.x1, text
+        assert box.y1 <= figure.bbox.y1, text
+    padded = [(text, box.padded(-1)) for text, box in boxes]
+    assert not [(a, b) for (a, one), (b, two) in itertools.combinations(padded, 2) if one.overlaps(two)]
+
+
+def test_a_single_answer_is_drawn_without_complaint(motions):
+    """As much as is known where a motion stops in its first step."""
+    motion = replace(motions["plane"], steps=motions["plane"].steps[:1])
+    figure = motion_picture(motion)
+    assert len(named(figure, "strobe")) == 1
+    figure.draw_without_rendering()
+
+
+def test_histories_of_nodes_by_name(motions):
+    motion = motions["space"]
+    figure = histories(motion, ["C", "B"])
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        f"{what} of {node}, {unit}" for node in "CB" for what, unit in (("position", "m"), ("velocity", "m/s"))
+    ]
+    lines = figure.axes[3].get_lines()
+    for i, line in enumerate(lines):
+        np.testing.assert_allclose(data(line)[:, 1], motion.velocities("B")[:, i])
+    with pytest.raises(SceneError, match="found node 'D'"):
+        histories(motion, ["D"])
+    with pytest.raises(SceneError, match="found none, accepted: names of nodes"):
+        histories(motion, [])
+
+
+@pytest.mark.parametrize("save", [save_motion, save_histories])
+@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
+def test_files(motions, tmp_path, save, ending):
+    path = tmp_path / f"out{ending}"
+    save(motions["plane"], path)
+    assert path.stat().st_size > 5000
+    with pytest.raises(SceneError, match=f"found the ending '.bmp' of a picture, accepted: {', '.join(ENDINGS)}"):
+        save(motions["plane"], tmp_path / "out.bmp")
+    with pytest.raises(SceneError, match="found no ending"):
+        save(motions["plane"], tmp_path / "out")
