@@ -10,12 +10,12 @@ from scenes import UNLIKE, arc_across, made, model_of, textbook
 import sfetcas
 from sfetcas import SceneError
 from sfetcas.description.matrices import rigid_motions
-from sfetcas.dynamics.body_points import points_of
-from sfetcas.dynamics.masses import masses_of
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics.bodies import body_of, own_axes, quadrature, shapes_along
 from sfetcas.mechanics.body_masses import body_mass, mass_of
+from sfetcas.mechanics.body_points import points_of
 from sfetcas.mechanics.connections import freedoms
+from sfetcas.mechanics.masses import masses_of
 
 END = np.array([0.8, 0.5, 0.3])
 LENGTH = float(np.linalg.norm(END))

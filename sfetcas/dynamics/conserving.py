@@ -30,8 +30,8 @@ from ..mathematics.interpolation import differentiation
 from ..mathematics.quaternion import product, turned
 from ..mechanics.elements import Element
 from ..mechanics.joints import Connection, Hinge, TurnSpring, name_of
+from ..mechanics.observed import Axes
 from .methods import Begin, Method
-from .observed import Axes
 from .stages import StageEquations
 
 __all__ = ["Conserving"]

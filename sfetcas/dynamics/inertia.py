@@ -10,12 +10,12 @@ from ..mathematics.arrays import Array
 from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
+from ..mechanics.body_points import BodyPoints
 from ..mechanics.equations import Equations, State
 from ..mechanics.joints import by_turning
 from ..mechanics.loading import Loading, carried
-from .body_points import BodyPoints
-from .masses import Observables
-from .observed import Axes
+from ..mechanics.masses import Observables
+from ..mechanics.observed import Axes
 from .stages import StageEquations
 
 __all__ = ["Inertia"]

@@ -18,6 +18,7 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations
+from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
@@ -25,7 +26,6 @@ from .conserving import Conserving
 from .idas import Idas
 from .inertia import Inertia
 from .integrators import Begun, Course, Integrator, Stages
-from .masses import masses_of
 from .methods import GeneralisedAlpha, Radau
 from .motion import Instant, Motion, Mover
 from .stages import StageEquations

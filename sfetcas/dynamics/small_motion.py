@@ -2,9 +2,9 @@
 
 The unknowns are those of :class:`~sfetcas.mechanics.equations.Equations`: rotation vectors about the fixed axes,
 displacements, multipliers.  With the Jacobian ``J`` of the quantities that carry mass (see
-:mod:`~sfetcas.dynamics.observed`) by the unknowns, ``K`` the Newton matrix at the equilibrium and ``G`` the rows,
+:mod:`~sfetcas.mechanics.observed`) by the unknowns, ``K`` the Newton matrix at the equilibrium and ``G`` the rows,
 
-    J^T m J x'' + J^T c J x' + K x + G^T mu = 0,      G x = 0.
+    J^T m J x'' + (J^T c J + J^T m 2 Omega x J) x' + K x + G^T mu = 0,      G x = 0.
 
 The mass matrix is singular (multipliers, and rotations without inertia, have none), which a shifted and inverted
 pencil bears: ``(K - s M)^-1 M`` on the constraints has the eigenvalues ``1 / (omega^2 - s)``.
@@ -22,11 +22,11 @@ from ..mathematics.arrays import Array, Index
 from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap, SparseSolver
 from ..mathematics.spectra import largest
-from ..mechanics.equations import Equations, Point, State
-from ..mechanics.fields import turned_tangents
+from ..mechanics.equations import Equations, Point, State, turned_tangents
 from ..mechanics.joints import by_turning
 from ..mechanics.loading import Loading
-from .masses import masses_of
+from ..mechanics.masses import masses_of
+from ..mechanics.spinning import vectors_of
 from .stages import StageEquations
 
 __all__ = ["Eigenmotions", "SmallMotion"]
@@ -93,8 +93,9 @@ class SmallMotion:
         self._system = StageEquations(equations, self.masses, "interpreted")
         self.unknowns = equations.unknowns
         jacobian = self._jacobian()
-        self.mass = _symmetric(jacobian, self._weights("mass"))
-        self.damping = _symmetric(jacobian, self._weights("damping"))
+        self.mass = _sandwich(jacobian, self._weights("mass"))
+        self.damping = _sandwich(jacobian, self._weights("damping"))
+        self.gyroscopic = self._gyroscopic(jacobian)
 
     # -- matrices -------------------------------------------------------------------------------
 
@@ -106,7 +107,7 @@ class SmallMotion:
     @property
     def plain(self) -> bool:
         """Whether squares of frequencies are eigenvalues: nothing depends on velocities."""
-        return not len(self.damping.value)
+        return not len(self.damping.value) and not len(self.gyroscopic.value)
 
     @functools.cached_property
     def stiffness(self) -> SparseMap:
@@ -128,7 +129,7 @@ class SmallMotion:
         """Quantities by unknowns."""
         system, model, axes = self._system, self.model, self.model.element.axes
         q = self.state.q
-        turned = turned_tangents(self.equations, self.state).reshape(-1, axes)
+        turned = turned_tangents(model, q).reshape(-1, axes)
         # The derivative of a turned vector by a rotation vector is the cross product with it.
         if model.space:
             x, y, z = turned.T
@@ -175,6 +176,24 @@ class SmallMotion:
         own = [getattr(group, what).ravel() for group in self.masses.observables]
         linear = system.mass if what == "mass" else system.drag
         return ca.sparsify(ca.diagcat(linear, *[ca.diag(ca.DM(part)) for part in own]))
+
+    def _gyroscopic(self, jacobian: ca.DM) -> SparseMap:
+        """Coriolis forces ``J^T m 2 Omega x J`` by velocities, in turning axes."""
+        spinning = self.model.spinning
+        if spinning is None:
+            return SparseMap(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0), (self.unknowns, self.unknowns))
+        x, y, z = 2.0 * spinning.omega
+        axes = self.model.element.axes
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])[:axes, :axes]
+        crosses = [_repeated(cross, self._system.linear // axes)]
+        for group in self.masses.observables:
+            # Behind the vectors there may be numbers, which nothing turns.
+            own = np.zeros((group.kind.sizes[2],) * 2)
+            turning = axes * vectors_of(group)
+            own[:turning, :turning] = np.kron(np.eye(vectors_of(group)), cross)
+            crosses.append(_repeated(own, len(group.data)))
+        weights = ca.mtimes(self._weights("mass"), ca.diagcat(*crosses))
+        return _sandwich(jacobian, weights, -1.0)
 
     # -- eigenvalues ----------------------------------------------------------------------------
 
@@ -228,7 +247,12 @@ class SmallMotion:
 
         def apply(block: Array) -> Array:
             f, g = block[:n], block[n:]
-            moved = _times(self.damping, f) + shift * _times(self.mass, f) + _times(self.mass, g)
+            moved = (
+                _times(self.damping, f)
+                + _times(self.gyroscopic, f)
+                + shift * _times(self.mass, f)
+                + _times(self.mass, g)
+            )
             x = -self._solved(moved)
             return np.concatenate([x, f + shift * x])
 
@@ -238,8 +262,10 @@ class SmallMotion:
             size = np.abs(exponents)
             waves = np.flatnonzero((exponents.imag > WAVES * size) & (size > NOTHING))
             waves = waves[np.argsort(size[waves], kind="stable")][:count]
-            alone = (size <= NOTHING) | ((np.abs(exponents.imag) <= WAVES * size) & (exponents.real > 0.0))
-            picked = np.concatenate([waves, np.flatnonzero(alone)[: unstable + MOST_FREE]])
+            still = np.flatnonzero(size <= NOTHING)[:MOST_FREE]
+            grows = (size > NOTHING) & (np.abs(exponents.imag) <= WAVES * size) & (exponents.real > 0.0)
+            grows = np.flatnonzero(grows)[np.argsort(size[grows], kind="stable")][:unstable]
+            picked = np.concatenate([waves, still, grows])
             return picked, len(waves) == count
 
         inverse, vectors = largest(apply, 2 * n, count + unstable, pick=pick)
@@ -290,19 +316,22 @@ class SmallMotion:
                 (equations.row, equations.column),
                 (self.mass.row, self.mass.column),
                 (self.damping.row, self.damping.column),
+                (self.gyroscopic.row, self.gyroscopic.column),
             )
         ]
         places = np.unique(np.concatenate(flat))
         row, column = places % total, places // total
-        values = (self.point.entries, self.mass.value, self.damping.value)
+        values = (self.point.entries, self.mass.value, self.damping.value, self.gyroscopic.value)
         found = []
         for part, value in zip(flat, values, strict=True):
             entries = np.zeros(len(places))
             entries[np.searchsorted(places, part)] = value
             found.append(entries)
         self._inside = np.flatnonzero((row < self.unknowns) & (column < self.unknowns))
-        solver = SparseSolver(total, row, column, equations.rows, symmetric=self.symmetric)
-        return (solver, np.flatnonzero(row == column)), found[0], found[1], found[2]
+        solver = SparseSolver(
+            total, row, column, equations.rows, symmetric=self.symmetric and self.model.spinning is None
+        )
+        return (solver, np.flatnonzero(row == column)), found[0], found[1], found[2] + found[3]
 
 
 ATTEMPTS = 6
@@ -314,7 +343,7 @@ VANISHING = 1e-13
 SLOW = 1e-9
 """Imaginary parts below this share of a square of a frequency are rounding."""
 
-WAVES = 1e-5
+WAVES = 1e-3
 """Share of an exponent that its imaginary part has to be: exponents crowd where damping stops all waves."""
 
 NOTHING = 1e-4
@@ -373,9 +402,14 @@ def _sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> 
     return ca.DM.triplet(np.ravel(row).tolist(), np.ravel(column).tolist(), ca.DM(np.ravel(value)), *shape)
 
 
-def _symmetric(jacobian: ca.DM, weights: ca.DM) -> SparseMap:
-    """``J^T m J``, exactly symmetric."""
+def _repeated(matrix: Array, count: int) -> ca.DM:
+    """A block diagonal matrix of equal blocks."""
+    return ca.kron(ca.DM.eye(count), ca.sparsify(ca.DM(matrix)))
+
+
+def _sandwich(jacobian: ca.DM, weights: ca.DM, sign: float = 1.0) -> SparseMap:
+    """``J^T m J``, exactly symmetric, or skew with the sign -1."""
     found = ca.mtimes(jacobian.T, ca.mtimes(weights, jacobian))
     row, column = (np.array(part, dtype=np.intp) for part in found.sparsity().get_triplet())
     value = 0.5 * np.array(found.nonzeros())
-    return SparseMap(np.append(row, column), np.append(column, row), np.append(value, value), found.shape)
+    return SparseMap(np.append(row, column), np.append(column, row), np.append(value, sign * value), found.shape)

@@ -1,7 +1,7 @@
 """The equations of motion at the stages of a time step, and one Newton iteration of them, as CasADi Functions.
 
 At each stage the equations are those of statics, with the same kernels, plus inertia and damping forces as further
-loads: ``M X'' + C X'`` of the quantities ``X`` (see :mod:`~sfetcas.dynamics.observed`).  A method of integration says
+loads: ``M X'' + C X'`` of the quantities ``X`` (see :mod:`~sfetcas.mechanics.observed`).  A method of integration says
 how rates at its stages depend on the quantities there,
 
     X'_i = sum_j C_ij (X_j - X_0) + v_i,      X''_i = sum_j B_ij (X_j - X_0) + a_i,
@@ -33,8 +33,8 @@ from ..mechanics.elements import Element
 from ..mechanics.equations import Equations, State
 from ..mechanics.joints import Connection, by_turning, name_of
 from ..mechanics.loading import Loading
+from ..mechanics.masses import Masses, Observables
 from ..mechanics.rotations import Turn
-from .masses import Masses, Observables
 
 __all__ = ["Layout", "StageEquations", "moved_by"]
 

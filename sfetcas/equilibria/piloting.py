@@ -181,8 +181,8 @@ class Piloting(Meshing):
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
             return self._grown_from_bent(pilot, factor)
-        if self.scene.histories and factor != 0.0:
-            # With histories the way leads through the factors, after the loads of factor 0 have grown.
+        if model.loaded_at_zero and factor != 0.0:
+            # Then the way leads through the factors, after the loads of factor 0 have grown.
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None)
             if first is None:
                 return None

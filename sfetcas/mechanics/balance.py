@@ -66,7 +66,7 @@ class Balance:
         end_forces: Sequence[Array],
         places: Array,
     ) -> None:
-        self.model, self._state, self._loading = equations.model, state, equations.effective(state, loading)
+        self.model, self._state, self._loading = equations.model, state, equations.acting(state, loading)
         self._moments, self._links = equations.shares(state, loading)
         self._start_forces, self._end_forces, self._places = start_forces, end_forces, places
         self._turns = equations.model.element.turns

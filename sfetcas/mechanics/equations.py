@@ -26,9 +26,10 @@ from .loading import Loading
 from .model import Model
 from .rotations import Turn
 from .segments import Segment
+from .spinning import SPUN, SpunPair, SpunVectors
 from .work import Work
 
-__all__ = ["Equations", "Point", "State"]
+__all__ = ["Equations", "Point", "State", "turned_tangents"]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -339,7 +340,7 @@ class Equations:
         links : list of ndarray (n, width)
             For each group of connections moments on its rotations, then forces on its places.
         """
-        model, loading = self.model, self.effective(state, loading)
+        model, loading = self.model, self.acting(state, loading)
         self._kernel.set(0, state.q[model.rotations.turns])
         constant = self.segment_pulls(state.lam, loading)[self._owner]
         self._kernel.set(3, loading.pull + constant[:, None, :])
@@ -348,7 +349,10 @@ class Equations:
         three = np.zeros((len(moments), len(model.element.nodes), 3))
         three[:, :, 3 - model.element.turns :] = moments.reshape(three.shape[0], three.shape[1], model.element.turns)
         pairs = zip(self._linked, loading.loads, strict=True)
-        return three, [link.evaluated(self, state, nodal, load)[3].copy() for link, load in pairs]
+        links = [link.evaluated(self, state, nodal, load)[3].copy() for link, load in pairs]
+        # What turning axes do is among the loads.
+        spun = [isinstance(link.group.kind, SPUN) for link in self._linked]
+        return three, [np.zeros_like(part) if skip else part for part, skip in zip(links, spun, strict=True)]
 
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
@@ -402,6 +406,22 @@ class Equations:
     def effective(self, state: State, loading: Loading) -> Loading:
         """The loading with what follows the state as it is there."""
         return loading if self.model.has_potential else self._work.effective(state.q, loading)
+
+    def acting(self, state: State, loading: Loading) -> Loading:
+        """The effective loading, with the centrifugal forces in turning axes."""
+        loading, spinning = self.effective(state, loading), self.model.spinning
+        if spinning is None:
+            return loading
+        q, places = state.q, self.places(state, loading)
+        u = places.reshape(len(self.model.segments.places), -1)
+        axes, pairs = self.model.element.axes, zip(self._linked, loading.loads, strict=True)
+        matrix = next(load[0] for link, load in pairs if isinstance(link.group.kind, SpunPair)).reshape(axes, axes)
+        found = loading.plus(spinning.positional(self.model, u, turned_tangents(self.model, q), matrix))
+        moment, force = found.moment.copy(), np.zeros_like(found.force)
+        for link, load in zip(self._linked, loading.loads, strict=True):
+            if isinstance(link.group.kind, SpunVectors):
+                link.add_forces(-link.evaluated(self, state, places, load)[3], moment, force)
+        return replace(found, moment=moment, force=found.force + force, own=found.own + force)
 
     def _on_unknowns(self, moments: Array) -> Array:
         """Moments about the fixed axes (rotations, 3) on the turning unknowns."""
@@ -477,6 +497,18 @@ class Equations:
         return State(q, y, state.lam + step[self.unknowns :], wound)
 
 
+def turned_tangents(model: Model, q: Array) -> Array:
+    """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
+    element, q = model.element, q[model.rotations.turns]
+    if element.gauss:
+        q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)
+    if model.space:
+        return quaternion.rotate(q / np.linalg.norm(q, axis=-1, keepdims=True), model.beams.tangent)
+    c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
+    t = model.beams.tangent
+    return np.stack([c * t[..., 0] - s * t[..., 1], s * t[..., 0] + c * t[..., 1]], axis=-1)
+
+
 class _Linked:
     """The connections of one group in the unknowns of the equations."""
 
@@ -534,6 +566,18 @@ class _Linked:
         residual[equations.unknowns + rows.start : equations.unknowns + rows.stop] = gaps.ravel()
         parts = [stiffness.ravel(), spin.ravel(), spin.ravel()]
         return float(energy.sum()), float(stored.sum()), parts
+
+    def add_forces(self, forces: Array, moments: Array, on_places: Array) -> None:
+        """Add moments and forces (n, width) on the sides to those of rotations (rotations, 3) and places, in place."""
+        group, axes = self.group, on_places.shape[1]
+        width = (forces.shape[1] - axes * group.places.shape[1]) // max(group.turns.shape[1], 1)
+        for i, turns in enumerate(group.turns.T):
+            used = turns >= 0
+            np.add.at(moments[:, 3 - width :], turns[used], forces[used, i * width : (i + 1) * width])
+        first = forces.shape[1] - axes * group.places.shape[1]
+        for i, places in enumerate(group.places.T):
+            used = places >= 0
+            np.add.at(on_places, places[used], forces[used, first + i * axes : first + (i + 1) * axes])
 
     def evaluated(self, equations: Equations, state: State, places: Array, load: Array) -> list[Array]:
         """Results of :func:`~sfetcas.mechanics.joints.by_turning` at a state."""

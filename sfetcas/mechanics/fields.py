@@ -18,11 +18,11 @@ from ..mathematics.arrays import Array
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .contact_joints import OnPlane, OnRound
-from .equations import Equations, State
+from .equations import Equations, State, turned_tangents
 from .loading import Loading
 from .mesh import Touch
 
-__all__ = ["Fields", "rotations_along", "transferred", "turned_tangents"]
+__all__ = ["Fields", "rotations_along", "transferred"]
 
 
 class Fields:
@@ -30,11 +30,11 @@ class Fields:
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
         self.model, self.state, self._applied = equations.model, state, loading
-        self._loading = loading = equations.effective(state, loading)
+        self._loading = loading = equations.acting(state, loading)
         self._equations = equations
         self.q = state.q
         model = self.model
-        self.turned = turned_tangents(equations, state)
+        self.turned = turned_tangents(model, state.q)
         reach = self.turned.sum(axis=1)
         nodal, _ = equations.displacements(state, loading, reach)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
@@ -445,6 +445,8 @@ class Fields:
             gains[:-1] -= self._loading.jump[part][1:]
         else:
             gains[:-1] -= self._loading.moment[chain[1:, 0]]
+            # Section axes that have inertia give moments to all nodes.
+            gains -= self._loading.moment[chain[:, 1:-1]].sum(axis=1)
         moments = -self.balance.start_moment(member) + np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
         if any(touch.to is not None for touch in model.mesh.touches):
             # An obstacle along a stretch gives couples that no loading knows: the elements say what reaches them.
@@ -467,19 +469,6 @@ def _per_place(xi: Array, rows: Any) -> Array:
 def _cross(a: Array, b: Array) -> Array:
     """Cross products of vectors in the plane or in space, (..., 3)."""
     return np.cross(_three(a), _three(b))
-
-
-def turned_tangents(equations: Equations, state: State) -> Array:
-    """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
-    model, element = equations.model, equations.model.element
-    q = state.q[model.rotations.turns]
-    if element.gauss:
-        q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)
-    if model.space:
-        return quaternion.rotate(q / np.linalg.norm(q, axis=-1, keepdims=True), model.beams.tangent)
-    c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
-    t = model.beams.tangent
-    return np.stack([c * t[..., 0] - s * t[..., 1], s * t[..., 0] + c * t[..., 1]], axis=-1)
 
 
 def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -28,6 +28,7 @@ from .positions import Positions, entries, place_nodes
 from .pressure import is_pressure
 from .rotations import Rotations, Turn, number_rotations
 from .segments import Segments, cut_members
+from .spinning import Spinning, with_spinning
 from .winding import Winding, winding_of
 
 __all__ = ["Block", "Model", "assemble"]
@@ -64,6 +65,8 @@ class Model:
         Where forces act that turn with what they act on.
     groups : mapping
         Loadings of factor 1, by history.
+    spinning : Spinning or None
+        What turning axes do.
     """
 
     scene: Scene
@@ -78,6 +81,7 @@ class Model:
     connections: tuple[Group, ...]
     followers: Followers
     groups: Mapping[str | None, Loading]
+    spinning: Spinning | None = None
 
     @property
     def space(self) -> bool:
@@ -131,6 +135,11 @@ class Model:
     def conservative(self) -> bool:
         """Whether there is an energy: the loads have a potential, or what follows is pressure, which has one too."""
         return self.has_potential or is_pressure(self.scene)
+
+    @property
+    def loaded_at_zero(self) -> bool:
+        """Whether there may be loads at factor 0: those of histories, and of turning axes."""
+        return bool(self.scene.histories) or self.spinning is not None
 
     @functools.cached_property
     def minimisable(self) -> bool:
@@ -191,6 +200,8 @@ class Model:
         """Loads and motions at a load factor, all of them times ``share``."""
         parts = [self.groups[name].scaled(share * value) for name, value in self.factors(factor).items()]
         total = parts[0]
+        if self.spinning is not None:
+            parts.append(self.spinning.loading.scaled(share))
         for part in parts[1:]:
             total = total.plus(part)
         return total
@@ -224,13 +235,16 @@ def assemble(
         Element order, integration and cuts of each member.
     assembly : str
         ``closing`` (unknowns are rotations only), ``nodal`` (and displacements of macro-nodes), or ``auto``: the
-        one whose stationarity equations have fewer entries.
+        one whose stationarity equations have fewer entries.  In turning axes it is ``nodal``, with a place at every
+        cut, as masses need.
 
     Raises
     ------
     SceneError
         A moment on a node that nothing turns with.
     """
+    if scene.rotating is not None:
+        mesh, assembly = replace(mesh, places=True), "nodal"
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
     scales, rotations = scales_of(scene), number_rotations(scene, mesh, element)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
@@ -242,7 +256,7 @@ def assemble(
         assembly = "closing" if closing <= nodal else "nodal"
     connections = connect(scene, mesh, segments, rotations, element, scales)
     followers = find_followers(scene, mesh, element, segments, rotations)
-    return Model(
+    model = Model(
         scene=scene,
         mesh=mesh,
         element=element,
@@ -256,6 +270,7 @@ def assemble(
         followers=followers,
         groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections, followers),
     )
+    return model if scene.rotating is None else with_spinning(model)
 
 
 def _blocks(model: Model) -> tuple[Block, ...]:

@@ -133,6 +133,8 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             parts.append(Segment(name, slice(begin + a, begin + b), here, there))
             here = there
         begin += len(cuts) - 1
+    # Turning axes act upon all that has mass.
+    kept |= set(scene.nodes) if scene.rotating is not None else set()
     kept |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)

@@ -58,7 +58,7 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
     if prepared.diagnosis.mobility and model.minimisable:
         note = f"without loads it is a mechanism: the path starts at factor {beside:g}"
         return _bent(prepared, beside), beside, (note,)
-    if not model.scene.histories:
+    if not model.loaded_at_zero:
         return prepared.correct(state, model.loading(0.0)).state, 0.0, ()
     grown = follow(prepared, lambda t: model.loading(0.0, t), state)
     if not grown.reached:

@@ -28,9 +28,9 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mechanics.body_masses import SMALLEST, BodyMass
-from ..mechanics.connections import freedoms
-from ..mechanics.joints import Body, Connection, Side
+from .body_masses import SMALLEST, BodyMass
+from .connections import freedoms
+from .joints import Body, Connection, Side
 
 __all__ = ["BodyPoints", "points_of"]
 

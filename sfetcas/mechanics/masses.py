@@ -2,7 +2,7 @@
 
 Masses of flexible members are lumped at the nodes of their elements (Lobatto quadrature: diagonal, constant, and as
 accurate as the elements); a rigid member has its own consistent mass between its ends, which is exact; a small one
-that of a few points which move with it (see :mod:`~sfetcas.dynamics.body_points`).
+that of a few points which move with it (see :mod:`~sfetcas.mechanics.body_points`).
 
 The unit of time is that in which the whole mass is one: ``sqrt(mass length^2 / moment)`` of the units of the model.
 """
@@ -10,6 +10,7 @@ The unit of time is that in which the whole mass is one: ``sqrt(mass length^2 / 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,9 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from ..mathematics.interpolation import differentiation, lobatto
 from ..mathematics.linear import SparseMap
-from ..mechanics.body_masses import BodyMass, body_mass, euler_weights
-from ..mechanics.joints import Connection, LineSpring, Spring, TurnSpring
-from ..mechanics.model import Model
+from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
+from .joints import Connection, LineSpring, Spring, TurnSpring
 from .observed import Axes, Gap, SpringAngle, Strains, Travel
 
 __all__ = ["Masses", "Observables", "masses_of"]
@@ -81,8 +81,8 @@ class Masses:
     observables: tuple[Observables, ...]
 
 
-def masses_of(model: Model) -> Masses:
-    """The masses of a model whose mesh has a place at every cut.
+def masses_of(model: Any) -> Masses:
+    """The masses of a model (:class:`~sfetcas.mechanics.model.Model`) whose mesh has a place at every cut.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def masses_of(model: Model) -> Masses:
 class _Weigher:
     """Collects the masses, in SI units."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Any) -> None:
         self.model, self.scene = model, model.scene
         self.space, self.axes = model.space, model.element.axes
         count = len(model.segments.places)

@@ -21,7 +21,7 @@ from typing import final
 
 import casadi as ca
 
-from ..mechanics.joints import Connection, Side, Turning
+from .joints import Connection, Side, Turning
 
 __all__ = ["Axes", "Gap", "SpringAngle", "Strains", "Travel"]
 

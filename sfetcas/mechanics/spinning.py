@@ -1,0 +1,246 @@
+"""Turning axes: the potential of the centrifugal forces on all that has mass, and these forces.
+
+In axes that turn with ``Omega`` about the origin rest is an equilibrium of the loads and of the centrifugal forces,
+
+    V = -1/2 sum m |Omega x r|^2 = -1/2 sum m r.P r,      P = Omega.Omega 1 - Omega Omega^T,
+
+over everything that carries mass: places and inner nodes of elements, section axes, points of small members.  Their
+potentials are connections like those of springs, so that statics, paths and stability know of them; they do not
+grow with the load factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array, Index
+from .body_points import BodyPoints
+from .connections import Group
+from .joints import Connection, Side
+from .loading import Loading, carried
+from .masses import Masses, Observables, masses_of
+from .observed import Axes
+
+__all__ = ["SPUN", "Spinning", "SpunInner", "SpunPair", "SpunVectors", "vectors_of", "with_spinning"]
+
+
+def _matrix(load: ca.SX, axes: int) -> ca.SX:
+    """The matrix P, which is the load: it grows with the loads where these are followed from zero."""
+    return ca.reshape(load, axes, axes)
+
+
+@final
+@dataclass(frozen=True)
+class SpunPair(Connection):
+    """A mass between two places, or at one that is named twice; data: both at rest, mass; load: P."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Two places."""
+        return 0, 2, 0, 2 * self.axes + 1, self.axes**2
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Minus half the mass times a product of the two positions."""
+        n = self.axes
+        a, b = (data[n * i : n * i + n] + ca.vertcat(*u[i]) for i in range(2))
+        return -0.5 * data[2 * n] * ca.dot(a, ca.mtimes(_matrix(load, n), b))
+
+
+@final
+@dataclass(frozen=True)
+class SpunInner(Connection):
+    """Inner nodes of an element, which hang on its start; data: of each node its place at rest, mass and arms, then
+    the tangents of all nodes; load: P.
+
+    Attributes
+    ----------
+    nodes : int
+        Nodes of the element.
+    """
+
+    nodes: int
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """All rotations of the element and its start."""
+        n, axes = self.nodes, self.axes
+        return n, 1, 0, (n - 2) * (axes + 1 + n) + n * axes, axes**2
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """The sum over the inner nodes."""
+        n, axes = self.nodes, self.axes
+        width = axes + 1 + n
+        tangents = [ca.vertsplit(data[(n - 2) * width + axes * j :][:axes]) for j in range(n)]
+        changes = ca.horzcat(
+            *[ca.vertcat(*self.forth(side, t)) - ca.vertcat(*t) for side, t in zip(q, tangents, strict=True)]
+        )
+        total, p = ca.SX(0), _matrix(load, axes)
+        for k in range(n - 2):
+            own = data[k * width : (k + 1) * width]
+            r = own[:axes] + ca.vertcat(*u[0]) + ca.mtimes(changes, own[axes + 1 :])
+            total -= 0.5 * own[axes] * ca.dot(r, ca.mtimes(p, r))
+        return total
+
+
+@final
+@dataclass(frozen=True)
+class SpunVectors(Connection):
+    """Vectors that are the first rows of a quantity; data: those of the quantity, of each vector what is to be added
+    and its mass; load: P.
+
+    Attributes
+    ----------
+    kind : Connection
+        The quantity.
+    vectors : int
+        How many of its rows, by the axes, are vectors.
+    """
+
+    kind: Connection
+    vectors: int
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Those of the quantity, without rows."""
+        turns, places, _, data, _ = self.kind.sizes
+        return turns, places, 0, data + self.vectors * (self.axes + 1), self.axes**2
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """The sum over the vectors."""
+        axes, first = self.axes, self.kind.sizes[3]
+        rows = ca.vertcat(*self.kind.residual(q, u, data[:first], ca.SX(0, 1)))
+        total, p = ca.SX(0), _matrix(load, axes)
+        for k in range(self.vectors):
+            own = data[first + k * (axes + 1) : first + (k + 1) * (axes + 1)]
+            r = own[:axes] + rows[k * axes : (k + 1) * axes]
+            total -= 0.5 * own[axes] * ca.dot(r, ca.mtimes(p, r))
+        return total
+
+
+SPUN = (SpunPair, SpunInner, SpunVectors)
+"""Kinds whose forces are loads, not those of joints or springs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spinning:
+    """Turning axes of a model, dimensionless.
+
+    Attributes
+    ----------
+    masses : Masses
+    omega : ndarray (3,)
+        Angular velocity by the unit of time of the masses.
+    rest, inner_rest : ndarray (places | elements, p + 1, axes)
+        Where the places and the nodes of elements are in the undeformed scene.
+    loading : Loading
+        P on everything that has mass; no factor multiplies it.
+    """
+
+    masses: Masses
+    omega: Array
+    rest: Array
+    inner_rest: Array
+    loading: Loading
+
+    def positional(self, model: Any, u: Array, turned: Array, matrix: Array) -> Loading:
+        """Centrifugal forces of P on places and inner nodes as loads, at displacements and turned tangents."""
+        element, segments = model.element, model.segments
+        arms = element.to_points / element.weights
+        start = np.array([segments.place(part.start) for part in segments.parts], dtype=np.intp)[segments.owner]
+        inner = self.inner_rest + u[start][:, None] + np.einsum("kj,eja->eka", arms, turned - model.beams.tangent)
+        spread = self.masses.inner[:, :, None] * (inner @ matrix)
+        own = np.stack([self.masses.places @ column for column in ((self.rest + u) @ matrix).T], axis=1)
+        pull, on_places = carried(spread, segments, element)
+        return replace(model.groups[None].scaled(0.0), force=own + on_places, own=own, spread=spread, pull=pull)
+
+
+def with_spinning(model: Any) -> Any:
+    """A model (:class:`~sfetcas.mechanics.model.Model`) with what turning axes do to it.
+
+    Raises
+    ------
+    SceneError
+        Nothing has mass.
+    """
+    masses = masses_of(model)
+    axes = model.element.axes
+    omega = np.asarray(model.scene.rotating, dtype=float) * masses.time
+    matrix = ((omega @ omega) * np.eye(3) - np.outer(omega, omega))[:axes, :axes]
+    rest = _at_rest(model)
+    groups = tuple(_groups(model, masses, *rest))
+    nothing = tuple(np.zeros((len(group.names), axes**2)) for group in groups)
+    loadings = {name: replace(load, loads=(*load.loads, *nothing)) for name, load in model.groups.items()}
+    empty = loadings[None].scaled(0.0)
+    before = len(model.connections)
+    here = tuple(np.tile(matrix.ravel(), (len(group.names), 1)) for group in groups)
+    spinning = Spinning(masses, omega, *rest, replace(empty, loads=(*empty.loads[:before], *here)))
+    return replace(model, connections=(*model.connections, *groups), groups=loadings, spinning=spinning)
+
+
+def _at_rest(model: Any) -> tuple[Array, Array]:
+    scene, element, segments = model.scene, model.element, model.segments
+    axes = element.axes
+    rest = np.zeros((len(segments.places), axes))
+    inner = np.zeros((*model.beams.weight.shape, axes))
+    for name, node in scene.nodes.items():
+        rest[segments.place(name)] = np.asarray(node.position)[:axes]
+    for (name, i), place in segments.ends.items():
+        rest[segments.place(place)] = np.asarray(scene.nodes[scene.members[name].nodes[i]].position)[:axes]
+    for name in model.members:
+        cuts, line, part = model.mesh.cuts[name], scene.center_lines[name], model.elements_of(name)
+        x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
+        inner[part] = line.positions(x.ravel())[:, :axes].reshape(*x.shape, axes)
+    for part in segments.parts:
+        rest[segments.place(part.start)] = inner[part.elements.start, 0]
+        rest[segments.place(part.end)] = inner[part.elements.stop - 1, -1]
+    return rest / model.scales.length, inner / model.scales.length
+
+
+def _group(kind: Connection, turns: Index, places: Index, data: Array, what: str) -> Group:
+    names = tuple(f"turning axes on {what} {i + 1}" for i in range(len(data)))
+    return Group(kind, turns, places, data, (), names, ("",) * len(data))
+
+
+def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> list[Group]:
+    element, space = model.element, model.space
+    n = element.order + 1
+
+    def joined(*parts: Array) -> Array:
+        return np.hstack([part.reshape(len(parts[0]), -1) for part in parts])
+
+    pairs = np.stack([masses.places.row, masses.places.column], axis=1)
+    data = joined(rest[pairs], masses.places.value)
+    found = [_group(SpunPair(space), np.zeros((len(pairs), 0), np.intp), pairs, data, "mass")]
+    heavy = np.flatnonzero(masses.inner.any(axis=1))
+    if len(heavy):
+        arms = np.broadcast_to(element.to_points / element.weights, (len(heavy), n, n))
+        own = np.concatenate([inner_rest[heavy], masses.inner[heavy, :, None], arms], axis=2)[:, 1:-1]
+        segments = model.segments
+        start = np.array([segments.place(part.start) for part in segments.parts], dtype=np.intp)[segments.owner]
+        data = joined(own, model.beams.tangent[heavy])
+        turns = model.rotations.turns[heavy]
+        found.append(_group(SpunInner(space, n), turns, start[heavy][:, None], data, "element"))
+    for group in masses.observables:
+        vectors = vectors_of(group)
+        if not vectors:
+            continue
+        mass = group.mass[:, : vectors * element.axes : element.axes]
+        added = np.zeros((len(group.data), vectors, element.axes))
+        if isinstance(group.kind, BodyPoints):
+            # The first point is told from the place of the first node, all others from there.
+            added[:, 0] = rest[group.places[:, 0]]
+        data = joined(group.data, np.concatenate([added, mass[:, :, None]], axis=2))
+        found.append(_group(SpunVectors(space, group.kind, vectors), group.turns, group.places, data, "body"))
+    return found
+
+
+def vectors_of(group: Observables) -> int:
+    """How many vectors with mass the rows of a group begin with."""
+    kind = group.kind
+    if isinstance(kind, Axes):
+        return kind.sizes[2] // kind.axes
+    return kind.points if isinstance(kind, BodyPoints) else 0
