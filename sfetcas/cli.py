@@ -86,6 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="solve a scene and print a short report")
     run.add_argument("file", type=Path, help="scene file, .toml or .json")
     run.add_argument("--json", type=Path, metavar="OUT", help="write the whole answer as JSON")
+    run.add_argument("--matrices", type=Path, metavar="OUT", help="modes: write the matrices, .npz or a new folder")
     run.add_argument("--plot", type=Path, metavar="OUT.png", help="write a picture")
     _add_overrides(run)
     run.set_defaults(command=_run)
@@ -121,6 +122,10 @@ def _settings(options: argparse.Namespace) -> Settings:
 def _run(options: argparse.Namespace) -> int:
     begin = time.perf_counter()
     scene, settings = load(options.file), _settings(options)
+    if options.matrices is not None and scene.analysis.type != "modes":
+        raise SceneError(f"--matrices: found the analysis {scene.analysis.type!r}, accepted: 'modes'")
+    if options.matrices is not None and options.matrices.suffix != ".npz" and options.matrices.exists():
+        raise SceneError(f"{options.matrices}: exists, accepted: a new folder, or a file that ends in .npz")
     for path in (options.json, options.plot):
         if path is not None:
             _check_writable(path)
@@ -133,6 +138,8 @@ def _run(options: argparse.Namespace) -> int:
     def told(solution: Answer) -> None:
         if options.json is not None:
             _write(options.json, lambda path: path.write_text(json.dumps(solution.to_dict(), allow_nan=False) + "\n"))
+        if options.matrices is not None and isinstance(solution, Modes):
+            _write_matrices(solution, options.matrices)
         if drawing is not None:
             _write(options.plot, lambda path: drawing(solution, path))
         _report(solution, time.perf_counter() - begin)
@@ -201,6 +208,17 @@ def _write(path: Path, writer: Callable[[Path], Any]) -> None:
     finally:
         if name:
             Path(name).unlink(missing_ok=True)
+
+
+def _write_matrices(modes: Modes, path: Path) -> None:
+    matrices = modes.matrices()
+    try:
+        if path.suffix == ".npz":
+            _write(path, matrices.save)
+        else:
+            matrices.save(path)
+    except OSError as error:
+        raise SceneError(f"{path}: could not be written: {error}") from None
 
 
 def _umask() -> int:

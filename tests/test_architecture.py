@@ -121,6 +121,7 @@ ORDER = [
     "dynamics.watching",
     "dynamics.simulation",
     "dynamics.small_motion",
+    "dynamics.matrices",
     "dynamics.modes",
     "paths",
     "paths.path",

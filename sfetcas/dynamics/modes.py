@@ -33,6 +33,7 @@ from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
+from .matrices import Matrices, matrices_of
 from .small_motion import Eigenmotions, SmallMotion
 
 __all__ = ["Mode", "Modes", "find_modes", "prepared_for_motion", "put_on"]
@@ -143,6 +144,10 @@ class Modes:
         """Whether motions fade or grow."""
         return not self.motion.plain or any(mode.damping for mode in self.modes)
 
+    def matrices(self) -> Matrices:
+        """Mass, damping, stiffness and constraints of the small motions, by name and in SI units."""
+        return matrices_of(self.motion)
+
     def values(self) -> dict[str, Any]:
         """What the answer says under ``modes``, but shapes."""
         answer: dict[str, Any] = {"omega": self.omega.tolist(), "rigid": self.rigid}
@@ -228,8 +233,9 @@ class _Run:
                 error = 0.0
                 break
             other, there = self._found(finer)
-            error = _difference(found, there)
-            if prescribed:
+            last, error = error, _difference(found, there)
+            # What gets no nearer is rounding: the coarser mesh has less of it.
+            if prescribed or error > last:
                 break
             mesh, found, answer = finer, there, (other, there)
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:

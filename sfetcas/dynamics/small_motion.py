@@ -37,8 +37,11 @@ SOFT = 1e-14
 PROXIMAL = 1e-13
 """Stiffness, over that of the rotation itself, of what neither mass nor stiffness holds, as a straight rod's spin."""
 
-RIGID = 1e-11
-"""Squares of frequencies below this share of what was added up, or of the units of the model, are zero: rounding."""
+RIGID = 3e-15
+"""Squares of frequencies below this share of what was added up, or 3000 times that of the units, are zero."""
+
+DOUBLE = 1e-12
+"""The same of exponents that are zero twice, of which rounding leaves the root."""
 
 NEARER = 0.5
 """Share of the lowest square of a frequency by which the last shift lies below zero."""
@@ -215,7 +218,7 @@ class SmallMotion:
         shift, wanted = -1.0, count + unstable
         for _ in range(ATTEMPTS):
             squares, shapes, exhausted = self._near(shift, wanted)
-            rigid = np.abs(squares) <= self._rounding(shapes)
+            rigid = np.abs(squares) <= RIGID * self._added(shapes)
             elastic = squares[~rigid]
             if not exhausted and len(elastic) < count + unstable:
                 wanted = count + unstable + int(rigid.sum())
@@ -270,7 +273,7 @@ class SmallMotion:
 
         inverse, vectors = largest(apply, 2 * n, count + unstable, pick=pick)
         exponents, shapes = _exponents(shift, inverse), vectors[:n]
-        rigid = np.abs(exponents) ** 2 <= self._rounding(shapes)
+        rigid = np.abs(exponents) ** 2 <= DOUBLE * self._added(shapes)
         return _sorted_exponents(exponents, shapes, self._independent(shapes[:, rigid]), rigid, count)
 
     def _independent(self, shapes: Array) -> int:
@@ -282,12 +285,12 @@ class SmallMotion:
         values = np.linalg.eigvalsh((kinetic / np.outer(sizes, sizes))[np.ix_(used, used)])
         return int((values > SAME * values.max(initial=0.0)).sum())
 
-    def _rounding(self, shapes: Array) -> Array:
-        """What rounding leaves of squares of frequencies of shapes."""
+    def _added(self, shapes: Array) -> Array:
+        """What is added up in squares of frequencies of shapes."""
         sizes = np.abs(shapes)
         added = (sizes * _times(self.stiffness.absolute, sizes)).sum(axis=0)
         kinetic = (shapes.conj() * _times(self.mass, shapes)).sum(axis=0).real
-        return RIGID * (1.0 + added / np.maximum(kinetic, TINY))
+        return np.asarray(3000.0 + added / np.maximum(kinetic, TINY))
 
     def _factor(self, mass: float, damping: float) -> None:
         """Factors of ``K + damping C + mass M`` with the rows."""
