@@ -20,7 +20,6 @@ from .description.scene import Analysis, History, Load, Member, Node, Scene
 from .description.sections import CrossSection
 from .dynamics.beginning import at_rest
 from .dynamics.integrating import Memory, Stepper, integrate
-from .dynamics.masses import masses_of
 from .dynamics.methods import GeneralisedAlpha, Method, Radau
 from .dynamics.sampling import Sampler
 from .dynamics.stages import StageEquations
@@ -28,6 +27,7 @@ from .mathematics.arrays import Array
 from .mathematics.kernels import Kernels
 from .mechanics.elements import ELEMENTS
 from .mechanics.equations import Equations
+from .mechanics.masses import masses_of
 from .mechanics.mesh import uniform_mesh
 from .mechanics.model import assemble
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from sfetcas import Analysis, Arc, CrossSection, Load, Member, Node, Scene, SceneError, Spring, solve
 from sfetcas.cli import main
 from sfetcas.description.scenefile import dump
