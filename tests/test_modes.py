@@ -107,14 +107,14 @@ def test_shape_of_a_pendulum():
 def test_rigid_member_is_a_very_stiff_one():
     def scene(members):
         nodes = {"A": Node(position=[0, 0], support="clamped"), "M": Node(position=[1, 0]), "B": Node(position=[2, 0])}
-        sections = {"strip": STRIP, "stiff": STRIP.model_copy(update={"EI3": 1e6})}
+        sections = {"strip": STRIP, "stiff": STRIP.model_copy(update={"EI3": 1e4})}
         return cantilever(sections=sections, nodes=nodes, members=members)
 
     first = {"one": Member(nodes=["A", "M"], section="strip")}
-    rigid = solve(scene(first | {"two": Member(nodes=["M", "B"], section="stiff", type="rigid")}))
-    stiff = solve(scene(first | {"two": Member(nodes=["M", "B"], section="stiff")}))
-    # The softness is a millionth.
-    assert stiff.omega[:2] == pytest.approx(rigid.omega[:2], rel=1e-5)
+    rigid = solve(scene(first | {"two": Member(nodes=["M", "B"], section="stiff", type="rigid")}), accuracy=1e-6)
+    stiff = solve(scene(first | {"two": Member(nodes=["M", "B"], section="stiff")}), accuracy=1e-6)
+    # The softness is 1e-4, and the second shape bends the stiff member more.
+    assert stiff.omega[:2] == pytest.approx(rigid.omega[:2], rel=1e-3)
 
 
 def test_frequencies_converge_twice_as_fast_as_the_order():
@@ -222,7 +222,7 @@ def test_matrices_are_read_back(tmp_path):
         for name, part in modes.matrices().parts.items():
             full = np.zeros(arrays[f"{name}.shape"])
             full[arrays[f"{name}.row"], arrays[f"{name}.column"]] = arrays[f"{name}.value"]
-            assert full == pytest.approx(part.full(), rel=1e-12, abs=1e-12)
+            np.testing.assert_array_equal(full, part.full())
             lines = (tmp_path / "folder" / f"{name}.mtx").read_text().splitlines()
             assert lines[1].split() == [str(n) for n in (*part.shape, len(part.value))]
             row, column, value = lines[2].split() if len(lines) > 2 else ("1", "1", str(part.full()[0, 0]))

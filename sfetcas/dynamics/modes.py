@@ -233,8 +233,9 @@ class _Run:
                 error = 0.0
                 break
             other, there = self._found(finer)
-            error = _difference(found, there)
-            if prescribed:
+            last, error = error, _difference(found, there)
+            # What gets no nearer is rounding: the coarser mesh has less of it.
+            if prescribed or error > last:
                 break
             mesh, found, answer = finer, there, (other, there)
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
