@@ -52,13 +52,16 @@ class Conserving(Method):
         Raises
         ------
         SceneError
-            A load follows what it acts on: it has no energy to keep.
+            A load follows what it acts on: it has no energy to keep; or the axes turn.
         """
         model = system.model
         if any(group.follows for group in model.groups.values()):
             name = next(name for name, load in model.scene.loads.items() if load.frame != "fixed")
             message = "found a follower with the integrator 'conserving', accepted: loads with a potential"
             raise SceneError(message, ("loads", name))
+        if model.spinning is not None:
+            message = "found with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
+            raise SceneError(message, ("rotating",))
         n = system.layout
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         begin = Begin(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array
@@ -25,12 +26,13 @@ class Inertia:
     """Masses and dampers of one model, applied to rates of its quantities (dimensionless)."""
 
     def __init__(self, system: StageEquations) -> None:
-        self._system, self._masses = system, system.masses
+        self.system, self._masses = system, system.masses
         self._model = model = system.model
         masses, axes = system.masses, system.axes
         self._inside = tuple(system.inner_nodes.T)
         self._inner = masses.inner[self._inside]
         self._inner_drag = masses.inner_drag[self._inside]
+        self._coriolis = None if system.coriolis is None else _map(system.coriolis)
         self._rest = np.zeros((system.linear // axes, axes))
         for name in model.nodes:
             self._rest[model.segments.place(name)] = np.asarray(model.scene.nodes[name].position)[:axes]
@@ -44,7 +46,7 @@ class Inertia:
 
     def _place(self, name: str) -> None:
         """Where the places and inner nodes of a member are in the undeformed scene."""
-        model, system = self._model, self._system
+        model, system = self._model, self.system
         line, cuts, first = model.scene.center_lines[name], model.mesh.cuts[name], model.beams.first[name]
         for part in model.segments.parts:
             if part.member == name:
@@ -60,12 +62,12 @@ class Inertia:
 
     def _linear(self, of_places: SparseMap, inner: Array, rates: Array) -> Array:
         """Weights times rates of positions (positions, axes)."""
-        places = self._system.places
+        places = self.system.places
         on_places = np.stack([of_places @ column for column in rates[:places].T], axis=1)
         return np.concatenate([on_places, inner[:, None] * rates[places:]])
 
     def _split(self, rates: Array) -> tuple[Array, list[Array]]:
-        system = self._system
+        system = self.system
         linear = rates[: system.linear].reshape(-1, system.axes)
         return linear, [rates[begin:end] for begin, end in system.ranges]
 
@@ -77,14 +79,15 @@ class Inertia:
 
     def forces(self, velocity: Array, acceleration: Array) -> Array:
         """What inertia and damping ask for, (quantities,)."""
-        system = self._system
+        system = self.system
         at_places = np.arange(system.places)
         drag = SparseMap(at_places, at_places, self._masses.place_drag, (system.places, system.places))
         linear, groups = self.momenta(acceleration)
         rates, others = self._split(velocity)
         linear = linear + self._linear(drag, self._inner_drag, rates)
         damped = [group.damping.ravel() * rate for group, rate in zip(self._masses.observables, others, strict=True)]
-        return np.concatenate([linear.ravel(), *(a + b for a, b in zip(groups, damped, strict=True))])
+        forces = np.concatenate([linear.ravel(), *(a + b for a, b in zip(groups, damped, strict=True))])
+        return forces if self._coriolis is None else forces + self._coriolis @ velocity
 
     def kinetic(self, velocity: Array) -> float:
         """Kinetic energy."""
@@ -105,9 +108,9 @@ class Inertia:
             if not isinstance(group.kind, Axes | BodyPoints):
                 continue
             # Numbers beside the points of a small member have no momentum.
-            kept = self._system.axes * group.kind.points if isinstance(group.kind, BodyPoints) else None
+            kept = self.system.axes * group.kind.points if isinstance(group.kind, BodyPoints) else None
             parts = (part.reshape(len(group.data), -1)[:, :kept] for part in (value, momentum))
-            vectors, its = (three(part.reshape(len(group.data), -1, self._system.axes)) for part in parts)
+            vectors, its = (three(part.reshape(len(group.data), -1, self.system.axes)) for part in parts)
             if isinstance(group.kind, BodyPoints):
                 # The first point of each is a place, seen from where the first node was.
                 vectors = vectors.copy()
@@ -121,7 +124,7 @@ class Inertia:
 
     def loading(self, equations: Equations, state: State, loading: Loading, forces: Array) -> Loading:
         """Loads at a state with inertia and damping forces among them (d'Alembert)."""
-        system, model = self._system, self._model
+        system, model = self.system, self._model
         linear = -forces[: system.linear].reshape(-1, system.axes)
         on_places, inner = linear[: system.places], linear[system.places :]
         spread = np.zeros_like(loading.spread)
@@ -170,3 +173,9 @@ class Inertia:
                 batch.set(i, values)
         batch.set(4, forces.reshape(n, -1))
         return np.asarray(batch()[3].copy())
+
+
+def _map(matrix: ca.DM) -> SparseMap:
+    """A sparse matrix of CasADi for NumPy."""
+    row, column = (np.array(part, dtype=np.intp) for part in matrix.sparsity().get_triplet())
+    return SparseMap(row, column, np.array(matrix.nz[:]).ravel(), matrix.shape)

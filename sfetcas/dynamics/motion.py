@@ -34,10 +34,7 @@ class Mover:
     def instant(self, sample: Sample) -> Instant:
         """A sample by name."""
         model, equations = self.model, self.equations
-        groups = [
-            model.groups[name].scaled(float(f)) for name, f in zip(model.groups, self.factors(sample.t), strict=True)
-        ]
-        loading = functools.reduce(lambda a, b: a.plus(b), groups)
+        loading = self.inertia.system.loading(self.factors(sample.t))
         free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.near)
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)

@@ -35,6 +35,7 @@ from ..mechanics.joints import Connection, by_turning, name_of
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
 from ..mechanics.rotations import Turn
+from ..mechanics.spinning import vectors_of
 
 __all__ = ["Layout", "StageEquations", "moved_by"]
 
@@ -140,7 +141,8 @@ class StageEquations:
         model, element = self.model, self.model.element
         self.elements, self.points = model.rotations.turns.shape
         self.axes, self.turns = element.axes, element.turns
-        self.groups = tuple(model.groups)
+        # Centrifugal forces are a load that no factor multiplies.
+        self.loadings = [*model.groups.values(), *([model.spinning.loading] if model.spinning else [])]
         self._calls, self._kernels = calls, kernels
         self.given = [
             ca.DM(part.reshape(-1, part.shape[-1]).T) for part in (model.beams.stiffness, model.beams.tangent)
@@ -390,13 +392,13 @@ class StageEquations:
             y=self.equations.displacement_unknowns,
             lam=self.equations.rows,
             x=bounds[-1],
-            factors=len(self.groups),
+            factors=len(self.loadings),
             near=self.model.winding.count,
         )
 
     def _load(self) -> None:
         """Loads and motions as linear maps of the factors of their groups."""
-        loadings = [self.model.groups[name] for name in self.groups]
+        loadings = self.loadings
 
         def columns(part: str) -> ca.DM:
             return ca.sparsify(ca.DM(np.stack([getattr(loading, part).ravel() for loading in loadings], axis=1)))
@@ -456,10 +458,10 @@ class StageEquations:
     def floating(self) -> tuple[Array, Array] | None:
         """What all displacements (y, axes) and quantities (x, axes) gain when everything moves by one along each axis.
 
-        None where the ground holds anything.
+        None where the ground holds anything, or the place matters as in turning axes.
         """
         positions, axes = self.model.positions, self.axes
-        grounded = any((group.places < 0).any() for group in self.model.connections)
+        grounded = any((group.places < 0).any() for group in self.model.connections) or self.model.spinning is not None
         if grounded or positions.Y.shape[0] != len(positions.Y.value):
             return None
         y = np.zeros((self.layout.y, axes))
@@ -483,7 +485,9 @@ class StageEquations:
     @functools.cached_property
     def histories(self) -> tuple[History | None, ...]:
         """Of the groups of loads; None of one whose factor is one."""
-        return tuple(None if name is None else self.model.scene.histories[name] for name in self.groups)
+        known = self.model.scene.histories
+        own = [None if name is None else known[name] for name in self.model.groups]
+        return (*own, *([None] * (len(self.loadings) - len(own))))
 
     def factors(self, t: float) -> Array:
         """Factors of the groups of loads at a time, dimensionless."""
@@ -492,7 +496,7 @@ class StageEquations:
 
     def loading(self, factors: Array) -> Loading:
         """Loads and motions at factors of their groups."""
-        groups = [self.model.groups[name].scaled(float(f)) for name, f in zip(self.groups, factors, strict=True)]
+        groups = [loading.scaled(float(f)) for loading, f in zip(self.loadings, factors, strict=True)]
         return functools.reduce(Loading.plus, groups)
 
     @staticmethod
@@ -641,7 +645,40 @@ class StageEquations:
                 if weight.any():
                     force += ca.repmat(ca.DM(weight.ravel()), 1, rates.shape[1]) * rate[begin:end, :]
             parts.append(force)
-        return ca.vertcat(*parts)
+        return ca.vertcat(*parts) + (0.0 if self.coriolis is None else ca.mtimes(self.coriolis, rates))
+
+    @functools.cached_property
+    def crossing(self) -> Array | None:
+        """Matrix (axes, axes) of ``2 Omega x`` of turning axes; None where they do not turn."""
+        if self.model.spinning is None:
+            return None
+        x, y, z = 2.0 * self.model.spinning.omega
+        return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])[: self.axes, : self.axes]
+
+    @functools.cached_property
+    def coriolis(self) -> ca.DM | None:
+        """Coriolis forces on the quantities by their rates."""
+        if self.crossing is None:
+            return None
+        weights, crosses = [self.mass], [ca.kron(ca.DM.eye(self.linear // self.axes), ca.DM(self.crossing))]
+        for group in self.masses.observables:
+            weights.append(ca.diag(ca.DM(group.mass.ravel())))
+            crosses.append(ca.kron(ca.DM.eye(len(group.data)), ca.DM(self.turned_rows(group))))
+        return ca.sparsify(ca.mtimes(ca.diagcat(*weights), ca.diagcat(*crosses)))
+
+    def turned_rows(self, group: Observables) -> Array:
+        """``2 Omega x`` on the rows of a quantity: on the vectors that they begin with; numbers behind do not turn."""
+        assert self.crossing is not None
+        found, count = np.zeros((group.kind.sizes[2],) * 2), vectors_of(group)
+        found[: self.axes * count, : self.axes * count] = np.kron(np.eye(count), self.crossing)
+        return found
+
+    @functools.cached_property
+    def place_weights(self) -> tuple[Index, Index, Array]:
+        """Row, column and mass of each pair of places, inner nodes hanging on the first place of their element."""
+        row, column = (np.array(part, dtype=np.intp) for part in self.place_mass.sparsity().get_triplet())
+        first = row % self.axes == 0
+        return row[first] // self.axes, column[first] // self.axes, np.array(self.place_mass.nz[:]).ravel()[first]
 
     def stage(self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, factors: ca.MX, near: ca.MX) -> _Stage:
         """Residual and entries at given inertia and damping forces."""
@@ -752,6 +789,16 @@ class _Places:
         for matrix in (system.place_mass, system.place_drag):
             row, column = (np.array(part, dtype=np.intp) for part in matrix.sparsity().get_triplet())
             coupled.add(system.of_places + row, system.of_places + column)
+        if system.crossing is None:
+            return
+        for sides in system.observed:
+            coupled.add(sides[:, None, :], sides[:, :, None])
+        if len(inside):
+            coupled.add(own[:, None, :], own[:, :, None])
+            coupled.add(own[:, :, None], at[:, None, :])
+            coupled.add(at[:, None, :], own[:, :, None])
+        row, column, _ = system.place_weights
+        coupled.add(system.place_cells(row)[:, :, None], system.place_cells(column)[:, None, :])
 
 
 class _Stage:
@@ -833,7 +880,25 @@ class _Stage:
         if len(system.massive):
             entries += system.hung(self._spin, other._spin, c, b)
         entries += [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
+        if system.crossing is not None:
+            entries += self._turning(other, c)
         return ca.vertcat(*entries)
+
+    def _turning(self, other: _Stage, c: ca.MX) -> list[ca.MX]:
+        """What Coriolis forces add to these entries."""
+        system, entries = self._system, []
+        assert system.crossing is not None
+        cross = ca.DM(system.crossing)
+        for group, mine, its in zip(system.masses.observables, self._spins, other._spins, strict=True):
+            n = len(group.data)
+            turned_its = ca.mtimes(ca.DM(system.turned_rows(group)), its)
+            function = system.paired(group.kind.sizes[2], mine.shape[1] // n, n)
+            entries.append(ca.vec(function(mine, turned_its, c * ca.DM(group.mass.T))))
+        if len(system.massive):
+            of_mass = system.hung(self._spin, ca.mtimes(cross, other._spin), ca.MX(0), c)
+            across = system.hung(ca.mtimes(cross.T, self._spin), other._spin, ca.MX(0), c)
+            entries += [of_mass[0], across[1], of_mass[2]]
+        return [*entries, c * ca.DM(np.outer(system.place_weights[2], cross.full()).ravel())]
 
 
 # -- functions of single things, made once a process ---------------------------------------------------
