@@ -79,6 +79,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("file", type=Path, help="scene file, .toml or .json")
     run.add_argument("--json", type=Path, metavar="OUT", help="write the whole answer as JSON")
     run.add_argument("--plot", type=Path, metavar="OUT.png", help="write a picture")
+    run.add_argument("--animate", type=Path, metavar="OUT.gif", help="write a moving picture, .gif or .mp4")
+    run.add_argument("--vtk", type=Path, metavar="DIR", help="write files for ParaView into a folder")
     run.add_argument("--matrices", type=Path, metavar="OUT", help="modes: write the matrices, .npz or a new folder")
     _add_overrides(run)
     run.set_defaults(command=_run)

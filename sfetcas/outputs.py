@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class Output:
     writer : callable
         Writes an answer to a path with the same ending.
     folder : bool
-        It makes a new folder of files.
+        It makes a folder of files.
     """
 
     option: str
@@ -60,19 +61,24 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
     SceneError
         It cannot be written, or not of such a scene.
     """
-    makers: dict[str, Callable[[Path, Scene], Writer]] = {"json": _json, "plot": _plot}
+    makers: dict[str, Callable[[Path, Scene], Writer]] = {
+        "json": _json,
+        "plot": _plot,
+        "animate": _animate,
+        "vtk": _vtk,
+    }
     found: list[Output] = []
     for key, maker in makers.items():
         path = getattr(options, key)
         if path is None:
             continue
-        _check_writable(path)
+        (_check_folder if key == "vtk" else _check_writable)(path)
         if path.exists() and path.samefile(options.file):
             raise SceneError(f"{path}: is the scene itself, accepted: another file")
         for other in found:
             if other.path.resolve() == path.resolve():
                 raise SceneError(f"{path}: found for {other.option} and for --{key}, accepted: two files")
-        found.append(Output(f"--{key}", path, maker(path, scene)))
+        found.append(Output(f"--{key}", path, maker(path, scene), key == "vtk"))
     if options.matrices is not None:
         found.append(_matrices(options.matrices, scene))
     return found
@@ -104,6 +110,24 @@ def _plot(path: Path, scene: Scene) -> Writer:
     _placed(path, lambda: check_ending(path))
     writers: dict[str, Writer] = {"path": save_chart, "dynamic": save_motion}
     return writers.get(scene.analysis.type, save_picture)
+
+
+def _animate(path: Path, scene: Scene) -> Writer:
+    from .pictures.animation import check_animation, save_animation
+
+    _placed(path, lambda: check_animation(scene, path))
+    return save_animation
+
+
+def _vtk(path: Path, scene: Scene) -> Writer:
+    try:
+        from .pictures.paraview import save_vtk
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "pyevtk":
+            raise
+        message = "found no library pyevtk, which writes such files, accepted: after pip install 'sfetcas[vtk]'"
+        raise SceneError(message, ("--vtk",)) from None
+    return save_vtk
 
 
 def _placed(path: Path, check: Callable[[], object]) -> None:
@@ -143,12 +167,30 @@ def _write(path: Path, writer: Callable[[Path], Any]) -> None:
             Path(name).unlink(missing_ok=True)
 
 
+OURS = re.compile(r"answers\.pvd|answer_\d+\.vtu")
+"""Files of an earlier run in a folder, which a later one replaces."""
+
+
+def _check_folder(path: Path) -> None:
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+        ours = not path.is_symlink() and (not path.exists() or all(OURS.fullmatch(name) for name in os.listdir(path)))
+    except (OSError, ValueError):
+        ours = False
+    if not ours:
+        accepted = "a new folder, or one that is empty or has nothing but files of an earlier run"
+        raise SceneError(f"{path}: cannot be written; accepted: {accepted}")
+
+
 def _write_folder(path: Path, writer: Callable[[Path], Any]) -> None:
-    """The same for a folder of files, which must not be there yet."""
+    """The same for a folder of files, which takes the place of one that is there."""
     try:
         with tempfile.TemporaryDirectory(dir=path.parent) as place:
-            writer(Path(place) / path.name)
-            os.replace(Path(place) / path.name, path)
+            writer(Path(place) / "new")
+            if path.exists():
+                os.replace(path, Path(place) / "old")
+            os.replace(Path(place) / "new", path)
     except (OSError, ValueError, ArithmeticError) as error:
         raise SceneError(f"{path}: could not be written: {error}") from None
 

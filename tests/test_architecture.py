@@ -139,6 +139,8 @@ ORDER = [
     "pictures.plotting",
     "pictures.charts",
     "pictures.motions",
+    "pictures.animation",
+    "pictures.paraview",
     "checks",
     "analyses",
     "benchmark_motion",
@@ -154,7 +156,14 @@ ORDER = [
 PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion")
 """What is run and not imported: only these print."""
 
-PICTURES = ("pictures.files", "pictures.sheet", "pictures.plotting", "pictures.charts", "pictures.motions")
+PICTURES = (
+    "pictures.files",
+    "pictures.sheet",
+    "pictures.plotting",
+    "pictures.charts",
+    "pictures.motions",
+    "pictures.animation",
+)
 """What needs matplotlib, which a run pays for only when a picture is asked for."""
 
 
@@ -249,7 +258,7 @@ def test_imports_stand_at_the_top(name):
         if isinstance(node, (ast.Import, ast.ImportFrom))
     ]
     # Pictures, and a bar on a terminal, are what a run does not pay for unless they are asked for.
-    allowed = {"outputs": set(PICTURES), "cli": {"tqdm"}}.get(name, set())
+    allowed = {"outputs": {*PICTURES, "pictures.paraview"}, "cli": {"tqdm"}}.get(name, set())
     assert {getattr(node, "module", None) for node in inside} <= allowed
 
 

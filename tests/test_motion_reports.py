@@ -143,7 +143,7 @@ def test_interrupted_before_the_first_answer_there_is_nothing(write, tmp_path, c
     def broken(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sfetcas.dynamics.simulation.integrate", broken)
+    monkeypatch.setattr("sfetcas.dynamics.integrators.integrate", broken)
     out = tmp_path / "out.json"
     assert main(["run", str(write(FALLING)), "--json", str(out)]) == 130
     assert capsys.readouterr().err == "sfetcas: interrupted; nothing was written\n"

@@ -6,7 +6,7 @@ import itertools
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -96,10 +96,11 @@ def axes_on(figure: Figure, paper: Axes, sketch: Sketch) -> Any:
     return paper
 
 
-def plot_line(axes: Any, line: Array, **style: Any) -> None:
-    """Draw a centre line (n, 3) in drawn units on axes that :func:`axes_on` made, whose limits stay."""
+def plot_line(axes: Any, line: Array, **style: Any) -> Any:
+    """Draw a centre line (n, 3) in drawn units on axes that :func:`axes_on` made, whose limits stay; what it is."""
     seen = line if hasattr(axes, "get_zlim") else line[:, :2]
-    axes.plot(*seen.T, scalex=False, scaley=False, **style)
+    (drawn,) = axes.plot(*seen.T, scalex=False, scaley=False, **style)
+    return drawn
 
 
 def title_of(text: str) -> str:
@@ -260,13 +261,14 @@ def _arrow(points: Array, mark: Mark, style: dict[str, Any]) -> FancyArrowPatch:
 
 @dataclass(eq=False)
 class Sheet:
-    """A figure with its axes, the same where marks are drawn on, and what is to be drawn."""
+    """A figure with its axes, the same where marks are drawn on, and what is to be drawn; ``drawn``: its marks."""
 
     figure: Figure
     axes: Any
     paper: Axes
     sketch: Sketch
     zoom: float = 1.0
+    drawn: list[Artist] = field(default_factory=list)
 
     def finish(self, *, gravity: float = 0.0) -> None:
         """Fit the axes to all that is drawn, and draw it, with so many times the gravity."""
@@ -282,8 +284,7 @@ class Sheet:
             self.figure.draw_without_rendering()
             self._fit()
             self.figure.draw_without_rendering()
-        for mark in self.sketch.marks:
-            self.draw(mark)
+        self.drawn += [self.draw(mark) for mark in self.sketch.marks]
         placed = self._placed(self._gravity(gravity))
         self._tell_left_out(len(self._labels()) - len(placed))
         for label, box in placed:

@@ -1,0 +1,213 @@
+"""Animations and files for ParaView: frames and points where the answer says, and every refusal."""
+
+import builtins
+import json
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+import scenes
+from matplotlib.animation import FFMpegWriter
+from moving import FALLING, SPACE, STRUCK
+from PIL import Image
+
+from sfetcas import Scene, SceneError, Settings, solve
+from sfetcas.cli import main
+from sfetcas.pictures.animation import _Film, _paced, save_animation
+from sfetcas.pictures.paraview import save_vtk
+
+ENDED = {**FALLING, "analysis": {**FALLING["analysis"], "output": 0.1}}
+"""Four answers."""
+STEPS = scenes.cantilever(analysis={"steps": [0.5, 1.0, 2.0]})
+PATH = scenes.cantilever(analysis={"type": "path", "range": [0, 1.0], "points": 5})
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(table):
+        path = tmp_path / "scene.json"
+        path.write_text(json.dumps(table))
+        return path
+
+    return written
+
+
+def made(table):
+    return solve(Scene.from_dict(table), Settings(accuracy=1e-4))
+
+
+# -- animations -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("table", "frames"), [(ENDED, 4), (STEPS, 3), (PATH, 5)], ids=["motion", "steps", "path"])
+def test_a_frame_for_each_answer(write, tmp_path, table, frames):
+    out = tmp_path / "out.gif"
+    assert main(["run", str(write(table)), "--animate", str(out)]) in (0, 1)  # five points do not end the path
+    with Image.open(out) as image:
+        assert image.n_frames == frames
+        assert image.size == (700, 500)
+        shots = []
+        for number in range(frames):
+            image.seek(number)
+            shots.append(np.asarray(image.convert("L"), float))
+    assert all(np.abs(a - b).max() > 100 for a, b in zip(shots, shots[1:]))
+
+
+@pytest.mark.parametrize("table", [ENDED, {**SPACE, "analysis": {**SPACE["analysis"], "end": 0.1}}])
+def test_a_frame_shows_its_answer_and_supports_keep_their_sides(table):
+    motion = made(table)
+    film = _Film(motion.steps, "", gravity=1.0)
+    axes, seen = (3 if motion.last.model.space else 2), []
+    for number, step in enumerate(motion.steps):
+        film.show(number, "now")
+        lines = [line for line in film.figure.findobj() if getattr(line, "get_gid", lambda: None)() == "deformed"]
+        for line, member in zip(lines, motion.scene.members.values(), strict=True):
+            drawn = np.stack(line.get_data_3d() if axes == 3 else line.get_data(), axis=1)
+            np.testing.assert_allclose(drawn[-1], step.position(member.nodes[1])[:axes], atol=1e-12)
+        seen.append([mark.points for mark in film._marks(number) if mark.name == "support-A"])
+    for marks in seen:
+        np.testing.assert_array_equal(np.vstack(marks), np.vstack(seen[0]))
+    assert len(film._sheet.drawn) == len(film._marks(0))  # those of earlier frames are gone
+
+
+@pytest.mark.parametrize(
+    ("times", "count", "rate", "said"),
+    [
+        (np.linspace(0, 4, 81), 81, 20, ""),
+        (np.linspace(0, 4, 1001), 101, 25, ""),
+        (np.linspace(0, 0.02, 101), 101, 25, " (slowed 200 times)"),
+        (np.linspace(0, 100, 101), 101, 10, " (sped up 10 times)"),
+        (np.linspace(0, 100, 5001), 200, 10, " (sped up 5 times)"),
+        (np.array([0.0]), 1, 25, ""),
+    ],
+)
+def test_pace(times, count, rate, said):
+    chosen, found, text = _paced(times)
+    assert (len(chosen), found, text) == (count, rate, said)
+    assert chosen[-1] == len(times) - 1
+
+
+REFUSED = {
+    "ending": (FALLING, "out.avi", "found the ending '.avi' of an animation, accepted: .gif, .mp4"),
+    "one step": (scenes.cantilever(), "out.gif", "found one step to animate, accepted: a motion, a path"),
+    "all": (scenes.cantilever(analysis={"equilibria": "all", "steps": [1, 2]}), "out.gif", "found equilibria = 'all'"),
+}
+
+
+@pytest.mark.parametrize(("table", "name", "sentence"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_animated_is_refused_before_it_is_solved(
+    write, tmp_path, capsys, monkeypatch, table, name, sentence
+):
+    monkeypatch.setattr("sfetcas.cli.solve", lambda *_, **__: pytest.fail("solved"))
+    assert main(["run", str(write(table)), "--animate", str(tmp_path / name)]) == 2
+    told = capsys.readouterr().err
+    assert sentence in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / name).exists()
+
+
+def test_films_need_their_program(tmp_path, monkeypatch):
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with pytest.raises(SceneError, match=r"found the ending '\.mp4', but no program ffmpeg"):
+        save_animation(made(ENDED), tmp_path / "out.mp4")
+
+
+def test_what_a_failed_motion_reached_is_animated(write, tmp_path):
+    out = tmp_path / "out.gif"
+    struck = {**STRUCK, "analysis": {**STRUCK["analysis"], "output": 0.05}}
+    assert main(["run", str(write(struck)), "--animate", str(out)]) == 3
+    with Image.open(out) as image:
+        assert image.n_frames == 3
+
+
+# -- files for ParaView ------------------------------------------------------------------------------
+
+
+def read(path):
+    """Arrays of a .vtu by name: read here by the definition of the format, lengths as 8 bytes before each array."""
+    head, _, raw = path.read_bytes().partition(b'<AppendedData encoding="raw">')
+    raw = raw[raw.index(b"_") + 1 :]
+    tree = ElementTree.fromstring(re.sub(rb"\s*$", b"", head) + b"</VTKFile>")
+    kinds = {"Float64": "f8", "Int32": "i4", "UInt8": "u1", "Int64": "i8"}
+    found = {}
+    for entry in tree.iter("DataArray"):
+        at = int(entry.get("offset"))
+        length = int(np.frombuffer(raw[at : at + 8], "u8")[0])
+        values = np.frombuffer(raw[at + 8 : at + 8 + length], kinds[entry.get("type")])
+        columns = int(entry.get("NumberOfComponents"))
+        found[entry.get("Name")] = values.reshape(-1, columns) if columns > 1 else values
+    return tree, found
+
+
+def collected(folder):
+    entries = list(ElementTree.parse(folder / "answers.pvd").iter("DataSet"))
+    return [float(entry.get("timestep")) for entry in entries], [folder / entry.get("file") for entry in entries]
+
+
+@pytest.mark.parametrize("table", [ENDED, {**SPACE, "analysis": {**SPACE["analysis"], "end": 0.1}}, STEPS, PATH])
+def test_files_hold_the_answers(tmp_path, table):
+    answer = made(table)
+    save_vtk(answer, tmp_path)
+    times, files = collected(tmp_path)
+    moving = "velocities" in dir(answer)
+    steps = [answer.posture(p) for p in answer.points] if "points" in dir(answer) else answer.steps
+    np.testing.assert_allclose(times, answer.times if moving else np.arange(len(steps)))
+    for step, file in zip(steps, files, strict=True):
+        tree, found = read(file)
+        (piece,) = tree.iter("Piece")
+        members = answer.scene.members
+        assert (int(piece.get("NumberOfCells")), len(found["points"])) == (
+            len(members),
+            int(piece.get("NumberOfPoints")),
+        )
+        assert found["types"].tolist() == [4] * len(members)  # polylines
+        assert found["member"].tolist() == list(range(len(members)))
+        np.testing.assert_array_equal(found["connectivity"], np.arange(len(found["points"])))
+        begin = 0
+        for end, (name, member) in zip(found["offsets"], members.items(), strict=True):
+            along = step.along(name, found["s"][begin:end])
+            np.testing.assert_allclose(found["points"][begin:end], along["position"], atol=1e-14)
+            for key in ("quaternion", "force", "moment", "curvature"):
+                np.testing.assert_allclose(found[key][begin:end], along[key], atol=1e-14)
+            if moving:
+                for place, node in zip((begin, end - 1), member.nodes, strict=True):
+                    np.testing.assert_allclose(found["velocity"][place], step.velocity(node), atol=1e-14)
+            begin = end
+        if not moving:
+            assert found["factor"] == [step.factor]
+
+
+def test_the_folder_is_filled_at_once_and_replaced_only_where_it_is_ours(write, tmp_path, capsys):
+    path, out = write(ENDED), tmp_path / "out"
+    assert main(["run", str(path), "--vtk", str(out)]) == 0
+    assert sorted(p.name for p in out.iterdir()) == [f"answer_{i:04d}.vtu" for i in range(4)] + ["answers.pvd"]
+    # Fewer answers replace all of the earlier ones.
+    path = write({**ENDED, "analysis": {**ENDED["analysis"], "output": 0.3}})
+    assert main(["run", str(path), "--vtk", str(out)]) == 0
+    assert sorted(p.name for p in out.iterdir()) == ["answer_0000.vtu", "answer_0001.vtu", "answers.pvd"]
+    (out / "notes.txt").write_text("mine")
+    for folder in (out, path, tmp_path / "no" / "out"):
+        assert main(["run", str(path), "--vtk", str(folder)]) == 2
+    told = capsys.readouterr().err
+    assert told.count("accepted: a new folder, or one that is empty or has nothing but files of an earlier run") == 3
+    assert len(list(out.iterdir())) == 4
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "scene.json"]
+
+
+def test_without_the_library_the_extra_is_named(write, tmp_path, capsys, monkeypatch):
+    monkeypatch.delitem(sys.modules, "sfetcas.pictures.paraview")
+    original = builtins.__import__
+
+    def missing(name, *more, **others):
+        if name.startswith("pyevtk"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return original(name, *more, **others)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    assert main(["run", str(write(ENDED)), "--vtk", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert "found no library pyevtk" in told
+    assert "pip install 'sfetcas[vtk]'" in told
+    assert not (tmp_path / "out").exists()
