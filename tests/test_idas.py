@@ -388,6 +388,30 @@ def test_what_has_no_mass():
     assert refusal(table) == f"analysis.integrator: {expected}"
 
 
+def test_closings_that_repeat_each_other():
+    """A plane loop of hinges in space: that it stays in its plane is said three times."""
+    table = double_pendulum()
+    table["dimension"], table["sections"]["bar"]["rhoI"] = "space", [0.1, 0.05, 0.05]
+    for name in "AB":
+        table["nodes"][name]["axis"] = [0, 0, 1]
+    table["nodes"]["C"] |= {"joint": "hinge", "axis": [0, 0, 1]}
+    table["nodes"]["D"] = {"position": [1.5, -1], "support": "hinge", "axis": [0, 0, 1]}
+    table["members"]["third"] = {"type": "rigid", "nodes": ["C", "D"], "section": "bar"}
+    sentence = refusal(table)
+    assert "but closings depend on each other (closing of upper, z" in sentence
+    assert sentence.endswith("accepted: joints and supports of which none repeats what others hold")
+
+
+def test_a_condition_ends_it():
+    until = {"quantity": "nodes.C.position", "component": 1, "below": -1.0}
+    motion = sfetcas.solve(Scene.from_dict(double_pendulum(accuracy=1e-6, until=until)))
+    times = np.array([0.0, motion.last.time])
+    # The accuracy, at both.
+    assert motion.last.position("C") == pytest.approx(pendulum_tip(times)[0], abs=4e-6)
+    assert motion.last.position("C")[1] == pytest.approx(-1.0, abs=4e-6)
+    assert 0.0 < motion.last.time < 2.0
+
+
 def test_steps_are_its_own():
     sentence = "analysis.step: found 0.1 s with 'idas', which chooses its steps itself, accepted: without 'step', or "
     assert refusal(double_pendulum(step=0.1)) == sentence + "another integrator"

@@ -123,7 +123,10 @@ class Idas(Integrator):
                 continue
             self.count += solver.steps
             for t, reached in zip(piece.ends.tolist(), found, strict=True):
-                x, sample = projection.projected(reached, piece, t, piece.parameters(degree))
+                try:
+                    x, sample = projection.projected(reached, piece, t, piece.parameters(degree))
+                except RuntimeError:
+                    raise self._failed(piece) from None
                 self.norm, self.gap = projection.norm, projection.gap
                 if t in wanted:
                     yield sample
@@ -153,7 +156,7 @@ class Idas(Integrator):
     def _failed(self, piece: _Piece) -> SolveError:
         unit = self.system.masses.time
         span = f"between {piece.begin * unit:.6g} and {piece.end * unit:.6g} s"
-        detail = f"IDAS did not get on {span}: steps became too short, or more than {STEPS}"
+        detail = f"IDAS did not get on {span}: steps became too short, more than {STEPS}, or joints singular"
         return SolveError(Status.FAILED, detail)
 
 
@@ -184,9 +187,9 @@ class _Solver:
             problem = self._one.problem
             self._made[fractions] = ca.integrator("idas", "idas", problem, 0.0, list(fractions), self._options)
         function = self._made[fractions]
-        z = self._one.answers(x, 0.0, p)[0]
         with _interrupts() as interrupted:
             try:
+                z = self._one.answers(x, 0.0, p)[0]
                 found = np.array(function(x0=x, z0=z, p=p)["xf"])
             except RuntimeError:
                 if interrupted:

@@ -42,7 +42,8 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
         why, accepted = _without_inertia(equations, open_ones)
     else:
         rows = [equations.row_names[i] for i in np.flatnonzero(null[n:] > PART)]
-        why, accepted = f"closings depend on each other ({', '.join(rows[:3])})", OTHERS
+        why = f"closings depend on each other ({', '.join(rows[:3])})"
+        accepted = "joints and supports of which none repeats what others hold"
     raise SceneError(f"found 'idas', but {why}, accepted: {accepted}", ("analysis", "integrator"))
 
 
