@@ -76,7 +76,7 @@ class Flight:
         state = at_rest(self.model)
         self.loading, self.gap = self.model.loading(1.0), 0.0
         rates, _ = velocities(self.system, self.equations, state)
-        x, v = self.system.rates(state, self.stepper.factors(0.0), rates)
+        x, v = self.system.rates(state, self.system.factors(0.0), rates)
         kept = np.zeros((self.stepper.method.kept, len(x)))
         kept[0] = v
         self.memory = Memory(0.0, state.q, state.y, state.lam, x, kept, state.wound)
