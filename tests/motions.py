@@ -26,7 +26,7 @@ THICK = {"EI2": 1.0, "EI3": 2.0, "GJ": 0.8, "rhoA": 1.0, "rhoI": [0.02, 0.015, 0
 def cantilever(section=FLAT, value=(1.0, 2.0), **more):
     """A clamped strip that is pushed at its end, smoothly from rest."""
     return {
-        "sections": {"s": section},
+        "sections": {"s": dict(section)},
         "nodes": {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [1, 0, 0]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "loads": {"tip": {"type": "force", "node": "B", "value": list(value), "history": "on"}},

@@ -65,14 +65,14 @@ def thrown(space):
     else:
         nodes = {"A": {"position": [0, 0], "velocity": [0, 0.3]}, "B": {"position": [1, 0]}}
         member = {"nodes": ["A", "B"], "section": "s", "spin": {"polynomial": [4, -8.0]}}
-    return {"sections": {"s": THICK if space else FLAT}, "nodes": nodes, "members": {"m": member}}
+    return {"sections": {"s": dict(THICK if space else FLAT)}, "nodes": nodes, "members": {"m": member}}
 
 
 def chain(space):
     """A free chain of flexible and rigid members with hinges, a mass in the middle and a spring."""
     turning = {"spin": [0.5, 1.0, 3.0]} if space else {"spin": 3.0}
     table = {
-        "sections": {"s": THICK if space else FLAT},
+        "sections": {"s": dict(THICK if space else FLAT)},
         "nodes": {
             "A": {"position": [0, 0, 0], "velocity": [0.2, -1.0, 0.5 if space else 0.0]},
             "B": {"position": [1, 0, 0], "joint": "hinge", "mass": 0.3},

@@ -147,7 +147,7 @@ def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
 def velocities(system: StageEquations, equations: Equations, state: State) -> tuple[Array, tuple[str, ...]]:
     """Rates of all unknowns at the begin, and notes.
 
-    What is given holds; what is left open follows from the joints with the least rates of bending and turning.
+    What is given holds; what is left open follows from the joints with the least rates of bending, then of turning.
 
     Raises
     ------
@@ -166,15 +166,17 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
     full[equations.row, equations.column] = equations.at(free, model.loading(0.0).scaled(0.0)).entries
     stiffness = 0.5 * (full[:n, :n] + full[:n, :n].T)
     values, vectors = np.linalg.eigh(stiffness)
-    weight = (vectors * np.abs(values)) @ vectors.T + OPEN * np.eye(n)
+    small = np.where(np.arange(n) < equations.turning_unknowns, TURNING, MOVING)
+    root = np.vstack([np.sqrt(np.abs(values))[:, None] * vectors.T, np.diag(small)])
     held = full[n:, :n]
     both = np.vstack([held, rows])
     right = np.concatenate([np.zeros(closings), wanted])
-    # Least energy on what is given; what cannot be met is missed as little as possible.
-    root = np.linalg.cholesky(weight)
-    reduced = np.linalg.solve(root, both.T).T
-    solution = np.linalg.lstsq(reduced, right, rcond=RANK)[0]
-    rates = np.linalg.solve(root.T, solution)
+    # What cannot be met is missed as little as possible; then the least energy on what is given.
+    u, sizes, axes = np.linalg.svd(both)
+    rank = int((sizes > RANK * sizes[0]).sum())
+    rates = axes[:rank].T @ ((u[:, :rank].T @ right) / sizes[:rank])
+    rest = axes[rank:].T
+    rates = rates - rest @ np.linalg.lstsq(root @ rest, root @ rates, rcond=None)[0]
     missed = rows @ rates - wanted
     largest = float(np.abs(wanted).max())
     worst = int(np.abs(missed).argmax())
@@ -192,10 +194,13 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
     return rates, ()
 
 
-OPEN = 1e-8
-"""Weight of turning and moving as such beside that of bending, in the units of the model."""
+TURNING, MOVING = 1e-4, 1e-8
+"""Roots of the weights of turning and moving as such beside that of bending, in the units of the model.
 
-RANK = 1e-13
+What is thrown at one node only flies on without turning, what nothing is given of stays where it is.
+"""
+
+RANK = 1e-12
 """Singular values below this share of the largest are none."""
 
 CONTRADICTION = 1e-3

@@ -131,6 +131,7 @@ class Inertia:
         spread[self._inside] = inner
         pull, carried_to = carried(spread, model.segments, model.element)
         moment, own = loading.moment.copy(), on_places.copy()
+        couple, jump = loading.couple.copy(), loading.jump.copy()
         places = equations.places(state, loading)
         for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
             shares = -self._shares(equations, state, places, group, batch, forces[begin:end])
@@ -141,6 +142,8 @@ class Inertia:
                 three_of = np.zeros((len(part), 3))
                 three_of[:, 3 - width :] = part
                 np.add.at(moment, turns[used], three_of[used])
+                for sums, number in () if group.at is None else zip((couple, jump), group.at.T, strict=True):
+                    np.add.at(sums, number[number >= 0], three_of[number >= 0])
             first = width * group.turns.shape[1]
             for side, at in enumerate(group.places.T):
                 used, begin_of = at >= 0, first + system.axes * side
@@ -152,6 +155,8 @@ class Inertia:
             spread=loading.spread + spread,
             pull=loading.pull + pull,
             moment=moment,
+            couple=couple,
+            jump=jump,
         )
 
     def _shares(

@@ -43,6 +43,9 @@ class Observables:
         The group of connections whose angles these are, in which the counted turns stand.
     numbers : ndarray (n,) or None
         Which of that group.
+    at : ndarray (n, 2) or None
+        Of section axes the place and the element to whose balance of moments their inertia belongs, -1 for none: nodes
+        that share a rotation have balances of their own.
     """
 
     kind: Connection
@@ -53,6 +56,7 @@ class Observables:
     damping: Array
     spring: int | None = None
     numbers: Index | None = None
+    at: Index | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +108,10 @@ class _Weigher:
         self.inner, self.inner_drag = np.zeros(model.beams.weight.shape), np.zeros(model.beams.weight.shape)
         # Of each rotation the sum of weight times b b^T over the axes b that turn with it.
         self.spread = np.zeros((len(model.rotations.kind), 3, 3))
+        # The same of what turns with rigid members, by rotation, place and element.
+        self.shared: dict[tuple[int, int, int], Array] = {}
+        rigid = [name for name, member in self.scene.members.items() if member.type == "rigid"]
+        self.rigid = {int(model.rotations.ends[name][0]) for name in rigid}
         self.bodies: dict[str, BodyMass] = {}
         self.total = 0.0
 
@@ -125,7 +133,7 @@ class _Weigher:
             self.drag[number] += node.drag
             turn = model.rotations.node_turn[name]
             if node.inertia is not None and turn is not None:
-                self._turning(turn, np.eye(3), np.asarray(node.inertia))
+                self._turning(turn, np.diag(euler_weights(np.asarray(node.inertia))), place=number)
         length, moment = model.scales.length, model.scales.moment
         if self.total <= 0.0:
             raise SceneError("nothing has a mass, accepted: a section with rhoA, or a node with mass")
@@ -148,9 +156,13 @@ class _Weigher:
     def _at(self, row: int, column: int, mass: float) -> None:
         self.entries.append((row, column, mass))
 
-    def _turning(self, turn: int, axes: Array, inertia: Array) -> None:
-        """Moments of inertia (3,), kg m2, about axes (columns) that turn with a rotation."""
-        self.spread[turn] += axes @ np.diag(euler_weights(inertia)) @ axes.T
+    def _turning(self, turn: int, spread: Array, place: int = -1, element: int = -1) -> None:
+        """Sum of weight times b b^T over axes b that turn with a rotation, of a node or within an element."""
+        if turn in self.rigid:
+            key = (turn, place, element)
+            self.shared[key] = self.shared.get(key, np.zeros((3, 3))) + spread
+        else:
+            self.spread[turn] += spread
 
     # -- members --------------------------------------------------------------------------------
 
@@ -175,7 +187,10 @@ class _Weigher:
             frames = quaternion.matrix(line.quaternions(x.ravel()))
             parts = euler_weights(inertia * weights.ravel()[:, None])
             spread = np.einsum("nij,nj,nkj->nik", frames, parts, frames)
-            np.add.at(self.spread, model.rotations.turns[part].ravel(), spread)
+            chain = model.rotations.turns[part].ravel()
+            np.add.at(self.spread, chain[1:-1], spread[1:-1])
+            for i in (0, -1):
+                self._turning(int(chain[i]), spread[i], place=model.segments.place(model.segments.ends[name, -i]))
 
     def _add_rigid(self, name: str) -> None:
         """The mass spread over the straight line between the nodes: exact between the displacements of its ends."""
@@ -193,28 +208,35 @@ class _Weigher:
             self._at(row, column, float(share @ weight))
         inertia = (section.inertia(x) * (w * chord.length)[:, None]).sum(axis=0)
         frame = quaternion.matrix(chord.quaternions(np.array([0.5])))[0]
-        self._turning(self.model.rotations.ends[name][0], frame, inertia)
+        turned = frame @ np.diag(euler_weights(inertia)) @ frame.T
+        self._turning(int(self.model.rotations.ends[name][0]), turned, element=self.model.elements_of(name).start)
 
     # -- groups ---------------------------------------------------------------------------------
 
     def _axes(self, unit: float) -> list[Observables]:
         """Rotary inertia of all rotations that have any."""
+        turns, at = np.arange(len(self.spread)), np.full((len(self.spread), 2), -1)
+        spread = self.spread
+        if self.shared:
+            keys = np.array(list(self.shared))
+            turns, at = np.concatenate([turns, keys[:, 0]]), np.concatenate([at, keys[:, 1:]])
+            spread = np.concatenate([spread, list(self.shared.values())])
         if not self.space:
             # The turning of one direction: about z, the sum of the weights of what lies in the plane.
-            about = self.spread[:, 0, 0] + self.spread[:, 1, 1]
-            turns = np.flatnonzero(about)
-            data = np.tile([1.0, 0.0], (len(turns), 1))
-            mass = np.repeat(about[turns, None], 2, axis=1)
+            about = spread[:, 0, 0] + spread[:, 1, 1]
+            used = np.flatnonzero(about)
+            data = np.tile([1.0, 0.0], (len(used), 1))
+            mass = np.repeat(about[used, None], 2, axis=1)
         else:
-            turns = np.flatnonzero(np.abs(self.spread).max(axis=(1, 2)))
-            values, vectors = np.linalg.eigh(self.spread[turns])
+            used = np.flatnonzero(np.abs(spread).max(axis=(1, 2)))
+            values, vectors = np.linalg.eigh(spread[used])
             data = vectors.transpose(0, 2, 1).reshape(-1, 9)
             mass = np.repeat(values, 3, axis=1)
-        if not len(turns):
+        if not len(used):
             return []
-        kind = Axes(self.space)
-        places = np.zeros((len(turns), 0), dtype=np.intp)
-        return [Observables(kind, turns[:, None], places, data, mass / unit, np.zeros(mass.shape))]
+        places = np.zeros((len(used), 0), dtype=np.intp)
+        none = np.zeros(mass.shape)
+        return [Observables(Axes(self.space), turns[used, None], places, data, mass / unit, none, at=at[used])]
 
     def _bodies(self, unit: float) -> list[Observables]:
         """Points and numbers of the small members, those of one kind together."""

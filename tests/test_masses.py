@@ -1,0 +1,266 @@
+"""Masses, dampers, loads and motions against closed forms and equations of motion written by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from motions import FLAT, SMOOTH, THICK, cantilever, changed, moved
+
+import sfetcas
+from sfetcas.mathematics import quaternion as quat
+
+GRAVITY = 9.81
+CLOSE = 1e-6
+"""Of lengths of 1: runs are asked for 1e-7."""
+RATES = 1e-3
+"""Of accelerations and reactions, which are second derivatives of what is asked for: of their size, some 10."""
+ROD = {"rhoA": 1.2, "rhoI": [0.02, 0.01, 0.01]}
+J = 1.2 / 3 + 0.01
+"""Inertia of the rod about its end."""
+
+
+def exact(table, end, **keys):
+    return moved(table, end, accuracy=1e-7, **keys)
+
+
+def runge_kutta(rate, x, end, steps=4000):
+    """The state at the end by the classical method; its error is below 1e-10 here."""
+    x, h = np.asarray(x, dtype=float), end / steps
+    for i in range(steps):
+        t = i * h
+        a = rate(t, x)
+        b = rate(t + h / 2, x + h / 2 * a)
+        c = rate(t + h / 2, x + h / 2 * b)
+        d = rate(t + h, x + h * c)
+        x = x + h / 6 * (a + 2 * b + 2 * c + d)
+    return x
+
+
+def rod(**more):
+    return {
+        "sections": {"s": ROD},
+        "nodes": {"A": {"position": [0, 0, 0], "support": "hinge"}, "B": {"position": [1, 0, 0]}},
+        "members": {"r": {"nodes": ["A", "B"], "type": "rigid", "section": "s"}},
+        **more,
+    }
+
+
+def direction(angle):
+    return np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def across(angle):
+    return np.array([-math.sin(angle), math.cos(angle), 0.0])
+
+
+# -- rigid bodies -----------------------------------------------------------------------------------------------------
+
+
+def pendulum(t, x):
+    return np.array([x[1], -1.2 * GRAVITY * 0.5 * math.cos(x[0]) / J])
+
+
+@pytest.mark.parametrize("integrator", ["radau-3", "radau-2", "generalised-alpha", "conserving"])
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_pendulum(integrator, dimension):
+    table = rod(gravity=[0, -GRAVITY, 0], dimension=dimension)
+    order2 = integrator in ("generalised-alpha", "conserving")
+    step = moved(table, 1.3, accuracy=1e-5 if order2 else 1e-7, integrator=integrator).last
+    angle, rate = runge_kutta(pendulum, [0, 0], 1.3)
+    loose = 100 if order2 else 1
+    assert np.abs(step.position("B") - direction(angle)).max() < loose * CLOSE
+    assert np.abs(step.velocity("B") - rate * across(angle)).max() < loose * 1e-4
+    turning = pendulum(0, [angle, rate])[1]
+    acceleration = 0.5 * (turning * across(angle) - rate**2 * direction(angle))
+    force, moment = step.reaction("A")
+    assert np.abs(force - 1.2 * (acceleration + [0, GRAVITY, 0])).max() < 10 * loose * RATES
+    assert np.abs(moment).max() < 10 * loose * RATES
+    assert step.energy["kinetic"] == pytest.approx(0.5 * J * rate**2, rel=loose * 1e-4)
+    assert np.abs(step.momentum["angular"] - [0, 0, (0.1 + 0.01) * rate]).max() < loose * 1e-4
+
+
+def test_double_pendulum():
+    table = rod(gravity=[0, -GRAVITY, 0])
+    table["nodes"]["B"] |= {"joint": "hinge", "mass": 0.3}
+    table["nodes"]["C"] = {"position": [1.6, 0, 0], "mass": 0.2}
+    table["members"]["q"] = {"nodes": ["B", "C"], "type": "rigid", "section": "s"}
+    # Lagrange's equations: rods of lengths 1 and 0.6, masses at their ends.
+    m, n, long = 1.2, 1.2 * 0.6, 0.6
+    first = J + (0.3 + n + 0.2)
+    second = n * long**2 / 3 + 0.01 * long + 0.2 * long**2
+    lever = (n / 2 + 0.2) * long
+
+    def rate(t, x):
+        a, b, va, vb = x
+        matrix = np.array([[first, lever * math.cos(a - b)], [lever * math.cos(a - b), second]])
+        right = [
+            -lever * math.sin(a - b) * vb**2 - GRAVITY * (m / 2 + 0.3 + n + 0.2) * math.cos(a),
+            lever * math.sin(a - b) * va**2 - GRAVITY * lever * math.cos(b),
+        ]
+        return np.array([va, vb, *np.linalg.solve(matrix, right)])
+
+    a, b, va, vb = runge_kutta(rate, [0, 0, 0, 0], 1.5)
+    step = exact(table, 1.5).last
+    print(step.position("C") - direction(a) - long * direction(b))
+    assert np.abs(step.position("B") - direction(a)).max() < CLOSE
+    assert np.abs(step.position("C") - direction(a) - long * direction(b)).max() < 10 * CLOSE
+    assert np.abs(step.velocity("C") - va * across(a) - long * vb * across(b)).max() < 1e-3
+
+
+INERTIA = np.array([0.3, 0.5, 0.7])
+
+
+def top(spin, **node):
+    """A light rigid arm, all mass and inertia at the node B, asymmetric."""
+    return {
+        "nodes": {
+            "A": {"position": [0, 0, 0], **node},
+            "B": {"position": [0.2, 0, 0.6], "mass": 1.5, "inertia": INERTIA.tolist()},
+        },
+        "members": {"arm": {"nodes": ["A", "B"], "type": "rigid", "spin": spin}},
+    }
+
+
+def tumbling(spin, lever, end, integrator="radau-3", **table):
+    """End of the arm and rate of turning, by Euler's equations about its fixed end or the centre of mass."""
+    inertia = np.diag(INERTIA) + 1.5 * (lever @ lever * np.eye(3) - np.outer(lever, lever))
+
+    def rate(t, x):
+        turn, w = quat.matrix(x[:4] / np.linalg.norm(x[:4])), x[4:]
+        moment = np.cross(lever, turn.T @ [0, 0, -1.5 * GRAVITY])
+        return np.concatenate(
+            [
+                0.5 * quat.multiply(x[:4], np.array([0.0, *w])),
+                np.linalg.solve(inertia, moment - np.cross(w, inertia @ w)),
+            ]
+        )
+
+    return runge_kutta(rate, [1, 0, 0, 0, *spin], end)
+
+
+@pytest.mark.parametrize("integrator", ["radau-3", "conserving"])
+def test_heavy_top(integrator):
+    spin, lever = [0.5, 1.0, 6.0], np.array([0.2, 0.0, 0.6])
+    x = tumbling(spin, lever, 1.5)
+    table = {**top(spin, support="ball"), "gravity": [0, 0, -GRAVITY]}
+    loose = 1 if integrator == "radau-3" else 100
+    step = moved(table, 1.5, accuracy=1e-7 if loose == 1 else 1e-5, integrator=integrator).last
+    turn = quat.matrix(x[:4] / np.linalg.norm(x[:4]))
+    print(step.position("B") - turn @ lever)
+    assert np.abs(step.position("B") - turn @ lever).max() < 10 * loose * CLOSE
+    assert abs(abs(step.quaternion("B") @ x[:4]) - 1.0) < loose * CLOSE
+    force, moment = step.reaction("A")
+    assert np.abs(moment).max() < loose * 10 * RATES
+
+
+def test_a_free_body_tumbles_by_euler():
+    spin, lever = np.array([0.2, 4.0, 0.3]), np.zeros(3)
+    x = tumbling(spin, lever, 2.0)
+    velocity = np.array([0.3, -0.2, 0.5])
+    table = top(spin.tolist(), velocity=(velocity + np.cross(spin, [-0.2, 0, -0.6])).tolist())
+    table["nodes"]["B"]["velocity"] = velocity.tolist()
+    step = exact(table, 2.0).last
+    print(step.position("B") - [0.2, 0, 0.6] - 2.0 * velocity)
+    assert np.abs(step.position("B") - [0.2, 0, 0.6] - 2.0 * velocity).max() < CLOSE
+    turn = quat.matrix(x[:4] / np.linalg.norm(x[:4]))
+    assert np.abs(step.position("A") - step.position("B") + turn @ [0.2, 0, 0.6]).max() < 10 * CLOSE
+    assert np.abs(step.momentum["angular"] - INERTIA * spin).max() < 1e-3
+    assert np.abs(step.momentum["linear"] - 1.5 * velocity).max() < CLOSE
+
+
+# -- dampers, drag ----------------------------------------------------------------------------------------------------
+
+
+def slider(**more):
+    """A mass on a guide along x, on a light rod that is there to have a member."""
+    return {
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "slider", "direction": [1, 0, 0], "mass": 2.0},
+            "B": {"position": [0, 1, 0]},
+        },
+        "members": {"r": {"nodes": ["A", "B"], "type": "rigid"}},
+        **more,
+    }
+
+
+def damped(mass, damper, stiffness, speed, t):
+    """A damped oscillator thrown from its rest."""
+    decay = damper / mass / 2
+    omega = math.sqrt(stiffness / mass - decay**2)
+    return speed / omega * math.exp(-decay * t) * math.sin(omega * t)
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+@pytest.mark.parametrize("spring", [{"direction": [1, 0, 0]}, {"anchor": [-1, 0, 0]}], ids=["along", "length"])
+def test_damped_oscillator(dimension, spring):
+    table = slider(dimension=dimension)
+    table["nodes"]["A"]["velocity"] = [0.5, 0, 0]
+    table["springs"] = {"s": {"type": "translational", "node": "A", "stiffness": 30.0, "damping": 1.6, **spring}}
+    step = exact(table, 1.7).last
+    assert step.position("A")[0] == pytest.approx(damped(2.0, 1.6, 30.0, 0.5, 1.7), abs=CLOSE)
+
+
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_damped_turning(dimension):
+    table = rod(dimension=dimension, springs={"s": {"node": "A", "stiffness": 12.0, "damping": 0.4}})
+    table["members"]["r"]["spin"] = [0, 0, 2.0] if dimension == "space" else 2.0
+    angle = damped(J, 0.4, 12.0, 2.0, 1.1)
+    assert np.abs(exact(table, 1.1).last.position("B") - direction(angle)).max() < CLOSE
+
+
+def test_drag_of_a_node():
+    table = slider()
+    table["nodes"]["A"] |= {"velocity": [1.5, 0, 0], "drag": 0.7}
+    table["loads"] = {"pull": {"type": "force", "node": "A", "value": [3.0, 1.0, 0]}}
+    k, t = 0.7 / 2.0, 2.0
+    last = 3.0 / 0.7
+    x = last * t + (1.5 - last) * (1 - math.exp(-k * t)) / k
+    step = exact(table, t).last
+    assert step.position("A")[0] == pytest.approx(x, abs=10 * CLOSE)
+    assert step.velocity("A")[0] == pytest.approx(last + (1.5 - last) * math.exp(-k * t), abs=1e-4)
+    assert np.abs(step.reaction("A")[0] - [0, -1, 0]).max() < RATES
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_drag_of_a_member(space):
+    section = (THICK if space else FLAT) | {"drag": 0.6}
+    table = cantilever(section, nodes={"A": {"position": [0, 0, 0], "velocity": [1, 2, 0]}, "B": {"position": [1, 0, 0]}})
+    del table["loads"]
+    table["gravity"] = [0, -GRAVITY, 0]
+    k, t = 0.6, 1.5
+    fall = -GRAVITY / k
+    there = [(1 - math.exp(-k * t)) / k, fall * t + (2 - fall) * (1 - math.exp(-k * t)) / k, 0]
+    assert np.abs(exact(table, t).last.position("A") - there).max() < 10 * CLOSE
+
+
+# -- small vibrations -------------------------------------------------------------------------------------------------
+
+FIRST = 3.51601526850015
+"""Square of the lowest root of 1 + cos cosh."""
+SLENDER = {"EI3": 1.0, "rhoA": 1.0}
+TIP = 1e-4
+"""Deflections, m: the period changes by their square."""
+
+
+def ringing(section, periods, **more):
+    """A cantilever let go from a bent shape: times and deflections of its end."""
+    table = cantilever(section)
+    table["loads"]["tip"] = {"type": "force", "node": "B", "value": [0, 3 * TIP * 1.0]}
+    begin = {"initial": "equilibrium", "cut": ["tip"]}
+    period = 2 * math.pi / FIRST
+    motion = moved(table, periods * period, period / 200, element="SFET5", elements=2, output=period / 200, **begin, **more)
+    return motion.times, motion.positions("B")[:, 1]
+
+
+def test_period_of_a_cantilever():
+    times, y = ringing(SLENDER, 10)
+    # The first mode by its projection on two windows of five periods each.
+    half = len(times) // 2
+    phases = [np.angle(np.trapezoid(y[part] * np.exp(-1j * FIRST * times[part]) * window(half), times[part])) for part in (slice(0, half), slice(half, 2 * half))]
+    shift = (phases[1] - phases[0] + math.pi) % (2 * math.pi) - math.pi
+    assert abs(shift) < 1e-4
+
+
+def window(n):
+    """Smooth weights that other modes do not get through."""
+    return np.sin(math.pi * (np.arange(n) + 0.5) / n) ** 4
