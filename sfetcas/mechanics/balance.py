@@ -20,7 +20,7 @@ from .equations import Equations, State
 from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
 from .joints import Spring as Tension
 from .loading import Loading
-from .rotations import STIFF, end_joints
+from .rotations import STIFF, Turn, end_joints
 
 __all__ = ["Balance", "SpringState", "three"]
 
@@ -124,7 +124,16 @@ class Balance:
             return sum((self._totals[turn] for turn in self._pinned(node)), np.zeros(3))
         if self._shared(number):
             return self._rigid[1].get(node, np.zeros(3))
-        return self._totals[number]
+        return self._held(node, number)
+
+    def _held(self, node: str, number: int) -> Array:
+        """What is left of the moments on a rotation about what the ground holds: the rest is not exactly in balance."""
+        kind, left = self.model.rotations.kind[number], self._totals[number]
+        if kind == Turn.AXIS:
+            axis = self.model.rotations.axis[number]
+            return left - (axis @ left) * axis
+        free = kind == Turn.FREE and self.model.scene.nodes[node].support != "universal"
+        return np.zeros(3) if free else left
 
     def _pinned(self, node: str) -> list[int]:
         """Rotations of member ends that the support itself pins, the node having none."""
