@@ -73,7 +73,7 @@ class Conserving(Method):
         )
         h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
         found = _Middle(system, begin, h, factors, q, y, lam)
-        step = system.solved(found.entries, found.residual, linear)
+        step = system.solved(found.entries, [2.0 / h**2], found.residual, linear)
         (there,), shift, more, size = system.moved([q], step)
         constants = [begin.q, begin.y, begin.x, begin.rates, begin.near, h, factors]
         return ca.Function("middle", [q, y, lam, *constants], [there, y + shift, lam + more, size])

@@ -1,4 +1,4 @@
-"""What turns or moves without inertia: integrators of index 1 cannot take it, as nothing gives it an acceleration."""
+"""What turns or moves without inertia: integrators of index 1 cannot take it, others not if nothing resists either."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 
-__all__ = ["check_inertia"]
+__all__ = ["check_inertia", "check_resisted"]
 
 SINGULAR = 1e-13
 """Shift of an equilibrated matrix: what its entries have of rounding, or less."""
@@ -45,6 +45,29 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
         why = f"closings depend on each other ({', '.join(rows[:3])})"
         accepted = "joints and supports of which none repeats what others hold"
     raise SceneError(f"found 'idas', but {why}, accepted: {accepted}", ("analysis", "integrator"))
+
+
+def check_resisted(equations: Equations, matrix: Array) -> None:
+    """Refuse what has neither inertia nor stiffness, so that nothing says how it moves.
+
+    Parameters
+    ----------
+    matrix : ndarray (total, total)
+        Stiffness, masses and closings, ``[K + M G^T; G 0]``.
+
+    Raises
+    ------
+    SceneError
+        Names sections, nodes or members.
+    """
+    null = _null(matrix)
+    if null is None:
+        return
+    open_ones = np.flatnonzero(null[: equations.unknowns] > PART)
+    if len(open_ones):
+        why, accepted = _without_inertia(equations, open_ones)
+        accepted = accepted.split(",")[0] if accepted.startswith("'rhoI'") else "a mass, an inertia or a spring there"
+        raise SceneError(f"{why}, and no stiffness either, accepted: {accepted}")
 
 
 def _null(matrix: Array) -> Array | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from ..description.scene import Scene
@@ -25,6 +26,7 @@ from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
 from .idas import Idas
 from .inertia import Inertia
+from .inertialess import check_resisted
 from .integrators import Begun, Course, Integrator, Stages
 from .methods import GeneralisedAlpha, Radau
 from .motion import Instant, Motion, Mover
@@ -166,6 +168,8 @@ class _Simulation:
         except KeyboardInterrupt:
             run.interrupted = True
         except SolveError as error:
+            if not run.instants:
+                check_resisted(equations, _resistance(system, begun))
             run.failure = error
         if watch is None or not watch.ended:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
@@ -259,3 +263,15 @@ class _Simulation:
                 run.failure.reached = motion
             raise run.failure
         return motion
+
+
+def _resistance(system: StageEquations, begun: Begun) -> Array:
+    """Stiffness, masses and closings at the begin."""
+    n, state = system.layout, begun.state
+    q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
+    factors, near = ca.MX.sym("factors", n.factors), ca.MX.sym("near", n.near)
+    stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, near)
+    whole = system.static_matrix(stage) + system.coupling_matrix(stage, 0.0, 1.0)
+    matrix = ca.Function("resistance", [q, y, lam, factors, near], [whole])
+    # Without loads, which are not yet in balance.
+    return np.array(matrix(state.q.T, state.y, np.zeros(n.lam), np.zeros(n.factors), state.wound))

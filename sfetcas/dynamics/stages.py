@@ -610,18 +610,24 @@ class StageEquations:
         entries = [stage.entries for stage in found]
         for i, one in enumerate(found):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
-        step = self.solved(entries, ca.horzcat(*[stage.residual for stage in found]), linear)
+        inertia = [b[i, i] for i in range(stages)]
+        step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]), linear)
         turned, shift, more, size = self.moved(parts, step)
         results = [ca.horzcat(*turned), y + shift, lam + more, size]
         names = ["q", "y", "lam", "x0", "v", "a", "C", "B", "factors", "near"]
         arguments = [q, y, lam, x0, v, a, c, b, factors, near]
         return ca.Function(f"iteration_{stages}", arguments, results, names, ["q_next", "y_next", "lam_next", "size"])
 
-    def solved(self, entries: list[ca.MX], residual: ca.MX, linear: str) -> ca.MX:
-        """Newton's step of all stages, (total, stages), for entries in the order of their places."""
+    def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX, linear: str) -> ca.MX:
+        """Newton's step of all stages, (total, stages), for entries in the order of their places.
+
+        ``inertia`` is what accelerations of each stage are multiplied by: beside the masses over it closings are
+        slightly soft in the matrix, not in the equations, so that some may depend on each other.
+        """
         stages = residual.shape[1]
         system = self._system(stages)
-        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries)))
+        soft = [-SOFT / part for part in inertia]
+        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *soft)))
         left = ca.vec(residual.T)
         return -ca.reshape(ca.solve(matrix, left[system.order], linear)[system.back], stages, self.total).T
 
@@ -727,6 +733,8 @@ class StageEquations:
         place = np.argsort(np.array(amd, dtype=np.intp))
         blocks = [(i, i, static, one + 1) for i in range(stages)]
         blocks += [(i, j, coupled, probe.coupled.count) for i in range(stages) for j in range(stages)]
+        rows = np.arange(self.equations.unknowns, self.total)
+        blocks += [(i, i, (rows, rows, np.ones(len(rows)), np.zeros(len(rows), np.intp)), 1) for i in range(stages)]
         size, first, flat, weights, entries = self.total * stages, 0, [], [], []
         for i, j, (r, c, weight, number), count in blocks:
             flat.append((place[c] * stages + j) * size + place[r] * stages + i)
@@ -739,6 +747,10 @@ class StageEquations:
         back = (place[:, None] * stages + np.arange(stages)).ravel()
         found = pattern(size, places % size, places // size)
         return _System(found, sums, np.argsort(back).tolist(), back.tolist())
+
+
+SOFT = 1e-10
+"""Softness of closings in the matrix over the inverse of what resists them, the whole mass being one."""
 
 
 @dataclass(frozen=True)
