@@ -1,11 +1,12 @@
-"""sfetcas: equilibria of very flexible beams under large motion.
+"""sfetcas: equilibria, vibrations and motions of very flexible beams.
 
 The flow, in the order of the names below:
 
 1. a :class:`Scene` says what there is: sections, nodes, members, loads, motions (or :func:`load` a file);
-2. :func:`solve` finds its equilibria, to the accuracy asked for, each with a certificate;
+2. :func:`solve` finds its equilibria, each with a certificate, its vibrations or its motion, to the accuracy asked for;
 3. a :class:`Solution` answers by the names of the scene; a :class:`Path` does so along a path, and :func:`switch`
-   follows other branches from its bifurcations.
+   follows other branches from its bifurcations; :class:`Modes` has frequencies and shapes, a :class:`Trajectory` the
+   states of a motion, each an :class:`Instant`.
 
 Underneath: :func:`assemble` makes the :class:`Model` of a scene on a :class:`Mesh`; :class:`Prepared` keeps its
 solvers for repeated solves by :func:`solve_model`; :func:`equilibrium_nlp` opens the problem as a CasADi program
@@ -23,6 +24,8 @@ from .description.scenefile import dump, load
 from .description.sections import CrossSection, Polynomial, Table
 from .description.shapes import Arc, Curvature, Helix, Spline, Straight
 from .description.springs import Spring
+from .dynamics.modes import Modes
+from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Certificate, Equilibrium, Solution
 from .equilibria.statics import Settings, solve_model
 from .errors import SceneError, SolveError, Status
@@ -49,11 +52,13 @@ __all__ = [
     "Expect",
     "Helix",
     "History",
+    "Instant",
     "Ipopt",
     "Load",
     "Member",
     "Mesh",
     "Model",
+    "Modes",
     "Motion",
     "NLPResult",
     "Node",
@@ -74,6 +79,7 @@ __all__ = [
     "Status",
     "Straight",
     "Table",
+    "Trajectory",
     "Until",
     "assemble",
     "check",

@@ -12,7 +12,7 @@ import numpy as np
 from .description.records import nearest, say
 from .description.scene import Expect, Scene
 from .dynamics.modes import Modes
-from .dynamics.motion import Instant, Motion
+from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
 from .paths.path import Path
@@ -20,7 +20,7 @@ from .paths.path import Path
 __all__ = ["Answer", "Check", "check", "look_up"]
 
 
-Answer = Solution | Path | Motion | Modes
+Answer = Solution | Path | Trajectory | Modes
 """What an analysis may give."""
 
 
@@ -79,7 +79,7 @@ def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | Instant:
     """The answer that an expectation speaks of."""
     if isinstance(solution, Path):
         return _entry_on_path(solution, expect)
-    if isinstance(solution, Motion):
+    if isinstance(solution, Trajectory):
         return solution.last if expect.time is None else solution.at(expect.time)
     if expect.step is None:
         return solution.last

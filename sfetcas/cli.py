@@ -19,7 +19,7 @@ from .checks import Answer, Check, check
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load
-from .dynamics.motion import Motion
+from .dynamics.motion import Trajectory
 from .equilibria.solution import Solution
 from .equilibria.statics import Settings, pilot_of
 from .errors import SceneError, SolveError, Status
@@ -126,7 +126,7 @@ def _run(options: argparse.Namespace) -> int:
     try:
         solution, checks = _answered(options.file, scene, settings)
     except SolveError as error:
-        if isinstance(error.reached, (Solution, Motion)):
+        if isinstance(error.reached, (Solution, Trajectory)):
             told(error.reached)
         raise
     told(solution)
@@ -147,7 +147,7 @@ def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Answer, lis
 def _verdict(solution: Answer, checks: Sequence[Check]) -> int:
     """Print the comparisons, and what the exit code of an answer is."""
     print_checks(checks)
-    if solution.status is Status.INTERRUPTED and isinstance(solution, Motion):
+    if solution.status is Status.INTERRUPTED and isinstance(solution, Trajectory):
         reached, end = solution.last.time, solution.scene.analysis.duration
         print(f"sfetcas: interrupted: the motion is known up to {reached:.6g} of {end:.6g} s", file=sys.stderr)
         return INTERRUPTED

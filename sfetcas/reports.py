@@ -10,7 +10,7 @@ import numpy as np
 from .checks import Answer, Check
 from .description.records import counted
 from .dynamics.modes import Modes
-from .dynamics.motion import Instant, Motion
+from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium
 from .mechanics.model import Model
 from .paths.path import Branch
@@ -38,7 +38,7 @@ def report(solution: Answer, seconds: float) -> None:
         _report_path(solution)
     if isinstance(solution, Modes):
         _report_modes(solution)
-    if isinstance(solution, Motion):
+    if isinstance(solution, Trajectory):
         _report_motion(solution)
     else:
         for step, place in zip(solution.steps, _places(solution), strict=True):
@@ -72,7 +72,7 @@ def _report_path(path: Course) -> None:
         print(f"  note: {note}")
 
 
-def _report_motion(motion: Motion) -> None:
+def _report_motion(motion: Trajectory) -> None:
     answers = counted(len(motion.steps), "answer")
     print(f"  {motion.integrator}, {counted(motion.count, 'step')} in time, {answers} up to {motion.last.time:.9g} s")
     ends = [motion.steps[0], motion.last] if len(motion.steps) > 1 else [motion.last]
@@ -102,7 +102,7 @@ def _report_instant(instant: Instant) -> None:
     print(f"  energy: {energy} N m")
 
 
-def _report_course(motion: Motion) -> None:
+def _report_course(motion: Trajectory) -> None:
     """What is largest over the answers, and what should stay as it is."""
     print("over all answers")
     _report_largest(motion)
@@ -119,7 +119,7 @@ def _report_course(motion: Motion) -> None:
             print(f"  {kind} momentum: {_vector(values[0])} {unit} at first, off by at most {off:.1e}")
 
 
-def _report_largest(motion: Motion) -> None:
+def _report_largest(motion: Trajectory) -> None:
     """Nodes that go the farthest and the fastest, and the largest reaction, with their times."""
     nodes = motion.last.model.nodes
     away = [np.linalg.norm(motion.positions(name) - motion.positions(name)[0], axis=1) for name in nodes]
@@ -135,7 +135,7 @@ def _report_largest(motion: Motion) -> None:
             print(f"  {what}: {kind} {names[i]}, {table[i, k]:.6g} {unit} at {motion.times[k]:.6g} s")
 
 
-def _floats(motion: Motion) -> bool:
+def _floats(motion: Trajectory) -> bool:
     """Whether nothing holds the structure while it moves."""
     scene = motion.last.model.scene
     grounded = any(

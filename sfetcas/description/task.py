@@ -131,7 +131,7 @@ class Analysis(Record):
         vanish at once the first shape is taken; ``switch`` takes others
     modes : so many of the lowest, 8 where left out; of a path at each of its points, where left out none
     end : s - dynamic: the motion is followed from 0 to this time
-    output : s - dynamic: spacing of the answers, left out: chosen by the steps in time
+    output : s - dynamic: spacing of the answers, left out: a hundredth of the span
     step : s - dynamic: fixed step in time, left out: chosen by the accuracy
     integrator : dynamic: how steps in time are made, left out: chosen
     initial : dynamic: the motion begins undeformed, or at rest in the equilibrium of the loads and motions as their

@@ -21,7 +21,7 @@ from .inertia import Inertia
 from .projecting import factor_closings
 from .sampling import Sample
 
-__all__ = ["Instant", "Motion", "Mover"]
+__all__ = ["Instant", "Mover", "Trajectory"]
 
 
 class Mover:
@@ -128,7 +128,7 @@ class Instant(Posture):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Trajectory:
     """The motion of a scene, made by :func:`sfetcas.solve`.
 
     Attributes

@@ -29,7 +29,7 @@ from .inertia import Inertia
 from .inertialess import check_resisted
 from .integrators import Begun, Course, Integrator, Stages
 from .methods import GeneralisedAlpha, Radau
-from .motion import Instant, Motion, Mover
+from .motion import Instant, Mover, Trajectory
 from .stages import StageEquations
 from .watching import Measure, Watch, finer
 
@@ -57,7 +57,7 @@ ROUNDS = 6
 @single_threaded
 def simulate(
     scene: Scene, settings: Settings, measure: Measure, progress: Callable[[float], Any] | None = None
-) -> Motion:
+) -> Trajectory:
     """The motion of a scene.
 
     Parameters
@@ -204,7 +204,7 @@ class _Simulation:
 
     # -- all --------------------------------------------------------------------------------------------
 
-    def motion(self) -> Motion:
+    def motion(self) -> Trajectory:
         """Runs until two agree."""
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
@@ -239,14 +239,14 @@ class _Simulation:
                 apart = max(apart, float(np.abs(moved).max()))
         return apart / scene.size / GAINED
 
-    def _answer(self, run: _Run, error: float | None) -> Motion:
+    def _answer(self, run: _Run, error: float | None) -> Trajectory:
         short = error is not None and not error <= self.accuracy and self.asked
         status = Status.SHORT if short else Status.SOLVED
         if run.failure is not None:
             status = run.failure.status
         elif run.interrupted:
             status = Status.INTERRUPTED
-        motion = Motion(
+        motion = Trajectory(
             scene=self.given,
             status=status,
             steps=tuple(run.instants),

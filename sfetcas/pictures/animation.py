@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from ..description.scene import Scene
-from ..dynamics.motion import Motion
+from ..dynamics.motion import Trajectory
 from ..equilibria.solution import Posture, Solution
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index
@@ -57,7 +57,7 @@ def check_animation(scene: Scene, file: str | os.PathLike[str]) -> None:
         raise SceneError(f"found one step to animate, {accepted}")
 
 
-def save_animation(answer: Solution | Path | Motion, file: str | os.PathLike[str]) -> None:
+def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike[str]) -> None:
     """Write a moving picture of a motion, of steps or of the points of a path (without its branches).
 
     At most 200 frames, evenly taken.  A motion has 10 to 25 frames a second and goes in real time where these are
@@ -69,7 +69,7 @@ def save_animation(answer: Solution | Path | Motion, file: str | os.PathLike[str
         As :func:`check_animation`.
     """
     check_animation(answer.scene, file)
-    if isinstance(answer, Motion):
+    if isinstance(answer, Trajectory):
         chosen, rate, pace = _paced(answer.times)
         steps: list[Posture] = [answer.steps[i] for i in chosen]
         texts = [f"{text}{pace}" for text in _times(answer, chosen)]
@@ -78,7 +78,7 @@ def save_animation(answer: Solution | Path | Motion, file: str | os.PathLike[str
         numbers = np.unique(np.linspace(0, len(every) - 1, min(MOST_FRAMES, len(every))).round().astype(int))
         steps, rate = [every[i] for i in numbers], round(float(np.clip(len(numbers) / LASTS, 2.0, FASTEST)))
         texts = [f"factor {in_short(step.factor)}" for step in steps]
-    film = _Film(steps, answer.scene.title, gravity=1.0 if isinstance(answer, Motion) else 0.0)
+    film = _Film(steps, answer.scene.title, gravity=1.0 if isinstance(answer, Trajectory) else 0.0)
     writer: Any = (FFMpegWriter if check_ending(file, ENDINGS) == ".mp4" else PillowWriter)(fps=rate)
     with writer.saving(film.figure, os.fspath(file), DPI):
         for number, text in enumerate(texts):
@@ -109,7 +109,7 @@ def _short(number: float) -> str:
     return f"{float(f'{number:.2g}'):.10g}"
 
 
-def _times(motion: Motion, chosen: Index) -> list[str]:
+def _times(motion: Trajectory, chosen: Index) -> list[str]:
     """Times in as many digits as tell them apart."""
     factor, letter = prefix(motion.last.time, 0.1)
     times = motion.times[chosen] / factor

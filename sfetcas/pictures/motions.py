@@ -19,7 +19,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
 from ..description.records import nearest
-from ..dynamics.motion import Instant, Motion
+from ..dynamics.motion import Instant, Trajectory
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .files import DPI, check_ending, save_figure
@@ -41,7 +41,7 @@ BEGUN = 2e-3
 """Apart by this much of the size the undeformed scene is drawn beside the first position."""
 
 
-def save_motion(motion: Motion, file: str | os.PathLike[str]) -> None:
+def save_motion(motion: Trajectory, file: str | os.PathLike[str]) -> None:
     """Write :func:`motion_picture` of a motion to a file, in the format of its ending.
 
     Raises
@@ -53,7 +53,7 @@ def save_motion(motion: Motion, file: str | os.PathLike[str]) -> None:
     save_figure(motion_picture(motion), file)
 
 
-def save_histories(motion: Motion, file: str | os.PathLike[str], nodes: Sequence[str] | None = None) -> None:
+def save_histories(motion: Trajectory, file: str | os.PathLike[str], nodes: Sequence[str] | None = None) -> None:
     """Write :func:`histories` of a motion to a file, in the format of its ending.
 
     Raises
@@ -65,7 +65,7 @@ def save_histories(motion: Motion, file: str | os.PathLike[str], nodes: Sequence
     save_figure(histories(motion, nodes), file)
 
 
-def motion_picture(motion: Motion) -> Figure:
+def motion_picture(motion: Trajectory) -> Figure:
     """Positions over each other, the history of the node that moves most, and energies; a figure of 11 x 5.5 inch."""
     figure = Figure(figsize=(11.0, 5.5), dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08, wspace=0.03))
     grid = figure.add_gridspec(2, 2, width_ratios=[1.2, 1.0])
@@ -82,12 +82,12 @@ def motion_picture(motion: Motion) -> Figure:
     return figure
 
 
-def histories(motion: Motion, nodes: Sequence[str] | None = None) -> Figure:
+def histories(motion: Trajectory, nodes: Sequence[str] | None = None) -> Figure:
     """Positions and velocities of nodes over time; a figure of 9 inch.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Trajectory
     nodes : sequence of str, optional
         Default: the one that moves most.
 
@@ -112,7 +112,7 @@ def histories(motion: Motion, nodes: Sequence[str] | None = None) -> Figure:
     return figure
 
 
-def most_moving(motion: Motion) -> str:
+def most_moving(motion: Trajectory) -> str:
     """The node that goes the farthest from where it began."""
     nodes = motion.last.model.nodes
     ways = [motion.positions(name) for name in nodes]
@@ -122,7 +122,7 @@ def most_moving(motion: Motion) -> str:
 # Over time
 
 
-def _draw_history(axes: Axes, motion: Motion, node: str, quantity: str) -> None:
+def _draw_history(axes: Axes, motion: Trajectory, node: str, quantity: str) -> None:
     values = motion.positions(node) if quantity == "position" else motion.velocities(node)
     factor, letter = prefix(float(np.abs(values).max()), 0.1)
     for i, name in enumerate("xyz" if motion.last.model.space else "xy"):
@@ -131,7 +131,7 @@ def _draw_history(axes: Axes, motion: Motion, node: str, quantity: str) -> None:
     _finish(axes, f"{quantity} of {node}, {letter}{unit}")
 
 
-def _draw_energies(axes: Axes, motion: Motion) -> None:
+def _draw_energies(axes: Axes, motion: Trajectory) -> None:
     values = {kind: motion.energies(kind) for kind in ENERGIES}
     factor, letter = prefix(max(float(np.abs(column).max()) for column in values.values()), 0.1)
     for kind, colour in ENERGIES.items():
@@ -140,7 +140,7 @@ def _draw_energies(axes: Axes, motion: Motion) -> None:
     _finish(axes, f"energy, {letter}N m")
 
 
-def _draw_values(axes: Axes, motion: Motion, values: Array, name: str, colour: str, dashes: str = "-") -> None:
+def _draw_values(axes: Axes, motion: Trajectory, values: Array, name: str, colour: str, dashes: str = "-") -> None:
     # A single answer is no line.
     style: dict[str, Any] = {"marker": "o", "markersize": 4} if len(values) == 1 else {}
     times = motion.times / _unit_of_time(motion)[0]
@@ -155,18 +155,18 @@ def _finish(axes: Axes, name: str) -> None:
     axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 0.98), fontsize=8, frameon=False, borderaxespad=0.2)
 
 
-def _unit_of_time(motion: Motion) -> tuple[float, str]:
+def _unit_of_time(motion: Trajectory) -> tuple[float, str]:
     return prefix(motion.last.time, 0.1)
 
 
-def _say_times(axes: Axes, motion: Motion) -> None:
+def _say_times(axes: Axes, motion: Trajectory) -> None:
     axes.set_xlabel(f"time, {_unit_of_time(motion)[1]}s")
 
 
 # Positions over each other
 
 
-def _draw_strobes(figure: Figure, paper: Axes, motion: Motion) -> None:
+def _draw_strobes(figure: Figure, paper: Axes, motion: Trajectory) -> None:
     chosen = _chosen(motion)
     scene = motion.last.model.scene
     course = course_of(scene, chosen, "none")
@@ -205,13 +205,13 @@ def _legend(sketch: Sketch, *, undeformed: bool) -> Iterator[Line2D]:
         yield Line2D([], [], color=WAY, linewidth=0.9, label="way of a node")
 
 
-def _chosen(motion: Motion) -> list[Instant]:
+def _chosen(motion: Trajectory) -> list[Instant]:
     """Answers evenly over the time."""
     wanted = np.linspace(motion.times[0], motion.times[-1], STROBES)
     return [motion.steps[i] for i in np.unique(np.abs(motion.times - wanted[:, None]).argmin(axis=1))]
 
 
-def _sketch_ways(sketch: Sketch, motion: Motion) -> None:
+def _sketch_ways(sketch: Sketch, motion: Trajectory) -> None:
     """Ways of the free ends that move the farthest, or of the node that does, with their names."""
     scene, course = sketch.scene, sketch.course
     ends = [

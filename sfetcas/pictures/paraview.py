@@ -12,7 +12,7 @@ from pathlib import Path as File
 import numpy as np
 from pyevtk.vtk import VtkFile, VtkGroup, VtkPolyLine, VtkUnstructuredGrid
 
-from ..dynamics.motion import Instant, Motion
+from ..dynamics.motion import Instant, Trajectory
 from ..equilibria.solution import Posture, Solution
 from ..mathematics.arrays import Array
 from ..paths.path import Path
@@ -24,7 +24,7 @@ PLACES = np.linspace(0.0, 1.0, 21)
 """Fractions of the length at which there are points, beside the nodes of the elements."""
 
 
-def save_vtk(answer: Solution | Path | Motion, folder: str | os.PathLike[str]) -> None:
+def save_vtk(answer: Solution | Path | Trajectory, folder: str | os.PathLike[str]) -> None:
     """Write ``answers.pvd`` and its ``answer_0000.vtu``, ... into a folder, which is made where it is not there.
 
     Each member is a polyline, its number in ``member``; at its points stand ``s`` (fraction of the length),
@@ -41,8 +41,8 @@ def save_vtk(answer: Solution | Path | Motion, folder: str | os.PathLike[str]) -
     group.save()
 
 
-def _timed(answer: Solution | Path | Motion) -> Iterator[tuple[float, Posture]]:
-    if isinstance(answer, Motion):
+def _timed(answer: Solution | Path | Trajectory) -> Iterator[tuple[float, Posture]]:
+    if isinstance(answer, Trajectory):
         yield from ((step.time, step) for step in answer.steps)
     elif isinstance(answer, Path):
         yield from ((float(i), answer.posture(point)) for i, point in enumerate(answer.points))
