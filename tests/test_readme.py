@@ -151,10 +151,10 @@ def programs():
 
 
 def test_there_are_programs():
-    assert len(programs()) == 3
+    assert len(programs()) == 4
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", range(4))
 def test_program_of_the_readme_runs_as_it_stands(number, monkeypatch):
     """Each by itself, imports and all; what a comment prints with dots is what the line gives, digit by digit."""
     monkeypatch.chdir(README.parent)
