@@ -11,10 +11,10 @@ from sfetcas.dynamics.beginning import at_rest, velocities
 from sfetcas.dynamics.conserving import Conserving
 from sfetcas.dynamics.inertia import Inertia
 from sfetcas.dynamics.integrating import Memory, Stepper
-from sfetcas.mechanics.masses import masses_of
 from sfetcas.dynamics.methods import GeneralisedAlpha, Radau
 from sfetcas.dynamics.stages import StageEquations
 from sfetcas.mechanics.equations import Equations, State
+from sfetcas.mechanics.masses import masses_of
 
 METHODS = {m.name: m for m in (Radau(3), Radau(2), GeneralisedAlpha(), Conserving())}
 SMOOTH = {"t": [0, 1], "polynomial": [[0, 0, 0, 0, 35, -84, 70, -20]]}

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import scenes
 from motions import FLAT, cantilever, changed, moved
-from sfetcas.mechanics.masses import masses_of
 
 import sfetcas
 from sfetcas import Scene, SceneError, Settings, SolveError, Status, assemble, uniform_mesh
@@ -22,6 +21,7 @@ from sfetcas.dynamics.projecting import closed
 from sfetcas.dynamics.simulation import simulate
 from sfetcas.dynamics.stages import StageEquations
 from sfetcas.mechanics.equations import Equations, State
+from sfetcas.mechanics.masses import masses_of
 
 ACCURACY = 1e-4
 RAMP = {"t": [0, 0.2, 1], "polynomial": [[0, 0, 0, 10, -15, 6], [1]]}

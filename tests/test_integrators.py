@@ -114,7 +114,6 @@ ROUNDING = 1e-12
 def test_conserving_keeps_energy_and_momenta(table):
     flight = Flight(table)
     energy, linear, angular = kept(flight, 0.01, 300)
-    print(np.abs(energy).max(), linear, angular, flight.gap)
     assert np.abs(energy).max() < ROUNDING
     assert linear < ROUNDING
     assert angular < ROUNDING
@@ -127,7 +126,6 @@ def test_conserving_keeps_energy_and_momenta(table):
 def test_energy_does_not_grow_in_many_steps(table):
     flight = Flight(table, order=2, elements=1)
     energy, linear, angular = kept(flight, 0.02, 5000)
-    print(np.abs(energy).max(), linear, angular, flight.gap)
     assert np.abs(energy).max() < 10 * ROUNDING
     # No trend: the ends of the time are no further apart than what lies between.
     assert abs(energy[-1000:].mean() - energy[:1000].mean()) < ROUNDING
@@ -139,7 +137,6 @@ def test_energy_does_not_grow_in_many_steps(table):
 def test_others_keep_the_linear_momentum(table, method):
     flight = Flight(table, method)
     energy, linear, _ = kept(flight, 0.01, 100)
-    print(method, energy[-1], np.diff(energy).max(), linear, flight.gap)
     # Velocities of these have rounding over the length of a step.
     assert linear < 100 * ROUNDING
     assert flight.gap < ROUNDING
@@ -148,7 +145,6 @@ def test_others_keep_the_linear_momentum(table, method):
 def test_radau_loses_energy_slowly():
     flight = Flight(thrown(False), "radau-3")
     energy, _, _ = kept(flight, 0.005, 400)
-    print(energy[-1], energy.max())
     assert -1e-3 < energy[-1] < 0.0
     assert energy.max() < 1e-5
 
@@ -160,7 +156,6 @@ def test_conserving_keeps_energy_under_dead_loads_and_springs():
     table["springs"] = {"line": {"type": "translational", "node": "B", "stiffness": 2.0, "direction": [0, 1, 0]}}
     flight = Flight(table)
     energy, _, _ = kept(flight, 0.01, 200)
-    print(np.abs(energy).max())
     assert np.abs(energy).max() < ROUNDING
 
 
@@ -181,7 +176,6 @@ def test_conserving_comes_back(table):
     for _ in flight.steps(0.01, 150):
         pass
     apart = np.abs(flight.memory.y - start.y).max()
-    print(apart, np.abs(flight.memory.rates[0] + start.rates[0]).max())
     # Differences of 1e-16 grow with time, in chaotic chains fastest.
     assert apart < 1e-9
     assert np.abs(flight.memory.rates[0] + start.rates[0]).max() < 1e-7

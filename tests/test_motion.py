@@ -13,7 +13,7 @@ SAME = 1e-10
 
 
 def frame():
-    """Two flexible members, a rigid and a small one, hinges, springs, masses, damping; a motion and loads of all kinds."""
+    """Members of all types, hinges, springs, masses, damping, a motion and loads of all kinds."""
     return {
         "gravity": [0.0, -2.0, 0.0],
         "sections": {"s": FLAT | {"damping": 0.01, "drag": 0.05}, "stiff": FLAT | {"EI3": 200.0}},

@@ -46,7 +46,9 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
     nodes = {name: node.model_copy(update={"velocity": None}) for name, node in scene.nodes.items()}
     members = {name: member.model_copy(update={"spin": None}) for name, member in scene.members.items()}
     tables: dict[str, Any] = {"loads": loads, "motions": motions, "nodes": nodes, "members": members}
-    before = Scene(**{**_given_keys(scene), **tables, "analysis": analysis, "expect": ()})
+    # What acts later only, or is cut, may be all that makes a scene one in space.
+    tables |= {"dimension": scene.resolved_dimension, "analysis": analysis, "expect": ()}
+    before = Scene(**{**_given_keys(scene), **tables})
     stopped = any(spring.stop is not None for spring in scene.springs.values())
     return (stops.solve_stopped(before, settings) if stopped else statics.solve(before, settings)).last
 
@@ -76,6 +78,7 @@ def moving(scene: Scene) -> Scene:
     motions = {name: motion for name, motion in scene.motions.items() if motion.node not in released}
     analysis = scene.analysis.model_copy(update={"cut": (), "release": ()})
     tables: dict[str, Any] = {"loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis}
+    tables["dimension"] = scene.resolved_dimension
     return Scene(**{**_given_keys(scene), **tables})
 
 
