@@ -26,6 +26,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mathematics.arrays import Array
+from ..mathematics.constants import times
 from ..mathematics.interpolation import differentiation
 from ..mathematics.quaternion import product, turned
 from ..mechanics.elements import Element
@@ -100,8 +101,8 @@ class _Middle:
         forces = system.forces(moved / h, 2.0 * (moved / h - begin.rates) / h)
         c, b = 1.0 / h, 2.0 / h**2
         linear = forces[: system.linear]
-        on_places = system.times(system.by_place.T, linear) - system.times(system.force, middle)
-        turning = -system.times(system.moment, middle)
+        on_places = times(system.by_place.T, linear) - times(system.force, middle)
+        turning = -times(system.moment, middle)
         if not model.space and system.moment.nnz():
             # Moments in the plane have a potential, that of the angle.  What their factor changes of the matrix is as
             # small as the angle of a step: it is left out.
@@ -110,13 +111,13 @@ class _Middle:
         entries, full, coupled = [], [], []
         if system.elements:
             turns = model.rotations.turns.ravel().tolist()
-            pull = system.times(system.pull, middle) + system.times(system.closing.T, lam[:n, :])
-            pull += system.times(system.by_tangent.T, linear)
+            pull = times(system.pull, middle) + times(system.closing.T, lam[:n, :])
+            pull += times(system.by_tangent.T, linear)
             pull = ca.reshape(pull, system.axes, system.elements * system.points)
             function = system.many(_element(model.element), system.elements)
             moments, stiffness, mean, spin = function(begin.q[:, turns], q[:, turns], *system.given, pull)
-            gaps += system.times(system.closing, ca.vec(system.tangents(q)) - ca.DM(system.rest))
-            turning += system.times(system.onto_rotations, ca.vec(moments))
+            gaps += times(system.closing, ca.vec(system.tangents(q)) - ca.DM(system.rest))
+            turning += times(system.onto_rotations, ca.vec(moments))
             signs, picked = ca.DM(system.closed.value), system.closed.entry.tolist()
             entries += [ca.vec(stiffness), ca.vec(spin)[picked] * signs, ca.vec(mean)[picked] * signs]
             massive = system.massive_columns
@@ -127,9 +128,7 @@ class _Middle:
             first = n + sum(len(g.rows) for g in model.connections[:number])
             own = ca.reshape(lam[first : first + count * width], width, count)
             given = system.sides(group, begin.q, before, begin.near), system.sides(group, q, places, begin.near)
-            loads = [
-                ca.reshape(system.times(system.loads[number], f), group.kind.sizes[4], count) for f in (middle, end)
-            ]
+            loads = [ca.reshape(times(system.loads[number], f), group.kind.sizes[4], count) for f in (middle, end)]
             function = system.many(_between(group.kind), count)
             gradient, stiffness, values, mean, spin = function(*given[0][:2], *given[1], *loads, own)
             full.append((sides, gradient))

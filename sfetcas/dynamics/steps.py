@@ -11,7 +11,8 @@ import casadi as ca
 import numpy as np
 
 from .methods import Begin, Method
-from .stages import StageEquations, moved_by
+from .stages import StageEquations
+from .system import moved_by
 
 __all__ = ["CONVERGED", "ITERATIONS", "step_function"]
 

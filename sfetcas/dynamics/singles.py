@@ -1,0 +1,135 @@
+"""CasADi functions of single things, made once a process: a turned vector, a rotation, the rows of a connection.
+
+They are mapped over all elements, nodes or connections of a model, and may be compiled for that.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TypeVar
+
+import casadi as ca
+
+from ..mathematics.quaternion import product, turned
+from ..mechanics.elements import Element
+from ..mechanics.joints import Connection, name_of
+
+__all__ = [
+    "arms_product",
+    "exponential",
+    "moved_rotation",
+    "rotation_between",
+    "rows_of",
+    "spread_change",
+    "turned_change",
+    "turned_vector",
+    "weighted_product",
+]
+
+T = TypeVar("T", ca.SX, ca.MX)
+
+
+def tag(space: bool) -> str:
+    return "space" if space else "plane"
+
+
+@functools.cache
+def turned_vector(space: bool) -> ca.Function:
+    """(q, t) -> R(q) t."""
+    q, t = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("t", 3 if space else 2)
+    if space:
+        now = ca.vertcat(*turned(ca.vertsplit(q), ca.vertsplit(t)))
+    else:
+        c, s = ca.cos(q), ca.sin(q)
+        now = ca.vertcat(c * t[0] - s * t[1], s * t[0] + c * t[1])
+    return ca.Function(f"turned_{tag(space)}", [q, t], [now])
+
+
+@functools.cache
+def turned_change(space: bool) -> ca.Function:
+    """(f) -> minus the derivative of a vector that turns, by its rotation."""
+    f = ca.SX.sym("f", 3 if space else 2)
+    return ca.Function(f"change_{tag(space)}", [f], [ca.densify(ca.skew(f) if space else ca.vertcat(f[1], -f[0]))])
+
+
+@functools.cache
+def spread_change(element: Element) -> ca.Function:
+    """(forces, tangents) -> what turning distributed followers adds, on the first place and on the nodes."""
+    n, axes, turns = element.order + 1, element.axes, element.turns
+    f, t = ca.SX.sym("f", axes, n), ca.SX.sym("t", axes, n)
+    whole = ca.SX(axes + turns * n, turns * n)
+    for i in range(n):
+        change = turned_change(element.space)(f[:, i])
+        columns = slice(turns * i, turns * (i + 1))
+        whole[:axes, columns] = change
+        for j in range(n):
+            arm = t[:, j] / element.weights[j]
+            crossed = ca.skew(arm) if element.space else ca.horzcat(-arm[1], arm[0])
+            rows = slice(axes + turns * j, axes + turns * (j + 1))
+            whole[rows, columns] = element.to_points[i, j] * ca.mtimes(crossed, change)
+    return ca.Function(f"spread_change_{tag(element.space)}_{n}", [f, t], [ca.densify(whole)])
+
+
+@functools.cache
+def moved_rotation(space: bool) -> ca.Function:
+    """(q, phi) -> exp(phi / 2) q, of length one again."""
+    q, phi = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("phi", 3 if space else 1)
+    if space:
+        now = ca.vertcat(*product(ca.vertsplit(exponential(phi)), ca.vertsplit(q)))
+        now /= ca.norm_2(now)
+    else:
+        now = q + phi
+    return ca.Function(f"moved_{tag(space)}", [q, phi], [now])
+
+
+def exponential(phi: T) -> T:
+    """Unit quaternion of a rotation vector."""
+    square = 0.25 * ca.dot(phi, phi)
+    half = ca.sqrt(ca.fmax(square, 1e-30))
+    # sin(x) / x to all digits also where the vector vanishes.
+    ratio = ca.if_else(square < 1e-8, 1.0 - square / 6.0, ca.sin(half) / half)
+    # As polynomial, so that second derivatives hold where the vector vanishes.
+    cosine = ca.if_else(square < 1e-8, 1.0 - 0.5 * square, ca.cos(half))
+    return ca.vertcat(cosine, 0.5 * ratio * phi)
+
+
+@functools.cache
+def rotation_between(space: bool) -> ca.Function:
+    """(q, p) -> rotation vector from q to p, shorter than a turn."""
+    q, p = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("p", 4 if space else 1)
+    if not space:
+        return ca.Function(f"vectors_{tag(space)}", [q, p], [p - q])
+    a = ca.vertsplit(q)
+    r = ca.vertcat(*product(ca.vertsplit(p), [a[0], -a[1], -a[2], -a[3]]))
+    r = ca.if_else(r[0] < 0.0, -1.0, 1.0) * r
+    sine = ca.sqrt(ca.fmax(ca.dot(r[1:], r[1:]), 1e-30))
+    # The angle over its half sine, to all digits also where it vanishes.
+    share = ca.if_else(sine < 1e-6, 2.0, 2.0 * ca.atan2(sine, r[0]) / sine)
+    return ca.Function(f"vectors_{tag(space)}", [q, p], [share * r[1:]])
+
+
+@functools.cache
+def rows_of(kind: Connection) -> ca.Function:
+    """(q, u, data, load) -> the rows of a kind."""
+    turns, places, _, data, loads = kind.sizes
+    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
+    given, load = ca.SX.sym("data", data), ca.SX.sym("load", loads)
+    sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
+    rows = ca.densify(ca.vertcat(*kind.residual(*sides, given, load)))
+    return ca.Function(f"values_{name_of(kind)}", [q, u, given, load], [rows])
+
+
+@functools.cache
+def weighted_product(rows: int, width: int) -> ca.Function:
+    """(A, B, w) -> A^T diag(w) B."""
+    a, b, w = ca.SX.sym("a", rows, width), ca.SX.sym("b", rows, width), ca.SX.sym("w", rows)
+    return ca.Function(f"pairs_{rows}_{width}", [a, b, w], [ca.densify(ca.mtimes(a.T, ca.repmat(w, 1, width) * b))])
+
+
+@functools.cache
+def arms_product(axes: int, turns: int, points: int) -> ca.Function:
+    """(A, B, W) -> blocks W_jl A_j^T B_l, of arrays with a block of ``turns`` columns for each point."""
+    a, b = ca.SX.sym("a", axes, turns * points), ca.SX.sym("b", axes, turns * points)
+    w = ca.SX.sym("w", points, points)
+    whole = ca.mtimes(a.T, b) * ca.kron(w, ca.SX.ones(turns, turns))
+    return ca.Function(f"inner_{axes}_{turns}_{points}", [a, b, w], [ca.densify(whole)])

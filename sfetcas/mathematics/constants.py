@@ -1,0 +1,41 @@
+"""Constant sparse matrices in CasADi expressions."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from .arrays import Array
+from .linear import SparseMap
+
+__all__ = ["by_axes", "constant", "hanging", "sparse", "times"]
+
+
+def constant(matrix: SparseMap) -> ca.DM:
+    """A constant sparse matrix."""
+    order = np.lexsort((matrix.row, matrix.column))
+    row, column = matrix.row[order], matrix.column[order]
+    starts = np.searchsorted(column, np.arange(matrix.shape[1] + 1))
+    return ca.DM(ca.Sparsity(*matrix.shape, starts.tolist(), row.tolist()), matrix.value[order])
+
+
+def sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> ca.DM:
+    """The same from its entries, which may stand at one place more than once."""
+    return constant(SparseMap(np.asarray(row, np.intp), np.asarray(column, np.intp), value, shape))
+
+
+def by_axes(matrix: SparseMap, axes: int) -> SparseMap:
+    """A matrix of scalars that acts on every component of vectors."""
+    each = np.arange(axes)
+    row, column = ((part[:, None] * axes + each).ravel() for part in (matrix.row, matrix.column))
+    return SparseMap(row, column, np.repeat(matrix.value, axes), (matrix.shape[0] * axes, matrix.shape[1] * axes))
+
+
+def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
+    """A product that leaves out what is not there."""
+    return ca.densify(ca.mtimes(matrix, vector)) if matrix.nnz() else ca.MX.zeros(matrix.shape[0], vector.shape[1])
+
+
+def hanging(onto: ca.DM, matrix: ca.DM) -> ca.DM:
+    """A matrix of positions in the displacements of places."""
+    return ca.mtimes(onto.T, ca.mtimes(matrix, onto))
