@@ -8,3 +8,11 @@ def _own_cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SFETCAS_CACHE", str(tmp_path_factory.mktemp("kernels")))
         yield
+
+
+@pytest.fixture(scope="module")
+def interpreted():
+    """Short motions: compiling would take longer than running them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SFETCAS_KERNELS", "interpreted")
+        yield

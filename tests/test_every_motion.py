@@ -10,6 +10,8 @@ from systems import EVERYTHING, FOLLOWING
 import sfetcas
 from sfetcas import Scene
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 STEP = 0.02
 
 

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from motions import FLAT, THICK, Flight, cantilever, changed, moved, tip
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 PLANE = cantilever()
 SPACE = cantilever(THICK, (0.5, 1.0, 1.5))
 ORDERS = {"generalised-alpha": 2, "conserving": 2, "radau-2": 3, "radau-3": 5}
 LONG = {"generalised-alpha": 1 / 32, "conserving": 1 / 32, "radau-2": 1 / 32, "radau-3": 1 / 16}
-"""Steps, s, at which the highest frequency of one element is resolved: below, orders of stiff problems would be seen."""
+"""Steps, s, at which the highest frequency of one element is resolved: beyond, orders are those of stiff problems."""
 
 
 def order(errors):
@@ -95,7 +97,9 @@ def chain(space):
 def kept(flight, h, count):
     """Changes of the energy over the largest kinetic one, and the largest ones of the momenta over that of its size."""
     energies, momenta, kinetic = [], [], 0.0
-    for memory in flight.steps(h, count):
+    for k, memory in enumerate(flight.steps(h, count)):
+        if k % (1 + count // 500):
+            continue
         energies.append(flight.energy(memory))
         momenta.append(flight.momentum(memory))
         kinetic = max(kinetic, flight.inertia.kinetic(memory.rates[0]))
@@ -128,7 +132,7 @@ def test_energy_does_not_grow_in_many_steps(table):
     energy, linear, angular = kept(flight, 0.02, 5000)
     assert np.abs(energy).max() < 10 * ROUNDING
     # No trend: the ends of the time are no further apart than what lies between.
-    assert abs(energy[-1000:].mean() - energy[:1000].mean()) < ROUNDING
+    assert abs(energy[-100:].mean() - energy[:100].mean()) < ROUNDING
     assert max(linear, angular) < 10 * ROUNDING
 
 
@@ -136,7 +140,7 @@ def test_energy_does_not_grow_in_many_steps(table):
 @pytest.mark.parametrize("method", ["radau-3", "radau-2", "generalised-alpha"])
 def test_others_keep_the_linear_momentum(table, method):
     flight = Flight(table, method)
-    energy, linear, _ = kept(flight, 0.01, 100)
+    _, linear, _ = kept(flight, 0.01, 100)
     # Velocities of these have rounding over the length of a step.
     assert linear < 100 * ROUNDING
     assert flight.gap < ROUNDING

@@ -9,6 +9,8 @@ from motions import FLAT, SMOOTH, THICK, cantilever, moved
 import sfetcas
 from sfetcas.mathematics import quaternion as quat
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 GRAVITY = 9.81
 CLOSE = 1e-6
 """Of lengths of 1: runs are asked for 1e-7."""
@@ -73,7 +75,7 @@ def test_pendulum(integrator, dimension):
     turning = pendulum(0, [angle, rate])[1]
     acceleration = 0.5 * (turning * across(angle) - rate**2 * direction(angle))
     force, moment = step.reaction("A")
-    assert np.abs(force - 1.2 * (acceleration + [0, GRAVITY, 0])).max() < 10 * loose * RATES
+    assert np.abs(force - 1.2 * np.add(acceleration, [0, GRAVITY, 0])).max() < 10 * loose * RATES
     assert np.abs(moment).max() < 10 * loose * RATES
     assert step.energy["kinetic"] == pytest.approx(0.5 * J * rate**2, rel=loose * 1e-4)
     assert np.abs(step.momentum["angular"] - [0, 0, (0.1 + 0.01) * rate]).max() < loose * 1e-4
@@ -147,7 +149,7 @@ def test_heavy_top(integrator):
     turn = quat.matrix(x[:4] / np.linalg.norm(x[:4]))
     assert np.abs(step.position("B") - turn @ lever).max() < 10 * loose * CLOSE
     assert abs(abs(step.quaternion("B") @ x[:4]) - 1.0) < loose * CLOSE
-    force, moment = step.reaction("A")
+    moment = step.reaction("A")[1]
     assert np.abs(moment).max() < loose * 10 * RATES
 
 

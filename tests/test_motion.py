@@ -8,6 +8,8 @@ from motions import FLAT, SMOOTH, THICK, cantilever, changed, moved, tip
 
 from sfetcas.mathematics import quaternion as quat
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 SAME = 1e-10
 """Of the size: the same steps in other axes or units, with rounding of some hundred of them."""
 
@@ -140,7 +142,7 @@ def test_a_plane_scene_in_space():
     for section in thick["sections"].values():
         section |= {"EI2": 5.0, "GJ": 3.0}
     # Angles and quaternions are interpolated otherwise: the same with fine elements only.
-    plane, space = (ends(moved(each, 1.2, 0.02, element="SFET7", elements=1)) for each in (table, thick))
+    plane, space = (ends(moved(each, 1.2, 0.02, element="SFET8", elements=2)) for each in (table, thick))
     assert np.abs(space - plane).max() < SAME
 
 

@@ -9,6 +9,8 @@ from motions import FLAT, THICK, cantilever, changed, moved, tip
 import sfetcas
 from sfetcas import SceneError, SolveError
 
+pytestmark = pytest.mark.usefixtures("interpreted")
+
 
 def refused(table, message, **keys):
     with pytest.raises(SceneError, match=re.escape(message)):
