@@ -125,6 +125,7 @@ ORDER = [
     "dynamics.modes",
     "paths",
     "paths.path",
+    "paths.vibrations",
     "paths.contact_curve",
     "paths.contact_trace",
     "paths.contact_path",

@@ -36,7 +36,18 @@ from ..solvers.stability import Stability
 from .matrices import Matrices, matrices_of
 from .small_motion import Eigenmotions, SmallMotion
 
-__all__ = ["Mode", "Modes", "find_modes", "prepared_for_motion", "put_on"]
+__all__ = [
+    "HALVINGS",
+    "MOST_ELEMENTS",
+    "ORDER",
+    "STILL",
+    "Mode",
+    "Modes",
+    "carried",
+    "find_modes",
+    "prepared_for_motion",
+    "put_on",
+]
 
 ORDER = 6
 """Order of the elements: the error of a frequency falls by 2 to the power of twice this at each halving."""
@@ -313,7 +324,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     loading = prepared.model.loading(1.0 if rest is None else rest.factor)
     state = prepared.equations.start(loading)
     if rest is not None:
-        state = _carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
+        state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
     corrected = prepared.correct(state, loading, iterations=30)
     if not corrected.converged and not corrected.residual <= SOLVED:
         detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
@@ -321,7 +332,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     return prepared, corrected, loading
 
 
-def _carried(equations: Equations, state: State, loading: Loading) -> State:
+def carried(equations: Equations, state: State, loading: Loading) -> State:
     """The state with displacements that close the members, and multipliers that balance it as far as these can."""
     positions, unknowns = equations.model.positions, equations.unknowns
     state = equations.holding(state, loading)
