@@ -52,6 +52,9 @@ MET = 1e-6
 What is left after a root was sought is 1e-10.  Two that come among the lowest from above do not meet there.
 """
 
+APART = 1e-6
+"""Flutter points within this share of the way between two points of the path are one."""
+
 TRIES = 3
 """Times at most that more motions are looked for, until all that grow are among them."""
 
@@ -122,10 +125,11 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class _Flutter:
-    """A flutter point and its frequency, dimensionless."""
+    """A flutter point, its frequency, dimensionless, and how many motions start to grow there."""
 
     standing: Standing
     omega: float
+    multiplicity: int = 1
 
 
 class _Level:
@@ -197,30 +201,36 @@ class _Level:
     # -- flutter --------------------------------------------------------------------------------
 
     @functools.cached_property
-    def flutter(self) -> list[list[_Flutter]]:
-        """Flutter points of each branch."""
-        return [self._along(i) for i in range(len(self.path.branches))]
+    def flutter(self) -> dict[tuple[int, int], list[_Flutter]]:
+        """Flutter points by branch and number of the point before them."""
+        numbers = [(i, j) for i, branch in enumerate(self.path.branches) for j in range(len(branch.points) - 1)]
+        return {} if self.steady else {key: found for key in numbers if (found := self.between(*key))}
 
-    def _along(self, branch: int) -> list[_Flutter]:
-        if self.steady:
-            return []
-        found = []
-        places = [self.place(branch, i) for i in range(len(self.path.branches[branch].points))]
-        for a, b in zip(places, places[1:], strict=False):
-            ranks = range(self._growing(a.exponents), self._growing(b.exponents))
-            met = [self._met(a, b, rank) for rank in ranks]
-            found += sorted([point for point in met if point is not None], key=lambda point: point.standing.arc)
+    def between(self, branch: int, number: int) -> list[_Flutter]:
+        """Flutter points between a point of a branch and the next one, in their order."""
+        a, b = self.place(branch, number), self.place(branch, number + 1)
+        before, after = self.growing(a.exponents), self.growing(b.exponents)
+        met = [point for rank in range(before, after) if (point := self._met(a, b, rank, after)) is not None]
+        apart, found = APART * (b.standing.arc - a.standing.arc), list[_Flutter]()
+        for point in sorted(met, key=lambda point: point.standing.arc):
+            if found and point.standing.arc - found[-1].standing.arc <= apart:
+                found[-1] = replace(found[-1], multiplicity=found[-1].multiplicity + 1)
+            else:
+                found.append(point)
         return found
 
-    def _growing(self, exponents: Array) -> int:
+    def growing(self, exponents: Array) -> int:
         """Number of motions that grow while they oscillate."""
         sizes = np.abs(exponents)
         share = STILL if self.damped else COMPLEX
         return int(((exponents.real > share * sizes) & (exponents.imag > COMPLEX * sizes)).sum())
 
-    def _met(self, a: _Place, b: _Place, rank: int) -> _Flutter | None:
-        """Where between two points more than so many motions start to grow; None where these came from above."""
-        value = _Crossing(self, rank) if self.damped else _Meeting(self, rank)
+    def _met(self, a: _Place, b: _Place, rank: int, after: int) -> _Flutter | None:
+        """Where between two points more than so many motions start to grow; None where these came from above.
+
+        ``after``: how many grow at the second point.
+        """
+        value = _Crossing(self, rank) if self.damped else _Meeting(self, rank, after)
         # The second point first: it says which two are to meet.
         value(b.standing)
         found = sought(self.curve, a.standing, b.standing, value)
@@ -240,7 +250,8 @@ class _Level:
                 largest = max(largest, self._apart(self.place(i, plain[j]), fine.place(i, plain[j])))
         if largest > enough:
             return largest
-        for ours, theirs in zip(self.flutter, fine.flutter, strict=True):
+        for key, ours in self.flutter.items():
+            theirs = fine.between(*key)
             if len(ours) != len(theirs):
                 return np.inf
             for one, other in zip(ours, theirs, strict=True):
@@ -268,7 +279,8 @@ class _Level:
         """The branch with its frequencies and flutter points."""
         branch = self.path.branches[number]
         points = tuple(self._point(point, self.place(number, i)) for i, point in enumerate(branch.points))
-        met = tuple(self._entry(point, error) for point in self.flutter[number])
+        found = [point for (i, _), points in self.flutter.items() if i == number for point in points]
+        met = tuple(self._entry(point, error) for point in found)
         return replace(branch, points=points, flutter_points=met)
 
     def _point(self, point: PathPoint, place: _Place) -> PathPoint:
@@ -282,7 +294,11 @@ class _Level:
         corrected = Corrected(at.state, at.point, True, at.iterations, 0.0, 0.0, residual)
         stability = self.prepared.stability(corrected)
         estimate = error if error is not None and np.isfinite(error) else None
-        entry = finished(self.prepared, corrected, at.loading, float(at.factor), stability, estimate=estimate)
+        count = point.multiplicity
+        notes = (f"{count} motions start to grow at once",) if count > 1 else ()
+        entry = finished(
+            self.prepared, corrected, at.loading, float(at.factor), stability, estimate=estimate, notes=notes
+        )
         parts = {part.name: getattr(entry, part.name) for part in fields(entry)}
         return FlutterPoint(**parts, omega=point.omega / self.time)
 
@@ -296,14 +312,14 @@ class _Meeting:
         Frequency in the middle of the two, of the last call.
     """
 
-    def __init__(self, level: _Level, rank: int) -> None:
-        self._level, self._rank = level, rank
+    def __init__(self, level: _Level, rank: int, after: int) -> None:
+        self._level, self._rank, self._after = level, rank, after
         self._middle, self.omega = -np.inf, 0.0
 
     def __call__(self, standing: Standing) -> float:
         exponents = self._level.exponents(standing)
-        squares = exponents**2
-        if self._level._growing(exponents) > self._rank:
+        squares, growing = exponents**2, self._level.growing(exponents)
+        if growing > self._rank:
             sizes = np.abs(exponents)
             grow = (exponents.real > COMPLEX * sizes) & (exponents.imag > COMPLEX * sizes)
             # Of those that grow the last one is that which starts here.
@@ -313,11 +329,13 @@ class _Meeting:
             value = -4.0 * float(newest.imag) ** 2
         else:
             real = np.sort(squares[np.abs(squares.imag) <= 2.0 * COMPLEX * np.abs(squares)].real)
-            middles = 0.5 * (real[1:] + real[:-1])
-            if not len(middles):
+            # Where several pairs meet at once, as in space, the halves of a group do.
+            half = self._after - growing
+            groups = np.lib.stride_tricks.sliding_window_view(real, 2 * half) if len(real) >= 2 * half else None
+            if groups is None:
                 return 1.0
-            nearest = int(np.argmin(np.abs(middles - self._middle)))
-            middle, value = float(middles[nearest]), float(real[nearest + 1] - real[nearest]) ** 2
+            group = groups[np.argmin(np.abs(groups.mean(axis=1) - self._middle))]
+            middle, value = float(group.mean()), float(group[half:].mean() - group[:half].mean()) ** 2
         self.omega = float(np.sqrt(max(-middle, 0.0)))
         return value / max(middle**2, 1e-300)
 
