@@ -19,6 +19,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from ..description.scene import Scene
 from ..dynamics.modes import HALVINGS, MOST_ELEMENTS, ORDER, STILL, carried, prepared_for_motion
 from ..dynamics.small_motion import SmallMotion
 from ..equilibria.settings import Settings
@@ -26,7 +27,7 @@ from ..equilibria.single import finished
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.fields import transferred
-from ..mechanics.mesh import Mesh
+from ..mechanics.mesh import SAME, Mesh, breaks_of
 from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.critical import sought
@@ -73,11 +74,14 @@ def with_modes(path: Path, settings: Settings) -> Path:
         raise SceneError("integration: found 'gauss', accepted: 'nodes' with modes, as masses stand at the nodes")
     begin, scene = time.perf_counter(), path.scene
     named = settings.element or any(member.element for member in scene.members.values())
-    mesh = path.model.mesh
-    mesh = replace(mesh, order=mesh.order if named else max(ORDER, mesh.order), places=True)
     flexible = {name for name, member in scene.members.items() if member.type == "flexible"}
     fixed = {name for name in flexible if (settings.elements or scene.members[name].elements) is not None}
     accuracy = settings.accuracy or scene.analysis.accuracy
+    mesh = replace(path.model.mesh, places=True)
+    if not named:
+        # Of higher order than that of the path: half the elements are enough to begin with.
+        cuts = {n: c if n in fixed or n not in flexible else _halves(scene, n, c) for n, c in mesh.cuts.items()}
+        mesh = replace(mesh, order=max(ORDER, mesh.order), cuts=cuts)
     level, error = _Level(path, prepared_for_motion(scene, mesh)), np.inf
     for _ in range(HALVINGS if flexible else 0):
         finer = _Level(path, prepared_for_motion(scene, _halved(mesh, fixed if fixed < flexible else set())))
@@ -109,6 +113,13 @@ def shaken(path: Path, branch: Branch) -> Branch:
     """A branch of a path that has modes, with modes on the mesh of these."""
     assert path.massive is not None
     return _Level(replace(path, branches=(branch,)), path.massive).answered(0, None)
+
+
+def _halves(scene: Scene, member: str, cuts: Array) -> Array:
+    """Every other cut, and those where something has to be."""
+    kept = np.abs(cuts[:, None] - np.array(breaks_of(scene, member))).min(axis=1) < SAME
+    kept[::2] = True
+    return cuts[kept]
 
 
 def _halved(mesh: Mesh, fixed: set[str]) -> Mesh:
