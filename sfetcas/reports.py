@@ -158,6 +158,9 @@ def _report_modes(modes: Modes) -> None:
         print(f"  mode {number}: {mode.omega:.9g} rad/s ({mode.omega / (2.0 * np.pi):.6g} Hz){faded}")
     for rate in modes.growing:
         print(f"  leaves the equilibrium at a rate of {rate:.9g} 1/s")
+    if len(modes.buckling):
+        factors = ", ".join(f"{factor:.9g}" for factor in modes.buckling)
+        print(f"  buckles at factors, linear estimate: {factors}")
     for note in modes.notes:
         print(f"  note: {note}")
 

@@ -122,6 +122,7 @@ ORDER = [
     "dynamics.simulation",
     "dynamics.small_motion",
     "dynamics.matrices",
+    "dynamics.buckling",
     "dynamics.modes",
     "paths",
     "paths.path",

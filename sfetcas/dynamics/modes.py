@@ -33,6 +33,7 @@ from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
+from .buckling import buckling_factors
 from .matrices import Matrices, matrices_of
 from .small_motion import Eigenmotions, SmallMotion
 
@@ -124,6 +125,9 @@ class Modes:
         Largest estimated relative error of the frequencies.
     motion : SmallMotion
         Matrices, dimensionless.
+    buckling : ndarray
+        Factors of the loads at which the structure buckles, a linear estimate from factor 0: those above zero rising,
+        then those below it by size.  Empty for loads without potential, and without loads.
     notes : tuple of str
     seconds : mapping
         Time spent on models and on solving.
@@ -137,6 +141,7 @@ class Modes:
     growing: tuple[float, ...]
     error_estimate: float
     motion: SmallMotion = field(repr=False)
+    buckling: Array
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
 
@@ -166,7 +171,7 @@ class Modes:
             answer["damping"] = [mode.damping for mode in self.modes]
         if self.growing:
             answer["growing"] = list(self.growing)
-        return {**answer, "error_estimate": self.error_estimate}
+        return {**answer, "buckling": self.buckling.tolist(), "error_estimate": self.error_estimate}
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer."""
@@ -233,8 +238,8 @@ class _Run:
         begin = time.perf_counter()
         fixed, mesh = self.meshing.fixed, self._mesh()
         flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
-        motion, found = self._found(mesh)
-        error, answer = np.inf, (motion, found)
+        answer, error = self._found(mesh), np.inf
+        found = answer[2]
         for _ in range(HALVINGS):
             marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
             # Where all is prescribed the error is that beside a mesh which only estimates it.
@@ -243,27 +248,36 @@ class _Run:
             if not flexible:
                 error = 0.0
                 break
-            other, there = self._found(finer)
-            last, error = error, _difference(found, there)
+            other = self._found(finer)
+            last, error = error, _difference(found, other[2])
             # What gets no nearer is rounding: the coarser mesh has less of it.
             if prescribed or error > last:
                 break
-            mesh, found, answer = finer, there, (other, there)
+            mesh, found, answer = finer, other[2], other
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
                 break
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
 
-    def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
+    def _found(self, mesh: Mesh) -> tuple[Prepared, SmallMotion, Eigenmotions]:
         prepared, corrected, loading = put_on(self.scene, mesh, self.rest)
         motion = SmallMotion(prepared.equations, corrected.state, loading, corrected.point)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
-            return motion, motion.eigenmotions(self.count, negative)
+            return prepared, motion, motion.eigenmotions(self.count, negative)
         except np.linalg.LinAlgError as error:
             raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
 
-    def _answered(self, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
+    def _buckling(self, prepared: Prepared) -> Array:
+        """Buckling factors, none where the structure cannot be unloaded."""
+        if self.rest is None or not prepared.model.conservative:
+            return np.zeros(0)
+        try:
+            return buckling_factors(prepared, self.count)
+        except (SceneError, SolveError, np.linalg.LinAlgError):
+            return np.zeros(0)
+
+    def _answered(self, prepared: Prepared, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
         notes = []
         asked = self.meshing.asked
         status = Status.SOLVED if error <= self.accuracy or not asked else Status.SHORT
@@ -276,7 +290,10 @@ class _Run:
             last = _undeformed(motion, bool(found.rigid))
         modes = tuple(_mode(motion, found, i) for i in range(len(found.exponents)))
         growing = tuple((found.growing / motion.masses.time).tolist())
-        return Modes(self.scene, status, last, modes, found.rigid, growing, error, motion, tuple(notes), self.seconds)
+        buckling = self._buckling(prepared)
+        return Modes(
+            self.scene, status, last, modes, found.rigid, growing, error, motion, buckling, tuple(notes), self.seconds
+        )
 
 
 def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
