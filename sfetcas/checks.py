@@ -15,7 +15,7 @@ from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
-from .paths.path import Path
+from .paths.path import FlutterPoint, Path
 
 __all__ = ["Answer", "Check", "check", "look_up"]
 
@@ -87,7 +87,7 @@ def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | Instant:
 
 
 def _entry_on_path(path: Path, expect: Expect) -> Equilibrium:
-    for key in ("limit_point", "bifurcation"):
+    for key in ("limit_point", "bifurcation", "flutter_point"):
         number = getattr(expect, key)
         if number is not None:
             return _numbered(getattr(path, f"{key}s"), number, key)
@@ -153,9 +153,11 @@ def look_up(step: Equilibrium | Instant, quantity: str, at: float | None = None)
         return _entry(step.certificate.to_dict(), parts[1])
     if quantity == "factor":
         return step.factor
+    if quantity == "omega" and isinstance(step, FlutterPoint):
+        return step.omega
     known = (
         "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, springs.NAME.KEY, motions.NAME.KEY, "
-        "contacts.NAME.KEY, energy.KEY, certificate.KEY, factor"
+        "contacts.NAME.KEY, energy.KEY, certificate.KEY, factor, at flutter points omega"
     )
     raise SceneError(f"found {quantity!r}, accepted: {known}")
 

@@ -13,7 +13,7 @@ from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium
 from .mechanics.model import Model
-from .paths.path import Branch
+from .paths.path import Branch, FlutterPoint
 from .paths.path import Path as Course
 
 __all__ = ["flexible", "print_checks", "report"]
@@ -48,7 +48,7 @@ def report(solution: Answer, seconds: float) -> None:
 
 
 def _report_path(path: Course) -> None:
-    counts = {"limit point": 0, "bifurcation": 0}
+    counts = {"limit point": 0, "bifurcation": 0, "flutter point": 0}
     for number, branch in enumerate(path.branches):
         name = f"branch {number} at bifurcation {branch.bifurcation}, side {branch.side:+d}" if number else "path"
         low, high = branch.factors.min(), branch.factors.max()
@@ -158,19 +158,28 @@ def _report_modes(modes: Modes) -> None:
         print(f"  mode {number}: {mode.omega:.9g} rad/s ({mode.omega / (2.0 * np.pi):.6g} Hz){faded}")
     for rate in modes.growing:
         print(f"  leaves the equilibrium at a rate of {rate:.9g} 1/s")
+    if len(modes.buckling):
+        factors = ", ".join(f"{factor:.9g}" for factor in modes.buckling)
+        print(f"  buckles at factors, linear estimate: {factors}")
     for note in modes.notes:
         print(f"  note: {note}")
 
 
 def _report_events(branch: Branch, counts: dict[str, int]) -> None:
-    """Limit points and bifurcations of a branch, numbered on from those of the branches before, as in ``expect``."""
-    for kind, entries in (("limit point", branch.limit_points), ("bifurcation", branch.bifurcations)):
+    """Critical points of a branch, numbered on from those of the branches before, as in ``expect``."""
+    kinds: tuple[tuple[str, Sequence[Equilibrium]], ...] = (
+        ("limit point", branch.limit_points),
+        ("bifurcation", branch.bifurcations),
+        ("flutter point", branch.flutter_points),
+    )
+    for kind, entries in kinds:
         for entry in entries:
             counts[kind] += 1
             error = entry.certificate.error_estimate
             said = "" if error is None else f", estimated error {error:.1e}"
             ways = f", {counted(entry.certificate.negative, *WAYS)}" if entry.certificate.negative else ""
-            print(f"  {kind} {counts[kind]}: factor {entry.factor:.12g}{ways}{said}")
+            wave = f", {entry.omega:.9g} rad/s" if isinstance(entry, FlutterPoint) else ""
+            print(f"  {kind} {counts[kind]}: factor {entry.factor:.12g}{wave}{ways}{said}")
             for note in entry.notes:
                 print(f"    note: {note}")
 
@@ -273,7 +282,7 @@ def _row(c: Check) -> tuple[str, ...]:
     step = "" if expect.step is None else f" step {expect.step:g}"
     step += "" if expect.time is None else f" time {expect.time:g}"
     step += "" if expect.equilibrium is None else f" equilibrium {expect.equilibrium}"
-    for key in ("crossing", "limit_point", "bifurcation"):
+    for key in ("crossing", "limit_point", "bifurcation", "flutter_point"):
         number = getattr(expect, key)
         step += "" if number is None else f" {key.replace('_', ' ')} {number}"
     tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"

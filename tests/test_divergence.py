@@ -56,7 +56,7 @@ def test_column_under_a_force_that_follows_in_part(follower, space):
         assert point.certificate.stable == "not defined"
         assert "static divergence" in point.notes[0]
         assert [note[:1] for note in point.notes[1:]] == ["2"] * space
-    assert any("flutter would only show in dynamics" in note for note in path.notes)
+    assert any("flutter would only show with the key 'modes'" in note for note in path.notes)
 
 
 @pytest.mark.parametrize("space", [False, True])

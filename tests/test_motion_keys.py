@@ -292,7 +292,8 @@ STOPPED = {"springs/k": {"node": "A", "stiffness": 1.0, "stop": [-1, 1]}}
 def test_obstacles_and_stops_are_refused(kind):
     refused(
         {**of_type(kind), **FLOOR},
-        f"contacts.floor: found an obstacle with analysis.type = {kind!r}, accepted: with 'static' or 'path'",
+        f"contacts.floor: found an obstacle with analysis.type = {kind!r}, accepted: with 'static', "
+        "or 'path' without modes",
     )
     refused(
         {**of_type(kind), **STOPPED},

@@ -41,12 +41,13 @@ def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], spring
     SceneError
         Names the first contact or stop.
     """
+    given = "analysis.modes on a path" if analysis.type == "path" else f"analysis.type = {analysis.type!r}"
     for name in contacts:
-        message = f"found an obstacle with analysis.type = {analysis.type!r}, accepted: with 'static' or 'path'"
+        message = f"found an obstacle with {given}, accepted: with 'static', or 'path' without modes"
         raise SceneError(message, ("contacts", name))
     for name, spring in springs.items():
         if spring.stop is not None:
-            message = f"found a stop with analysis.type = {analysis.type!r}, accepted: with 'static'"
+            message = f"found a stop with {given}, accepted: with 'static'"
             raise SceneError(message, ("springs", name, "stop"))
 
 

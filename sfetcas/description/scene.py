@@ -377,7 +377,7 @@ def _check_moving(scene: Scene) -> None:
     space = f"the scene is in space ({scene.dimension_reason})" if scene.resolved_dimension == "space" else None
     check_velocities(scene.nodes, scene.members, scene.motions, analysis, space)
     check_beginning(analysis, scene.nodes, scene.loads)
-    if analysis.type in ("modes", "dynamic"):
+    if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)
     if analysis.type == "dynamic":
         check_driving(analysis, scene.nodes, scene.members, scene.motions, scene.histories)

@@ -33,10 +33,22 @@ from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
+from .buckling import buckling_factors
 from .matrices import Matrices, matrices_of
 from .small_motion import Eigenmotions, SmallMotion
 
-__all__ = ["Mode", "Modes", "find_modes", "prepared_for_motion", "put_on"]
+__all__ = [
+    "HALVINGS",
+    "MOST_ELEMENTS",
+    "ORDER",
+    "STILL",
+    "Mode",
+    "Modes",
+    "carried",
+    "find_modes",
+    "prepared_for_motion",
+    "put_on",
+]
 
 ORDER = 6
 """Order of the elements: the error of a frequency falls by 2 to the power of twice this at each halving."""
@@ -113,6 +125,9 @@ class Modes:
         Largest estimated relative error of the frequencies.
     motion : SmallMotion
         Matrices, dimensionless.
+    buckling : ndarray
+        Factors of the loads at which the structure buckles, a linear estimate from factor 0: those above zero rising,
+        then those below it by size.  Empty for loads without potential, and without loads.
     notes : tuple of str
     seconds : mapping
         Time spent on models and on solving.
@@ -126,6 +141,7 @@ class Modes:
     growing: tuple[float, ...]
     error_estimate: float
     motion: SmallMotion = field(repr=False)
+    buckling: Array
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
 
@@ -155,7 +171,7 @@ class Modes:
             answer["damping"] = [mode.damping for mode in self.modes]
         if self.growing:
             answer["growing"] = list(self.growing)
-        return {**answer, "error_estimate": self.error_estimate}
+        return {**answer, "buckling": self.buckling.tolist(), "error_estimate": self.error_estimate}
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer."""
@@ -222,8 +238,8 @@ class _Run:
         begin = time.perf_counter()
         fixed, mesh = self.meshing.fixed, self._mesh()
         flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
-        motion, found = self._found(mesh)
-        error, answer = np.inf, (motion, found)
+        answer, error = self._found(mesh), np.inf
+        found = answer[2]
         for _ in range(HALVINGS):
             marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
             # Where all is prescribed the error is that beside a mesh which only estimates it.
@@ -232,27 +248,36 @@ class _Run:
             if not flexible:
                 error = 0.0
                 break
-            other, there = self._found(finer)
-            last, error = error, _difference(found, there)
+            other = self._found(finer)
+            last, error = error, _difference(found, other[2])
             # What gets no nearer is rounding: the coarser mesh has less of it.
             if prescribed or error > last:
                 break
-            mesh, found, answer = finer, there, (other, there)
+            mesh, found, answer = finer, other[2], other
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
                 break
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
 
-    def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
+    def _found(self, mesh: Mesh) -> tuple[Prepared, SmallMotion, Eigenmotions]:
         prepared, corrected, loading = put_on(self.scene, mesh, self.rest)
         motion = SmallMotion(prepared.equations, corrected.state, loading, corrected.point)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
-            return motion, motion.eigenmotions(self.count, negative)
+            return prepared, motion, motion.eigenmotions(self.count, negative)
         except np.linalg.LinAlgError as error:
             raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
 
-    def _answered(self, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
+    def _buckling(self, prepared: Prepared) -> Array:
+        """Buckling factors, none where the structure cannot be unloaded."""
+        if self.rest is None or not prepared.model.conservative:
+            return np.zeros(0)
+        try:
+            return buckling_factors(prepared, self.count)
+        except (SceneError, SolveError, np.linalg.LinAlgError):
+            return np.zeros(0)
+
+    def _answered(self, prepared: Prepared, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
         notes = []
         asked = self.meshing.asked
         status = Status.SOLVED if error <= self.accuracy or not asked else Status.SHORT
@@ -265,7 +290,10 @@ class _Run:
             last = _undeformed(motion, bool(found.rigid))
         modes = tuple(_mode(motion, found, i) for i in range(len(found.exponents)))
         growing = tuple((found.growing / motion.masses.time).tolist())
-        return Modes(self.scene, status, last, modes, found.rigid, growing, error, motion, tuple(notes), self.seconds)
+        buckling = self._buckling(prepared)
+        return Modes(
+            self.scene, status, last, modes, found.rigid, growing, error, motion, buckling, tuple(notes), self.seconds
+        )
 
 
 def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
@@ -313,7 +341,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     loading = prepared.model.loading(1.0 if rest is None else rest.factor)
     state = prepared.equations.start(loading)
     if rest is not None:
-        state = _carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
+        state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
     corrected = prepared.correct(state, loading, iterations=30)
     if not corrected.converged and not corrected.residual <= SOLVED:
         detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
@@ -321,7 +349,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     return prepared, corrected, loading
 
 
-def _carried(equations: Equations, state: State, loading: Loading) -> State:
+def carried(equations: Equations, state: State, loading: Loading) -> State:
     """The state with displacements that close the members, and multipliers that balance it as far as these can."""
     positions, unknowns = equations.model.positions, equations.unknowns
     state = equations.holding(state, loading)

@@ -46,6 +46,9 @@ DOUBLE = 1e-12
 NEARER = 0.5
 """Share of the lowest square of a frequency by which the last shift lies below zero."""
 
+FARTHER = 1e-5
+"""The same of the highest that is wanted: at a critical point the lowest vanishes and would drown all others."""
+
 
 @dataclass(frozen=True, eq=False)
 class Eigenmotions:
@@ -226,7 +229,8 @@ class SmallMotion:
             if not len(elastic) or shift != -1.0:
                 break
             # The nearer the shift to what is looked for the less rounding leaves of it.
-            shift = -NEARER * float(np.abs(elastic).min())
+            sizes = np.sort(np.abs(elastic))[: count + unstable]
+            shift = -NEARER * float(max(sizes[0], FARTHER * sizes[-1]))
         return _sorted(squares, shapes, rigid, count, real=self.symmetric)
 
     def _near(self, shift: float, wanted: int) -> tuple[Array, Array, bool]:

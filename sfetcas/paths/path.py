@@ -1,4 +1,4 @@
-"""Paths: equilibria over the load factor, with limit points, bifurcations and the branches that cross there."""
+"""Paths: equilibria over the load factor, with critical points, the branches that cross there, and frequencies."""
 
 from __future__ import annotations
 
@@ -17,13 +17,36 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 
-__all__ = ["NO_POTENTIAL", "Branch", "Path", "PathPoint"]
+__all__ = ["FLUTTER", "NO_POTENTIAL", "Branch", "FlutterPoint", "Path", "PathPoint"]
 
 NO_POTENTIAL = (
     "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
-    "tangent is singular (divergence), and flutter would only show in dynamics"
+    "tangent is singular (divergence), and flutter would only show with the key 'modes'"
 )
 """A note."""
+
+FLUTTER = (
+    "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
+    "tangent is singular (divergence), flutter points where one of the modes asked for starts to grow"
+)
+"""The note where modes are asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlutterPoint(Equilibrium):
+    """An equilibrium from which on a motion grows while it oscillates: without damping two frequencies meet there.
+
+    Attributes
+    ----------
+    omega : float
+        Angular frequency of that motion, rad/s.
+    """
+
+    omega: float = field(kw_only=True)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As an entry of ``flutter_points`` in the JSON answer."""
+        return {**super().to_dict(), "omega": self.omega}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +68,9 @@ class PathPoint:
     prepared : Prepared, optional
         Its own discretisation, where that is not the one of the whole path: in contact elements end where something
         touches.
+    omega, growth : ndarray (modes,), optional
+        Where modes are asked for: angular frequencies, rad/s, and rates of growth, 1/s, of the lowest motions.  Those
+        that leave the equilibrium without oscillating come first, with frequency zero; a rate below zero fades.
     """
 
     factor: float
@@ -55,6 +81,8 @@ class PathPoint:
     arc: float
     kind: str = ""
     prepared: Prepared | None = field(repr=False, default=None)
+    omega: Array | None = field(repr=False, default=None)
+    growth: Array | None = field(repr=False, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +99,8 @@ class Branch:
         Why it ends, a sentence.
     bifurcation, side : int
         From which bifurcation of the path it starts (0: it is the path itself), and to which side, 1 or -1.
+    flutter_points : tuple of FlutterPoint
+        Where modes are asked for: points from which on, along the path, one more motion grows while it oscillates.
     """
 
     points: tuple[PathPoint, ...] = field(repr=False)
@@ -80,6 +110,7 @@ class Branch:
     end: str
     bifurcation: int = 0
     side: int = 0
+    flutter_points: tuple[FlutterPoint, ...] = ()
 
     @property
     def factors(self) -> Array:
@@ -115,9 +146,11 @@ class Path:
         Arc lengths are the root of the mean square of the rotations (rad) and of the factor over this unit.
     error_estimate : float
         Largest estimated error along the path: of positions over the size of the scene, of the factors of limit
-        points and bifurcations relative to themselves.
+        points and bifurcations, of frequencies and of the factors of flutter points relative to themselves.
     seconds : mapping
         Time spent on models and on solving.
+    massive : Prepared, optional
+        The discretisation that modes are on, where these are asked for.
     """
 
     scene: Any = field(repr=False)
@@ -129,6 +162,7 @@ class Path:
     last: Equilibrium
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
+    massive: Prepared | None = field(repr=False, default=None)
 
     @property
     def model(self) -> Model:
@@ -160,6 +194,11 @@ class Path:
         """Bifurcation points of the path, then of the branches."""
         return tuple(entry for branch in self.branches for entry in branch.bifurcations)
 
+    @property
+    def flutter_points(self) -> tuple[FlutterPoint, ...]:
+        """Flutter points of the path, then of the branches."""
+        return tuple(entry for branch in self.branches for entry in branch.flutter_points)
+
     def fields(self, point: PathPoint) -> Fields:
         """Everything by name at a point."""
         return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
@@ -184,7 +223,7 @@ class Path:
             "seconds": dict(self.seconds),
             "path": self._arrays(self.main),
         }
-        for kind in ("steps", "limit_points", "bifurcations"):
+        for kind in ("steps", "limit_points", "bifurcations", "flutter_points"):
             entries = [
                 {**entry.to_dict(), "branch": i}
                 for i, branch in enumerate(self.branches)
@@ -208,6 +247,10 @@ class Path:
                 key = "quaternion" if model.space else "angle"
                 turned = [here.rotation(name) for here in fields]
                 nodes[name][key] = [t.tolist() if model.space else float(t[0]) for t in turned if t is not None]
+        moving: dict[str, Any] = {}
+        for key in ("omega", "growth"):
+            courses = [getattr(point, key) for point in points]
+            moving |= {key: [course.tolist() for course in courses]} if self.massive is not None else {}
         return {
             "factor": branch.factors.tolist(),
             "nodes": nodes,
@@ -215,5 +258,6 @@ class Path:
             "negative": [point.negative for point in points],
             "arc": [float(point.arc) for point in points],
             "kind": [point.kind for point in points],
+            **moving,
             "end": branch.end,
         }

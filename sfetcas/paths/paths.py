@@ -31,6 +31,7 @@ from ..solvers.prepared import Prepared
 from ..solvers.tracing import Traced, passes, switched, trace, without
 from .contact_path import follow_in_contact
 from .path import NO_POTENTIAL, Branch, Path, PathPoint
+from .vibrations import shaken, with_modes
 
 __all__ = ["follow_path", "switch"]
 
@@ -89,7 +90,9 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
     if scene.contacts:
         return follow_in_contact(scene, replace(settings or Settings(), **changes))
-    return _Run(scene, replace(settings or Settings(), **changes)).path()
+    settings = replace(settings or Settings(), **changes)
+    path = _Run(scene, settings).path()
+    return with_modes(path, settings) if scene.analysis.count_of_modes else path
 
 
 @single_threaded
@@ -134,7 +137,8 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
     if traced is None:
         raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
     stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
-    return run.answered(curve, stretch, {})
+    branch = run.answered(curve, stretch, {})
+    return branch if path.massive is None else shaken(path, branch)
 
 
 def _event_at(curve: Curve, path: Path, number: int) -> Event:
@@ -431,5 +435,5 @@ def _said(event: Event, has_energy: bool) -> tuple[str, ...]:
 
 DIVERGENCE = (
     "static divergence: the static tangent is singular, another equilibrium is adjacent; without a potential the "
-    "structure may have become unstable before by flutter, which only shows in dynamics"
+    "structure may have become unstable before by flutter, which the key 'modes' looks for"
 )

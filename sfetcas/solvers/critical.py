@@ -16,7 +16,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from .arclength import Curve, Standing, Tangent
 
-__all__ = ["Event", "at_factors", "events_between", "root", "shapes_at"]
+__all__ = ["Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
 SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
@@ -78,7 +78,7 @@ def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
 
 
 def _limit(curve: Curve, a: Standing, b: Standing) -> Standing | None:
-    return _sought(curve, a, b, lambda standing: standing.tangent.factor)
+    return sought(curve, a, b, lambda standing: standing.tangent.factor)
 
 
 def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
@@ -86,7 +86,7 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     found: list[Event] = []
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
-        standing = _sought(curve, a, b, value)
+        standing = sought(curve, a, b, value)
         if standing is None:
             continue
         standing = _settled(curve, a, b, standing)
@@ -141,7 +141,7 @@ def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], f
     return value
 
 
-def _sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float]) -> Standing | None:
+def sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float]) -> Standing | None:
     """The point between two others at which a function of the points vanishes."""
     at, arc = curve.between(a, b), b.arc - a.arc
     found: dict[float, Standing] = {0.0: a, arc: b}
@@ -225,7 +225,7 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
     found = curve.at_factor(replace(a, state=state, arc=a.arc + place), factor, most=NEAR)
     if found is not None:
         return found
-    near = _sought(curve, a, b, lambda standing: standing.factor - factor)
+    near = sought(curve, a, b, lambda standing: standing.factor - factor)
     return None if near is None else curve.at_factor(near, factor)
 
 

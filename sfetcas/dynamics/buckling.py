@@ -1,0 +1,87 @@
+"""Buckling factors: a linear estimate of the loads at which an unloaded structure buckles.
+
+With ``H`` the Newton matrix with its rows at factor 0 and ``H'`` its derivative along the path of equilibria there,
+
+    (H + f H') x = 0.
+
+Where the path bends only multipliers and not the structure, as of straight columns, ``H`` is linear in the factor and
+``f`` is exact; elsewhere it is what linear theory says, with the rotations before buckling to the first order.
+
+Source: Bathe 2014, Finite element procedures, section 6.8.2 (linearised buckling analysis).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.linear import SparseMap
+from ..mathematics.spectra import largest
+from ..solvers.arclength import Curve, Standing
+from ..solvers.beginning import begin_path
+from ..solvers.newton import DUAL, PROXIMAL
+from ..solvers.prepared import Prepared
+
+__all__ = ["buckling_factors"]
+
+TURN = 0.01
+"""Rotations, rad, over which matrices are differenced, by fourth order: 1e-8 is left out of what rotations do."""
+
+REAL = 1e-6
+"""Imaginary parts of inverse factors below this share are rounding."""
+
+FAR = 1e-7
+"""Inverse factors below this share of the largest are what differencing leaves."""
+
+BESIDE = 2
+"""Times so many factors are looked for: those below zero belong to loads turned round, and come last."""
+
+
+def buckling_factors(prepared: Prepared, count: int) -> Array:
+    """The lowest factors of a linear estimate, those above zero first, each kind by size.
+
+    Empty where the path of equilibria does not begin at factor 0, as of a mechanism that only its loads hold.
+
+    Raises
+    ------
+    SceneError, SolveError
+        There is no equilibrium to begin from.
+    numpy.linalg.LinAlgError
+        The pencil cannot be solved.
+    """
+    curve, start, _ = begin_path(prepared, (0.0, 1.0))
+    if start.factor != 0.0 or start.tangent.factor == 0.0:
+        return np.zeros(0)
+    change = _change(curve, start)
+    if not len(change.value):
+        return np.zeros(0)
+    equations = prepared.equations
+    entries = start.point.entries.copy()
+    turning = equations.turning_unknowns
+    entries[equations.diagonal[:turning]] += PROXIMAL * prepared.weight
+    entries[equations.diagonal[equations.unknowns : equations.total]] -= DUAL
+    equations.solver.factor(entries)
+
+    def apply(block: Array) -> Array:
+        return np.asarray(equations.solver.solve(-np.column_stack([change @ column for column in block.T])))
+
+    inverse, _ = largest(apply, equations.total, BESIDE * count)
+    sizes = np.abs(inverse)
+    real = inverse[(np.abs(inverse.imag) <= REAL * sizes) & (sizes > FAR * sizes.max(initial=0.0))].real
+    factors = 1.0 / real
+    return np.asarray(factors[np.lexsort((np.abs(factors), factors < 0.0))][:count])
+
+
+def _change(curve: Curve, start: Standing) -> SparseMap:
+    """Derivative of the Newton matrix by the factor along the path."""
+    equations = curve.equations
+    rate, loads = start.tangent.z / start.tangent.factor, curve.rate(start.factor)
+    turned = float(np.abs(rate[: equations.turning_unknowns]).max(initial=0.0))
+    h = 1.0 / max(turned / TURN, float(np.abs(rate).max(initial=0.0)), 1e-300)
+
+    def entries(w: float) -> Array:
+        loading = start.loading.plus(loads.scaled(w))
+        return equations.at(curve.held(equations.moved(start.state, w * rate), loading), loading).entries
+
+    near, far = ((entries(w) - entries(-w)) / (2.0 * w) for w in (h, 2.0 * h))
+    return SparseMap(equations.row, equations.column, (4.0 * near - far) / 3.0, (equations.total,) * 2)
