@@ -59,7 +59,8 @@ class StageEquations(System):
         entries = [stage.entries for stage in found]
         for i, one in enumerate(found):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
-        inertia = [b[i, i] for i in range(stages)]
+        # Of the last stage: that of the first of two stages of Radau's vanishes.
+        inertia = [b[stages - 1, stages - 1]] * stages
         step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]), linear)
         turned, shift, more, size = self.moved(parts, step)
         results = [ca.horzcat(*turned), y + shift, lam + more, size]
