@@ -44,6 +44,9 @@ INTEGRATORS: dict[str, Callable[[StageEquations, Callable[[float], Any] | None],
 }
 """What integrates a system, by name; the second argument is told the time reached, s."""
 
+USUAL_STEPS, CALLS = 100, 6
+"""Steps of a first run, and calls of a kernel in a step, for the choice whether compiling pays."""
+
 OUTPUTS = 100
 """Answers where no spacing is asked for."""
 
@@ -132,15 +135,17 @@ class _Simulation:
 
     # -- one run ----------------------------------------------------------------------------------------
 
-    def run(self, mesh: Mesh, rounds: int) -> _Run:
-        """The motion on a mesh, after so many coarser runs."""
+    def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> _Run:
+        """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
         model = assemble(self.scene, mesh, assembly="nodal")
         equations = Equations(model)
         masses = masses_of(model)
         built = time.perf_counter()
         analysis = self.scene.analysis
-        system = StageEquations(equations, masses)
+        steps = USUAL_STEPS if before is None else 2 * before
+        steps = steps if analysis.step is None else int(analysis.duration / analysis.step)
+        system = StageEquations(equations, masses, calls=CALLS * max(steps, 1))
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
@@ -214,7 +219,7 @@ class _Simulation:
             if run.failure is not None or run.interrupted:
                 break
             mesh = mesh if self.prescribed else mesh.refined()
-            finer = self.run(mesh, rounds)
+            finer = self.run(mesh, rounds, run.count)
             error = self._difference(run, finer)
             run = finer
             if error <= self.accuracy:
