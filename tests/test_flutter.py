@@ -75,6 +75,19 @@ def test_motions_that_come_among_the_lowest_do_not_meet_there():
     )
 
 
+def test_square_column_flutters_to_all_sides_at_once():
+    scene = column(head="free", feet="clamped", dimension="space")
+    scene["sections"] = {"strip": {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8, "rhoA": 1.0, "rhoI": [0.02, 0, 0]}}
+    scene["loads"]["weight"] |= {"value": [-10, 0], "frame": "follower"}
+    scene["members"]["column"] |= {"element": "SFET5", "elements": 2}
+    scene["analysis"] |= {"range": [0, 2.5], "modes": 4, "accuracy": 1e-4}
+    (point,) = solve(made(scene)).flutter_points
+    # The accuracy asked for.
+    assert point.factor == pytest.approx(2.00509536189738, rel=1e-4)
+    assert point.omega == pytest.approx(11.0155576409229, rel=1e-4)
+    assert "2 motions start to grow at once" in point.notes
+
+
 def test_squares_of_frequencies_of_a_hinged_column_fall_with_the_load():
     path = solve(made(column()))
     for point in path.points:

@@ -1,0 +1,90 @@
+"""Buckling factors of the linear estimate: Euler's columns, bifurcations of paths, and where there are none."""
+
+import json
+
+import numpy as np
+import pytest
+from scenes import made
+
+from sfetcas import load, solve
+from sfetcas.cli import main
+from sfetcas.description.scenefile import dump
+
+STRIP = {"EI2": 1.0, "EI3": 1.0, "GJ": 0.8, "rhoA": 1.0, "rhoI": [0.02, 0.01, 0.01]}
+
+
+def column(load=None, **changes):
+    return {
+        "sections": {"strip": STRIP},
+        "nodes": {"foot": {"position": [0, 0], "support": "clamped"}, "head": {"position": [1, 0]}},
+        "members": {"column": {"nodes": ["foot", "head"], "section": "strip"}},
+        "loads": {"weight": {"type": "force", "node": "head", "value": [-1, 0]} | (load or {})},
+        "analysis": {"type": "modes", "modes": 3, "accuracy": 1e-8},
+    } | changes
+
+
+@pytest.mark.parametrize("ends", ["clamped_free", "clamped_clamped", "clamped_hinged", "hinged_hinged"])
+def test_columns_of_euler(ends):
+    table = load(f"problems/euler_column_{ends}.toml").to_dict()
+    exact = [expect["value"] for expect in table.pop("expect") if expect["quantity"] == "factor"]
+    table["sections"]["strip"]["rhoA"] = 1.0
+    table["analysis"] = {"type": "modes", "modes": len(exact), "accuracy": 1e-8}
+    # Straight columns are exact up to the mesh, which is chosen for frequencies to this accuracy.
+    np.testing.assert_allclose(solve(made(table)).buckling, exact, rtol=1e-8)
+
+
+def portal(analysis):
+    nodes = {"A": [0, 0], "B": [0, 1], "C": [1, 1], "D": [1, 0]}
+    return made(
+        {
+            "sections": {"strip": STRIP},
+            "nodes": {n: {"position": p} | ({"support": "hinge"} if n in "AD" else {}) for n, p in nodes.items()},
+            "members": {name: {"nodes": list(name), "section": "strip"} for name in ("AB", "BC", "CD")},
+            "loads": {n: {"type": "force", "node": n, "value": [0, -1]} for n in "BC"},
+            "analysis": {"accuracy": 1e-8} | analysis,
+        }
+    )
+
+
+def test_frame_that_is_rigid_until_it_buckles():
+    bends = solve(portal({"type": "path", "range": [0, 30]})).bifurcations
+    buckling = solve(portal({"type": "modes", "modes": len(bends)})).buckling
+    assert len(bends) == 3
+    # Both to 1e-8.
+    np.testing.assert_allclose(buckling, [point.factor for point in bends], rtol=2e-8)
+
+
+def test_factors_do_not_depend_on_the_load_that_is_applied():
+    heavy = solve(made(column({"value": [-1.5, 0]})))
+    pulled = solve(made(column({"value": [1.5, 0]})))
+    exact = (np.array([1, 3, 5]) * np.pi / 2) ** 2 / 1.5
+    np.testing.assert_allclose(heavy.buckling, exact, rtol=1e-8)
+    # A load turned round: nothing above zero, so the others are listed, by size.
+    np.testing.assert_allclose(pulled.buckling, -exact, rtol=1e-8)
+
+
+def test_square_column_in_space_buckles_to_all_sides():
+    analysis = {"type": "modes", "modes": 4, "accuracy": 1e-8}
+    found = solve(made(column(dimension="space", analysis=analysis))).buckling
+    np.testing.assert_allclose(found, np.repeat([1, 9], 2) * np.pi**2 / 4, rtol=1e-8)
+
+
+@pytest.mark.parametrize("changes", [{"loads": {}}, {"load": {"frame": "follower"}}])
+def test_none_without_loads_or_a_potential(changes):
+    assert len(solve(made(column(**changes))).buckling) == 0
+
+
+def test_none_of_a_mechanism_that_its_load_holds():
+    nodes = {"foot": {"position": [0, 0], "support": "hinge"}, "head": {"position": [1, 0]}}
+    modes = solve(made(column({"value": [1, 0]}, nodes=nodes)))
+    assert len(modes.buckling) == 0
+    assert len(modes.modes) == 3
+
+
+def test_answer_report_and_expectation(tmp_path, capsys):
+    file, out = tmp_path / "scene.json", tmp_path / "out.json"
+    expect = {"quantity": "modes.buckling", "value": [np.pi**2 / 4, 9 * np.pi**2 / 4], "tolerance": 1e-7}
+    dump(made(column(expect=[expect])), file)
+    assert main(["run", str(file), "--json", str(out)]) == 0
+    assert json.loads(out.read_text())["modes"]["buckling"][0] == pytest.approx(np.pi**2 / 4, rel=1e-8)
+    assert "buckles at factors, linear estimate: 2.4674011, 22.20660" in capsys.readouterr().out
