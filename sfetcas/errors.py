@@ -35,6 +35,7 @@ class Status(enum.Enum):
     INFEASIBLE = "no shape of the members satisfies all supports, joints and motions"
     STRETCHED = "no finite force holds the members"
     UNBOUNDED = "the loads are not held: the energy falls without bound"
+    STOPPED = "the motion could not be followed further"
     INTERRUPTED = "interrupted: what was computed up to then is kept"
     ITERATIONS = "the solver used up its iterations"
     FAILED = "the solver stopped before it reached an equilibrium"

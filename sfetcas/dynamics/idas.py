@@ -157,7 +157,7 @@ class Idas(Integrator):
         unit = self.system.masses.time
         span = f"between {piece.begin * unit:.6g} and {piece.end * unit:.6g} s"
         detail = f"IDAS did not get on {span}: steps became too short, more than {STEPS}, or joints singular"
-        return SolveError(Status.FAILED, detail)
+        return SolveError(Status.STOPPED, detail)
 
 
 class _Solver:

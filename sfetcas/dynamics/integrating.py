@@ -342,4 +342,4 @@ SMALLEST = 1e-12
 def _failed(stepper: Stepper, taken: Taken) -> SolveError:
     seconds = taken.begin.t * stepper.time
     detail = f"Newton's method did not converge at {seconds:.6g} s in a step of {taken.h * stepper.time:.3g} s"
-    return SolveError(Status.FAILED, detail, taken.begin)
+    return SolveError(Status.STOPPED, detail, taken.begin)

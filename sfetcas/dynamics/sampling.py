@@ -1,7 +1,8 @@
-"""States between and at the ends of steps: polynomials through the stages of neighbouring steps.
+"""States between and at the ends of steps: polynomials through the ends of neighbouring steps.
 
-Positions at the ends of steps are of the full order of a method, its own velocities and internal forces of index 3
-are not; derivatives of these polynomials are nearly, and serve instead.
+Positions at the ends of steps are of the full order of a method; those at the stages within, and its own velocities and
+internal forces of index 3, are not.  Derivatives of polynomials through the ends nearly are, and serve instead.  Where
+fewer steps hang together, after a kink and before the next, the stages within have to do.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from .integrating import Taken
 __all__ = ["Sample", "Sampler", "between"]
 
 NODES = 6
-"""Intervals of the polynomials at least, where so many stages are smoothly connected."""
+"""Intervals of the polynomials, where so many are smoothly connected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +60,18 @@ class Sampler:
     def __init__(self, times: Sequence[float] | Array, stages: int) -> None:
         self._times, self._next = list(times), 0
         self._steps: list[Taken] = []
-        self._around = -(-NODES // stages)
+        self._stages = stages
 
     def feed(self, taken: Taken) -> Iterator[Sample]:
         """Samples that a further step makes possible."""
         if taken.begin.last is None:
             yield from self.close()
         self._steps.append(taken)
-        # Two steps beyond the one a time lies in make its polynomial a central one.
-        settled = len(self._steps) - 1 - max(1, self._around // 2)
+        # Steps beyond the one a time lies in make its polynomial a central one.
+        settled = len(self._steps) - 1 - NODES // 2
         if settled >= 0:
             yield from self._up_to(self._steps[settled].after.t)
-        if len(self._steps) > 2 * self._around:
+        if len(self._steps) > 2 * NODES:
             del self._steps[0]
 
     def close(self) -> Iterator[Sample]:
@@ -88,11 +89,14 @@ class Sampler:
         """The sample at a time within the steps that are there."""
         ends = [taken.after.t for taken in self._steps]
         k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-        first = max(0, min(k - (self._around - 1) // 2, len(ends) - self._around))
-        return _interpolated(self._steps[first : first + self._around], self._steps[k], t)
+        many = len(ends) >= NODES
+        around = NODES if many else -(-NODES // self._stages)
+        first = max(0, min(k - (around - 1) // 2, len(ends) - around))
+        return _interpolated(self._steps[first : first + around], self._steps[k], t, slice(-1 if many else 0, None))
 
 
-def _interpolated(steps: Sequence[Taken], own: Taken, t: float) -> Sample:
+def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> Sample:
+    """The sample between steps, of which the chosen stages count."""
     begin, h = own.begin, own.h
     nodes, turns = [(steps[0].begin.t - begin.t) / h], []
     # Each step may be counted from an origin of its own.
@@ -100,10 +104,10 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float) -> Sample:
     y = [steps[0].begin.y + steps[0].begin.origin[0]]
     turns.append(_from(begin.q, steps[0].begin.q))
     for taken in steps:
-        nodes += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places]
-        x += list(taken.x + taken.begin.origin[1])
-        y += list(taken.begin.y + taken.shifts + taken.begin.origin[0])
-        turns += [_from(begin.q, _turned(taken.begin.q, turn)) for turn in taken.turns]
+        nodes += [(taken.begin.t - begin.t + c * taken.h) / h for c in taken.places[chosen]]
+        x += list(taken.x[chosen] + taken.begin.origin[1])
+        y += list(taken.begin.y + taken.shifts[chosen] + taken.begin.origin[0])
+        turns += [_from(begin.q, _turned(taken.begin.q, turn)) for turn in taken.turns[chosen]]
     at, here = np.array(nodes), np.array([(t - begin.t) / h])
     row = evaluation(at, here)
     slopes = differentiation(at)
