@@ -83,8 +83,8 @@ def test_same_motion_as_radau(name):
     for node in table["nodes"]:
         # Both are off by the accuracy, of a size of about one, at most.
         assert one.positions(node) == pytest.approx(other.positions(node), abs=2 * ACCURACY)
-        # Errors of the accuracy in the lowest vibrations, of some 10 rad/s.
-        assert one.velocities(node) == pytest.approx(other.velocities(node), abs=20 * ACCURACY)
+        # Steps of the other are about 1/50 s long, and its velocities slopes of positions that are off by the accuracy.
+        assert one.velocities(node) == pytest.approx(other.velocities(node), abs=50 * ACCURACY)
     along = [
         [m.steps[i].fields.positions(name, np.array([0.4])) for i in (0, -1)]
         for m in (one, other)
@@ -200,7 +200,7 @@ def test_driven_rotations_have_their_centripetal_acceleration_where_their_angle_
     one = any_state(table)[0]
     model = one.system.model
     rest = model.held(model.loading(0.0, 0.0))[one.turning].ravel()
-    groups = list(one.system.groups)
+    groups = list(one.system.model.groups)
     rate = np.array([2.0 if name == "on" else 0.0 for name in groups])
     zero = np.zeros(len(groups))
     place = np.concatenate([rest, np.zeros(one.states[1]), zero])
@@ -421,7 +421,7 @@ def test_failure_says_when(monkeypatch):
     monkeypatch.setattr(idas, "STEPS", 40)
     with pytest.raises(SolveError, match=r"IDAS did not get on between [0-9.]+ and [0-9.]+ s: steps became") as caught:
         sfetcas.solve(Scene.from_dict(double_pendulum(accuracy=1e-6, output=0.5)))
-    assert caught.value.status is Status.FAILED
+    assert caught.value.status is Status.STOPPED
     assert caught.value.reached.last.time < 2.0
 
 

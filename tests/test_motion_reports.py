@@ -94,7 +94,7 @@ def test_a_step_that_fails_leaves_what_was_reached(write, tmp_path, capsys):
     assert caught.err.count("\n") == 1
     assert "at 0.1 s" in caught.out
     answer = json.loads(out.read_text())
-    assert answer["status"] == Status.FAILED.value
+    assert answer["status"] == Status.STOPPED.value
     assert "did not converge at 0.1 s" in answer["failure"]
     np.testing.assert_allclose(answer["times"], np.arange(6) * 0.02, atol=1e-15)
     assert len(answer["nodes"]["B"]["position"]) == 6

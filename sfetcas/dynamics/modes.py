@@ -266,7 +266,7 @@ class _Run:
         try:
             return prepared, motion, motion.eigenmotions(self.count, negative)
         except np.linalg.LinAlgError as error:
-            raise SolveError(Status.STOPPED, f"the frequencies could not be found: {error}", corrected.state) from None
+            raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
 
     def _buckling(self, prepared: Prepared) -> Array:
         """Buckling factors, none where the structure cannot be unloaded."""
@@ -345,7 +345,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     corrected = prepared.correct(state, loading, iterations=30)
     if not corrected.converged and not corrected.residual <= SOLVED:
         detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
-        raise SolveError(Status.STOPPED, detail, state)
+        raise SolveError(Status.FAILED, detail, state)
     return prepared, corrected, loading
 
 

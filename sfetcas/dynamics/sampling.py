@@ -2,7 +2,8 @@
 
 Positions at the ends of steps are of the full order of a method; those at the stages within, and its own velocities and
 internal forces of index 3, are not.  Derivatives of polynomials through the ends nearly are, and serve instead.  Where
-fewer steps hang together, after a kink and before the next, the stages within have to do.
+fewer steps hang together, after a kink and before the next, or where so many steps are too long for one polynomial, the
+stages within have to do.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from ..mathematics.interpolation import differentiation, evaluation
 from .integrating import Taken
 
 __all__ = ["Sample", "Sampler", "between"]
+
+DOUBTFUL = 10.0
+"""How much more one node less may change the polynomial through ends: that of all stages does not show its error."""
 
 NODES = 6
 """Intervals of the polynomials, where so many are smoothly connected."""
@@ -89,14 +93,17 @@ class Sampler:
         """The sample at a time within the steps that are there."""
         ends = [taken.after.t for taken in self._steps]
         k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-        many = len(ends) >= NODES
-        around = NODES if many else -(-NODES // self._stages)
-        first = max(0, min(k - (around - 1) // 2, len(ends) - around))
-        return _interpolated(self._steps[first : first + around], self._steps[k], t, slice(-1 if many else 0, None))
+        found = []
+        for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // self._stages), slice(0, None))):
+            if chosen.start == 0 or len(ends) >= NODES:
+                first = max(0, min(k - (around - 1) // 2, len(ends) - around))
+                found.append(_interpolated(self._steps[first : first + around], self._steps[k], t, chosen))
+        ends_only, doubt = found[0]
+        return ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
 
 
-def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> Sample:
-    """The sample between steps, of which the chosen stages count."""
+def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> tuple[Sample, float]:
+    """The sample between steps, of which the chosen stages count, and how much one node less changes it."""
     begin, h = own.begin, own.h
     nodes, turns = [(steps[0].begin.t - begin.t) / h], []
     # Each step may be counted from an origin of its own.
@@ -110,14 +117,22 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
         turns += [_from(begin.q, _turned(taken.begin.q, turn)) for turn in taken.turns[chosen]]
     at, here = np.array(nodes), np.array([(t - begin.t) / h])
     row = evaluation(at, here)
-    slopes = differentiation(at)
     middle = own.after.x + own.after.origin[1]
     quantities = np.array(x) - middle
     q = _turned(begin.q, np.einsum("n,nra->ra", row[0], np.array(turns)))
-    v = (row @ slopes @ quantities)[0] / h
-    a = (row @ slopes @ slopes @ quantities)[0] / h**2
+    v, a = _rates(at, here, quantities)
+    # Without the node that is furthest.
+    near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
+    doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    return Sample(t, q, (row @ np.array(y))[0], position, v, a, own.after.near)
+    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, own.after.near)
+    return sample, float(doubt) / h**2
+
+
+def _rates(at: Array, here: Array, values: Array) -> tuple[Array, Array]:
+    """First and second derivative of the polynomial through values."""
+    slopes = evaluation(at, here) @ differentiation(at)
+    return (slopes @ values)[0], (slopes @ differentiation(at) @ values)[0]
 
 
 def between(samples: Sequence[Sample], t: float) -> Sample:
