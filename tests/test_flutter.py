@@ -68,7 +68,8 @@ def test_damping_brings_flutter_earlier(damping):
     assert point.omega == pytest.approx(np.sqrt(2.0 / 7.0), rel=1e-7)
 
 
-def test_motions_that_come_among_the_lowest_do_not_meet_there():
+@pytest.mark.parametrize("stiffness", [(0.01, 0.01), (0.01, 0.03)])
+def test_motions_that_come_among_the_lowest_do_not_meet_there(stiffness):
     """Pendulums that are pulled get ahead of the two that have met: these are then among the lowest, as one pair."""
     alone = ziegler(0.0).to_dict()
     for number, name in enumerate(("left", "right")):
@@ -78,7 +79,7 @@ def test_motions_that_come_among_the_lowest_do_not_meet_there():
             f"{name} end": {"position": [x, 1], "mass": 1.0},
         }
         alone["members"][name] = {"nodes": [f"{name} foot", f"{name} end"], "type": "rigid"}
-        alone["springs"][name] = {"node": f"{name} foot", "stiffness": 0.01, "between": ["ground", name]}
+        alone["springs"][name] = {"node": f"{name} foot", "stiffness": stiffness[number], "between": ["ground", name]}
         alone["loads"][name] = {"type": "force", "node": f"{name} end", "value": [0, 0.23]}
     flutter = 3.5 - np.sqrt(2.0)
     few, all_four = (
