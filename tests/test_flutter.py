@@ -68,11 +68,26 @@ def test_damping_brings_flutter_earlier(damping):
     assert point.omega == pytest.approx(np.sqrt(2.0 / 7.0), rel=1e-7)
 
 
-def test_motions_that_come_among_the_lowest_do_not_meet_there():
-    # Of both frequencies only one is asked for: one more is looked at, so that the pair is seen whole.
-    assert [point.factor for point in solve(ziegler(0.0, modes=1)).flutter_points] == pytest.approx(
-        [3.5 - np.sqrt(2.0)], rel=1e-9
+@pytest.mark.parametrize("stiffness", [(0.01, 0.01), (0.01, 0.03)])
+def test_motions_that_come_among_the_lowest_do_not_meet_there(stiffness):
+    """Pendulums that are pulled get ahead of the two that have met: these are then among the lowest, as one pair."""
+    alone = ziegler(0.0).to_dict()
+    for number, name in enumerate(("left", "right")):
+        x = 5.0 + number
+        alone["nodes"] |= {
+            f"{name} foot": {"position": [x, 0], "support": "hinge"},
+            f"{name} end": {"position": [x, 1], "mass": 1.0},
+        }
+        alone["members"][name] = {"nodes": [f"{name} foot", f"{name} end"], "type": "rigid"}
+        alone["springs"][name] = {"node": f"{name} foot", "stiffness": stiffness[number], "between": ["ground", name]}
+        alone["loads"][name] = {"type": "force", "node": f"{name} end", "value": [0, 0.23]}
+    flutter = 3.5 - np.sqrt(2.0)
+    few, all_four = (
+        solve(made({**alone, "analysis": {**alone["analysis"], "range": [0, 3.5], "modes": modes}})) for modes in (1, 4)
     )
+    assert [point.factor for point in all_four.flutter_points] == pytest.approx([flutter], rel=1e-9)
+    assert few.points[-1].growth.max() > 0.1
+    assert few.flutter_points == ()
 
 
 def test_square_column_flutters_to_all_sides_at_once():

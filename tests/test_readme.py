@@ -161,7 +161,7 @@ def test_program_of_the_readme_runs_as_it_stands(number, monkeypatch):
     text, names = programs()[number], {}
     exec(compile(text, README.name, "exec"), names)
     printed = re.findall(r"^(\S.*?)  # .*?(-?\d+\.\d+)\.\.\.(?:.*?(-?\d+\.\d+)\.\.\.)?", text, re.MULTILINE)
-    assert len(printed) == (1, 2, 0, 0)[number]
+    assert len(printed) == (1, 3, 0, 0)[number]
     for line, *digits in printed:
         found = np.atleast_1d(eval(line, names))
         for value, told in zip(found, filter(None, digits), strict=False):

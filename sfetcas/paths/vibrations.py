@@ -47,10 +47,11 @@ COMPLEX = 1e-5
 The difference is squared where it is looked for, so that a flutter point is missed by 1e-10 of the factor.
 """
 
-MET = 1e-6
-"""Share of two exponents, squared, by which they may differ where they meet.
+BEYOND, MET = 1e-6, 1e-3
+"""So far beyond a meeting, over the way between two points of the path, the difference there is at most so large.
 
-What is left after a root was sought is 1e-10.  Two that come among the lowest from above do not meet there.
+It grows in proportion to the way, and over the whole of that becomes about one.  Two that come among the lowest from
+above have their difference at once.
 """
 
 APART = 1e-6
@@ -245,8 +246,14 @@ class _Level:
         # The second point first: it says which two are to meet.
         value(b.standing)
         found = sought(self.curve, a.standing, b.standing, value)
-        if found is None or not abs(value(found)) <= MET:
+        if found is None:
             return None
+        way = b.standing.arc - a.standing.arc
+        beyond = self.curve.between(a.standing, b.standing)(min(found.arc - a.standing.arc + BEYOND * way, way))
+        # On this side there may be two others that are alike.
+        if beyond is None or not -MET <= value(beyond) < 0.0:
+            return None
+        value(found)
         return _Flutter(found, value.omega)
 
     # -- comparing ------------------------------------------------------------------------------
