@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..description.scene import Analysis, Load, Motion, Scene
+from ..description.scene import Analysis, Load, Motion, Node, Scene
 from ..description.sections import Polynomial, Table, evaluate
+from ..description.structure import SLIDING, released
 from ..equilibria import statics, stops
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
@@ -74,7 +75,7 @@ def moving(scene: Scene) -> Scene:
     if not cut and not released:
         return scene
     loads = {name: load for name, load in scene.loads.items() if name not in cut}
-    nodes = {name: node.model_copy(update=FREE) if name in released else node for name, node in scene.nodes.items()}
+    nodes = {name: _freed(scene, name) if name in released else node for name, node in scene.nodes.items()}
     motions = {name: motion for name, motion in scene.motions.items() if motion.node not in released}
     analysis = scene.analysis.model_copy(update={"cut": (), "release": ()})
     tables: dict[str, Any] = {"loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis}
@@ -82,8 +83,16 @@ def moving(scene: Scene) -> Scene:
     return Scene(**{**_given_keys(scene), **tables})
 
 
-FREE = {"support": "free", "rotation": "fixed"}
-"""Of a node whose support is released."""
+def _freed(scene: Scene, name: str) -> Node:
+    """A node whose support is released: what only the support needed goes with it."""
+    node = scene.nodes[name]
+    free: dict[str, Any] = {"support": "free", "rotation": "fixed"}
+    if not any(name in released(scene.nodes, scene.members, ends) for ends in (SLIDING, ("cylindrical",))):
+        free["direction"] = None
+    ends = ("hinge", "universal")
+    if node.joint not in ends and name not in released(scene.nodes, scene.members, ends):
+        free |= {"axis": (0.0, 0.0, 1.0), "axis2": None}
+    return node.model_copy(update=free)
 
 
 def at_rest(model: Model) -> State:

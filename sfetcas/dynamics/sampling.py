@@ -9,7 +9,7 @@ stages within have to do.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,7 +99,9 @@ class Sampler:
                 first = max(0, min(k - (around - 1) // 2, len(ends) - around))
                 found.append(_interpolated(self._steps[first : first + around], self._steps[k], t, chosen))
         ends_only, doubt = found[0]
-        return ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
+        sample = ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
+        # How it begins is known.
+        return replace(sample, v=self._steps[0].begin.rates[0]) if t == 0.0 else sample
 
 
 def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> tuple[Sample, float]:

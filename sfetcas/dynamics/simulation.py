@@ -258,7 +258,7 @@ class _Simulation:
             seconds=dict(self.seconds),
             integrator=self.name,
             count=run.count,
-            error_estimate=error,
+            error_estimate=error if error is not None and np.isfinite(error) else None,
             violation={"norms": run.norm, "closings": run.gap},
             notes=run.notes,
             failure="" if run.failure is None else run.failure.detail,

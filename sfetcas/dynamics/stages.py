@@ -79,7 +79,10 @@ class StageEquations(System):
         soft = [-SOFT / part for part in inertia]
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *soft)))
         left = ca.vec(residual.T)
-        return -ca.reshape(ca.solve(matrix, left[system.order], linear)[system.back], stages, self.total).T
+        # Entries differ by the square of the step: none is too small to divide by.
+        options = {"eps": 1e-300} if linear == "qr" else {}
+        found = ca.solve(matrix, left[system.order], linear, options)
+        return -ca.reshape(found[system.back], stages, self.total).T
 
     def moved(self, q: list[ca.MX], step: ca.MX) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX]:
         """Rotations of all stages after a step, changes of displacements and multipliers, and the largest movement."""

@@ -116,7 +116,18 @@ class Balance:
         for group, links in zip(model.connections, self._links, strict=True):
             for number, side in np.argwhere(group.places == place):
                 force = force + self._force_of(group, links, number, side)
-        return force
+        along = self._guide(node)
+        # A guide does nothing along itself: what is left there is not exactly in balance.
+        return force if along is None else force - (along @ force) * along
+
+    def _guide(self, node: str) -> Array | None:
+        """Direction in which a support lets a node move; None where it does not, or a motion drives it."""
+        scene = self.model.scene
+        record = scene.nodes[node]
+        if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
+            return None
+        along = np.asarray(record.direction, dtype=float)
+        return np.asarray(along / np.linalg.norm(along))
 
     def _moment(self, node: str) -> Array:
         number = self.model.rotations.node_turn[node]
