@@ -162,8 +162,11 @@ class History(Record):
 
 def _derivative(terms: tuple[float, ...], span: float, x: float, k: int) -> float:
     """A derivative of a polynomial in the fraction x of a span of time."""
-    return sum(perm(j, k) * c * x ** (j - k) for j, c in enumerate(terms) if j >= k) / span**k
+    return sum(perm(j, k) * c * x ** (j - k) for j, c in enumerate(terms) if j >= k) / max(span**k, TINY)
 
+
+TINY = 1e-300
+"""Keeps spans whose powers are no numbers of the machine from being divided by."""
 
 SMOOTH = 1e-6
 """Jumps over the largest value, of derivatives times the interval's length, up to which a history goes on smoothly."""

@@ -80,7 +80,8 @@ def moving(scene: Scene) -> Scene:
     analysis = scene.analysis.model_copy(update={"cut": (), "release": ()})
     tables: dict[str, Any] = {"loads": loads, "nodes": nodes, "motions": motions, "analysis": analysis}
     tables["dimension"] = scene.resolved_dimension
-    return Scene(**{**_given_keys(scene), **tables})
+    # Rules of equilibria, as that something holds every node, are those of the scene before.
+    return scene.model_copy(update=tables)
 
 
 def _freed(scene: Scene, name: str) -> Node:

@@ -113,6 +113,9 @@ class Stepper:
     def __init__(self, system: StageEquations, method: Method, linear: str = "qr") -> None:
         self.system, self.method = system, method
         self.function = step_function(system, method, linear)
+        # What the error of a step is judged by: all that has inertia, section axes too, which nothing else may move.
+        weights = [np.ones(system.linear, bool), *(group.mass.ravel() != 0.0 for group in system.masses.observables)]
+        self.judged = np.flatnonzero(np.concatenate(weights))
         self._batch = Batch(self.function, 1)
         self.time = system.masses.time
         self.count = 0
@@ -304,14 +307,14 @@ class _Adaptive:
         """Over the tolerance, of the positions."""
         if not taken.converged:
             return float(np.inf)
-        positions = slice(0, self._stepper.system.linear)
+        positions = self._stepper.judged
         expected = self._stepper.predicted(memory, taken.h) + memory.origin[1]
         missed = (taken.after.position - expected)[positions]
         return float(np.abs(missed).max()) / self._tolerance
 
     def _begun(self, memory: Memory, h: float, least: float) -> list[Taken]:
         """The first two steps, each half of one that agrees with them."""
-        stepper, positions = self._stepper, slice(0, self._stepper.system.linear)
+        stepper, positions = self._stepper, self._stepper.judged
         while True:
             fresh = stepper.refreshed(memory, h)
             whole, half = stepper.step(fresh, h), stepper.step(fresh, 0.5 * h)

@@ -53,6 +53,9 @@ OUTPUTS = 100
 GAINED = 3.0
 """A finer run is taken to be more accurate than it differs from the coarser one by this: 2^order - 1 of order 2."""
 
+RESCUES = 2
+"""Finer meshes that are tried where the first run fails."""
+
 ROUNDS = 6
 """Finer runs at most."""
 
@@ -214,23 +217,31 @@ class _Simulation:
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
         run = self.run(mesh, 0)
-        refinable = analysis.step is None or not self.prescribed
-        for rounds in range(1, 1 + ROUNDS if refinable else 1):
-            if run.failure is not None or run.interrupted:
+        for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
+            failed = run.failure is not None
+            if run.interrupted or (failed and (self.prescribed or rounds > RESCUES)):
                 break
             mesh = mesh if self.prescribed else mesh.refined()
             finer = self.run(mesh, rounds, run.count)
-            error = self._difference(run, finer)
-            run = finer
+            if failed:
+                # What a coarse mesh cannot follow a finer one may.
+                run = finer
+                continue
+            if finer.interrupted or finer.failure is not None:
+                # The whole way, though not judged, says more than a part of it.
+                run.interrupted = finer.interrupted
+                run.failure = finer.failure
+                break
+            error, run = self._difference(run, finer), finer
             if error <= self.accuracy:
                 break
         return self._answer(run, error)
 
     def _difference(self, coarse: _Run, fine: _Run) -> float:
         """Estimated error of the finer run: distances of nodes and middles of members, over the size of the scene."""
-        if fine.failure is not None or fine.interrupted:
-            return float(np.inf)
         scene, apart = self.scene, 0.0
+        turning = coarse.instants[0].model.rotations.node_turn
+        heavy = {name for name in scene.nodes if turning[name] is not None and self._has_inertia(coarse, name)}
         # What ends at a condition ends at times that differ a little: both ends are compared.
         ends = [(coarse.instants[-1], fine.instants[-1])]
         for one, other in (*zip(coarse.instants, fine.instants, strict=False), *ends):
@@ -238,11 +249,24 @@ class _Simulation:
                 continue
             for node in scene.nodes:
                 apart = max(apart, float(np.abs(one.position(node) - other.position(node)).max()))
+            for node in heavy:
+                a, b = one.quaternion(node), other.quaternion(node)
+                assert a is not None
+                assert b is not None
+                # Of the angle between, rad, whichever signs the quaternions have.
+                apart = max(apart, scene.size * 2.0 * float(np.linalg.norm(a - (1.0 if a @ b >= 0.0 else -1.0) * b)))
             for member in one.model.members:
                 middle = np.array([0.5])
                 moved = one.fields.positions(member, middle) - other.fields.positions(member, middle)
                 apart = max(apart, float(np.abs(moved).max()))
         return apart / scene.size / GAINED
+
+    @staticmethod
+    def _has_inertia(run: _Run, name: str) -> bool:
+        """Whether a node turns with rotary inertia, so that its angle is a motion of its own."""
+        mover = run.instants[0].mover
+        turn = mover.model.rotations.node_turn[name]
+        return any(turn in group.turns for group in mover.inertia.system.masses.observables if group.mass.any())
 
     def _answer(self, run: _Run, error: float | None) -> Trajectory:
         short = error is not None and not error <= self.accuracy and self.asked
@@ -258,7 +282,7 @@ class _Simulation:
             seconds=dict(self.seconds),
             integrator=self.name,
             count=run.count,
-            error_estimate=error if error is not None and np.isfinite(error) else None,
+            error_estimate=error,
             violation={"norms": run.norm, "closings": run.gap},
             notes=run.notes,
             failure="" if run.failure is None else run.failure.detail,
