@@ -245,7 +245,14 @@ class SmallMotion:
         inverse, shapes = largest(apply, n, wanted, inner if self.symmetric else None)
         exhausted = len(inverse) < wanted
         found = np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0)
+        # Where nothing with mass can move, rounding of the rows is all that is left.
+        missed = np.abs(self._missed(shapes)).max(axis=0) if self.equations.rows else np.zeros(len(inverse))
+        found &= missed <= HELD * np.abs(shapes).max(axis=0, initial=TINY)
         return shift + 1.0 / inverse[found], shapes[:, found], exhausted or not found.all()
+
+    def _missed(self, shapes: Array) -> Array:
+        """What shapes miss the rows by."""
+        return _times(self.constraints, shapes)
 
     def _quadratic(self, count: int, unstable: int) -> Eigenmotions:
         """The same with damping: exponents nearest to a small number above zero."""
@@ -277,8 +284,24 @@ class SmallMotion:
 
         inverse, vectors = largest(apply, 2 * n, count + unstable, pick=pick)
         exponents, shapes = _exponents(shift, inverse), vectors[:n]
+        own = self._solve(exponents, shapes)
+        exponents, shapes = exponents[own], shapes[:, own]
         rigid = np.abs(exponents) ** 2 <= DOUBLE * self._added(shapes)
         return _sorted_exponents(exponents, shapes, self._independent(shapes[:, rigid]), rigid, count)
+
+    def _solve(self, exponents: Array, shapes: Array) -> Array:
+        """Which exponents and shapes solve their own equation: crowds of motions that fade leave others as well."""
+        parts = [_times(part, shapes) for part in (self.stiffness, self.mass)]
+        damped = _times(self.damping, shapes) + _times(self.gyroscopic, shapes)
+        with np.errstate(over="ignore", invalid="ignore"):
+            terms = np.array(
+                [
+                    (shapes.conj() * part).sum(axis=0) * exponents**power
+                    for part, power in ((parts[0], 0), (damped, 1), (parts[1], 2))
+                ]
+            )
+            missed = np.abs(terms.sum(axis=0)) / np.maximum(np.abs(terms).sum(axis=0), TINY)
+        return (missed < OWN) | (np.abs(exponents) <= NOTHING)
 
     def _independent(self, shapes: Array) -> int:
         """Number of motions among shapes: one without damping has the exponent zero twice."""
@@ -355,6 +378,12 @@ WAVES = 1e-3
 
 NOTHING = 1e-4
 """Exponents below this may be zeros, of which two that fall together are known to the root of rounding."""
+
+HELD = 1e-4
+"""Share of a shape by which it may miss the rows: they are a little soft in the factors."""
+
+OWN = 1e-5
+"""Share of the terms of its equation that an exponent may miss: of those that are converged it is rounding."""
 
 MOST_FREE = 40
 """Zero exponents that are looked for at most."""
