@@ -11,6 +11,7 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.kernels import Batch
+from ..mechanics.masses import Observables
 from .methods import Method, Radau
 from .stages import StageEquations
 from .steps import CONVERGED, step_function
@@ -99,6 +100,14 @@ class Taken:
         return self.size <= CONVERGED
 
 
+def _arms(group: Observables) -> Array:
+    """What the error of quantities counts beside that of positions: the arm on which their share of all mass would be.
+
+    A body may turn without moving anything but its section axes; of a thin member these count as much as it is thick.
+    """
+    return np.minimum(np.sqrt(len(group.data) * np.abs(group.mass.ravel())), 1.0)
+
+
 class Stepper:
     """Steps of one method for one system.
 
@@ -113,9 +122,7 @@ class Stepper:
     def __init__(self, system: StageEquations, method: Method, linear: str = "qr") -> None:
         self.system, self.method = system, method
         self.function = step_function(system, method, linear)
-        # What the error of a step is judged by: all that has inertia, section axes too, which nothing else may move.
-        weights = [np.ones(system.linear, bool), *(group.mass.ravel() != 0.0 for group in system.masses.observables)]
-        self.judged = np.flatnonzero(np.concatenate(weights))
+        self.judged = np.concatenate([np.ones(system.linear), *map(_arms, system.masses.observables)])
         self._batch = Batch(self.function, 1)
         self.time = system.masses.time
         self.count = 0
@@ -307,14 +314,13 @@ class _Adaptive:
         """Over the tolerance, of the positions."""
         if not taken.converged:
             return float(np.inf)
-        positions = self._stepper.judged
         expected = self._stepper.predicted(memory, taken.h) + memory.origin[1]
-        missed = (taken.after.position - expected)[positions]
+        missed = (taken.after.position - expected) * self._stepper.judged
         return float(np.abs(missed).max()) / self._tolerance
 
     def _begun(self, memory: Memory, h: float, least: float) -> list[Taken]:
         """The first two steps, each half of one that agrees with them."""
-        stepper, positions = self._stepper, self._stepper.judged
+        stepper = self._stepper
         while True:
             fresh = stepper.refreshed(memory, h)
             whole, half = stepper.step(fresh, h), stepper.step(fresh, 0.5 * h)
@@ -322,7 +328,7 @@ class _Adaptive:
             if whole.converged and half.converged:
                 other = stepper.step(half.after, 0.5 * h)
                 if other.converged:
-                    missed = (whole.after.position - other.after.position)[positions]
+                    missed = (whole.after.position - other.after.position) * stepper.judged
                     error = float(np.abs(missed).max()) / self._tolerance
                     if error <= 1.0:
                         self.h = 0.5 * h

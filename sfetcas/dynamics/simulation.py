@@ -241,7 +241,7 @@ class _Simulation:
         """Estimated error of the finer run: distances of nodes and middles of members, over the size of the scene."""
         scene, apart = self.scene, 0.0
         turning = coarse.instants[0].model.rotations.node_turn
-        heavy = {name for name in scene.nodes if turning[name] is not None and self._has_inertia(coarse, name)}
+        arms = {name: self._arm(coarse, name) for name in scene.nodes if turning[name] is not None}
         # What ends at a condition ends at times that differ a little: both ends are compared.
         ends = [(coarse.instants[-1], fine.instants[-1])]
         for one, other in (*zip(coarse.instants, fine.instants, strict=False), *ends):
@@ -249,12 +249,12 @@ class _Simulation:
                 continue
             for node in scene.nodes:
                 apart = max(apart, float(np.abs(one.position(node) - other.position(node)).max()))
-            for node in heavy:
+            for node, arm in arms.items():
                 a, b = one.quaternion(node), other.quaternion(node)
                 assert a is not None
                 assert b is not None
-                # Of the angle between, rad, whichever signs the quaternions have.
-                apart = max(apart, scene.size * 2.0 * float(np.linalg.norm(a - (1.0 if a @ b >= 0.0 else -1.0) * b)))
+                # By the angle between, whichever signs the quaternions have.
+                apart = max(apart, arm * 2.0 * float(np.linalg.norm(a - (1.0 if a @ b >= 0.0 else -1.0) * b)))
             for member in one.model.members:
                 middle = np.array([0.5])
                 moved = one.fields.positions(member, middle) - other.fields.positions(member, middle)
@@ -262,11 +262,12 @@ class _Simulation:
         return apart / scene.size / GAINED
 
     @staticmethod
-    def _has_inertia(run: _Run, name: str) -> bool:
-        """Whether a node turns with rotary inertia, so that its angle is a motion of its own."""
+    def _arm(run: _Run, name: str) -> float:
+        """Arm, m, on which all mass would have the rotary inertia of what turns like a node: what its angle counts."""
         mover = run.instants[0].mover
-        turn = mover.model.rotations.node_turn[name]
-        return any(turn in group.turns for group in mover.inertia.system.masses.observables if group.mass.any())
+        system, turn = mover.inertia.system, mover.model.rotations.node_turn[name]
+        shares = [np.abs(group.mass).sum() for group in system.masses.observables if turn in group.turns]
+        return float(np.sqrt(sum(shares) / system.axes)) * mover.model.scales.length
 
     def _answer(self, run: _Run, error: float | None) -> Trajectory:
         short = error is not None and not error <= self.accuracy and self.asked
