@@ -81,7 +81,12 @@ def elbow() -> Scene:
 
 
 PROBLEMS: dict[str, tuple[Callable[[], Scene], float, tuple[tuple[str, int], ...], tuple[str, int, float]]] = {
-    "D1 pendulum": (pendulum, 1.0, (("SFET4", 4), ("SFET5", 4), ("SFET7", 3), ("SFET7", 4), ("SFET7", 8)), ("SFET7", 16, 3e-6)),
+    "D1 pendulum": (
+        pendulum,
+        1.0,
+        (("SFET4", 4), ("SFET5", 4), ("SFET7", 3), ("SFET7", 4), ("SFET7", 8)),
+        ("SFET7", 16, 3e-6),
+    ),
     "D2 flight": (flight, 10.0, (("SFET5", 4), ("SFET5", 8), ("SFET7", 8)), ("SFET7", 16, 1e-5)),
     "D3 elbow": (elbow, 10.0, (("SFET3", 4), ("SFET5", 2), ("SFET5", 4), ("SFET5", 8)), ("SFET5", 16, 1e-5)),
 }
