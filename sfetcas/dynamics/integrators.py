@@ -140,7 +140,7 @@ class Stages(Integrator):
             course.breaks,
             step=course.step,
             tolerance=self._tolerance(course),
-            first=None if course.step is not None else FIRST * course.end,
+            first=None if course.step is not None else max(FIRST * course.end, min(course.end, SHORTEST)),
             beyond=course.beyond,
         )
         for taken in steps:
@@ -173,3 +173,6 @@ class Stages(Integrator):
 
 FIRST = 1e-3
 """First step that is tried, over the span."""
+
+SHORTEST = 1e-6
+"""The same in the unit of time: below, differences of positions over its square are rounding."""

@@ -183,6 +183,7 @@ class _Simulation:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
             run.instants = watch.up_to_end(run.instants, self.times)
+            run.notes = (*run.notes, watch.told(run.instants))
         run.count, run.gap, run.norm = integrator.count, integrator.gap, integrator.norm
         self.seconds["solve"] += time.perf_counter() - solving
         return run

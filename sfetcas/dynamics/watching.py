@@ -57,6 +57,15 @@ class Watch:
         end = self._end(instants)
         return [*(instant for instant in wanted if instant.time < end.time), end]
 
+    def told(self, instants: Sequence[Instant]) -> str:
+        """How it ended, in words."""
+        until = self._until
+        beyond = f"above {until.above:g}" if until.above is not None else f"below {until.below:g}"
+        if self._last is None:
+            return f"{until.quantity} never got {beyond}"
+        when = "at its begin already" if self._last == 0 else f"at {instants[-1].time:.9g} s"
+        return f"the motion ended {when}, as {until.quantity} was {beyond}"
+
     def _end(self, instants: list[Instant]) -> Instant:
         last = self._last
         assert last is not None
