@@ -62,7 +62,7 @@ def test_slider_is_let_go_with_its_direction():
 @pytest.mark.parametrize("end", [1e-3, 1e-7])
 def test_short_spans_are_no_singular_steps(end):
     motion = solved(cantilever(), end=end, output=end)
-    # At first the force, distributed by the waves it sends, moves the tip by far less than it would a point of mass 1/100.
+    # The force moves what its waves have reached, at these times more than a hundredth of the mass.
     assert 0.0 < motion.last.position("B")[1] < 50.0 * end**2
     assert motion.status is Status.SOLVED
 
