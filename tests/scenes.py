@@ -20,7 +20,7 @@ def arc_across(a, b, angle, direction):
 
 def cantilever(value=(0.0, 1.0), **more):
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "loads": {"tip": {"type": "force", "node": "B", "value": list(value)}},
@@ -46,7 +46,7 @@ def plane_loads():
 def arch():
     """Clamped arch: a loop through the ground, load beside the crown."""
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [1.0, 0.2], "support": "clamped"},
@@ -60,7 +60,7 @@ def arch():
 def four_bar():
     """Three members on two ball supports, one rigid corner and one hinge: a loop."""
     return {
-        "sections": {"s": SOFT, "thick": {**SOFT, "EI3": 2.0}},
+        "sections": {"s": {**SOFT}, "thick": {**SOFT, "EI3": 2.0}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [0, 1]},
@@ -82,7 +82,7 @@ def four_bar():
 def guided():
     """A slider on a slanted guide, a second one that turns, and a prescribed rotation and displacement."""
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [1, 0.2], "support": "slider", "direction": [1, 0.3], "rotation": "fixed"},
@@ -107,7 +107,7 @@ def bend_45():
     angle, radius = np.pi / 4, 1.0
     end = [radius * np.sin(angle), radius * (1 - np.cos(angle)), 0.0]
     return {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": end}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": angle}}},
         "loads": {
@@ -123,7 +123,7 @@ def tripod():
     """Three members of unlike sections on a rigid node in space: two loops; one foot is turned."""
     top = [0.1, 0.0, 1.0]
     return {
-        "sections": {"s": UNLIKE, "t": SOFT},
+        "sections": {"s": {**UNLIKE}, "t": {**SOFT}},
         "nodes": {
             "top": {"position": top},
             "a": {"position": [1, 0, 0], "support": "clamped"},
@@ -148,7 +148,7 @@ def tripod():
 def hinged_space():
     """Slanted hinges in space: a support, a joint between members, a released end; and a guide."""
     return {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {
             "A": {"position": [0, 0, 0], "support": "hinge", "axis": [0.2, 0.3, 1.0]},
             "B": {"position": [1, 0, 0.3], "joint": "hinge", "axis": [0.1, 1.0, 0.3]},
@@ -188,7 +188,7 @@ def helix():
     """A helix between a clamped node that is turned and a guide; twist and bending are coupled."""
     end = [0.5 * np.cos(2 * np.pi * 0.75), 0.5 * np.sin(2 * np.pi * 0.75), 0.6]
     return {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {
             "A": {"position": [0.5, 0, 0], "support": "clamped"},
             "B": {"position": end, "support": "slider", "direction": [0, 0, 1], "rotation": "ball"},

@@ -7,7 +7,7 @@ from scenes import SOFT, UNLIKE, ZOO, arc_across
 def linked():
     """Rigid crank, bent rigid corner and a flexible follower; springs of every kind of the plane; weight."""
     return {
-        "sections": {"s": SOFT, "bar": {"rhoA": 2.0}},
+        "sections": {"s": {**SOFT}, "bar": {"rhoA": 2.0}},
         "nodes": {
             "A": {"position": [0, 0], "support": "hinge"},
             "B": {"position": [0.2, 0.7], "joint": "hinge"},
@@ -47,7 +47,7 @@ def linked():
 def small_plane():
     """A flexible member, a curved small one and a slider; loads on the small one, and its weight."""
     return {
-        "sections": {"s": SOFT, "thick": {**SOFT, "EI3": {"at": [0, 1], "value": [3.0, 2.0]}}},
+        "sections": {"s": {**SOFT}, "thick": {**SOFT, "EI3": {"at": [0, 1], "value": [3.0, 2.0]}}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [0.8, 0.2]},
@@ -76,7 +76,7 @@ def small_plane():
 def sliding_plane():
     """A collar on a flexible member, driven along it, a driven hinge, and an end that slides along another."""
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [0.9, 0.1], "direction": [1, 0.2]},
@@ -114,7 +114,7 @@ def sliding_plane():
 def linked_space():
     """Rigid members at skew hinges, one on a universal support; springs of every kind of space."""
     return {
-        "sections": {"s": UNLIKE, "bar": {"rhoA": 1.5}},
+        "sections": {"s": {**UNLIKE}, "bar": {"rhoA": 1.5}},
         "nodes": {
             "A": {"position": [0, 0, 0], "support": "universal", "axis": [0, 0.2, 1], "axis2": [1, 0, 0]},
             "B": {"position": [0.3, 0.8, 0.2]},
@@ -155,7 +155,7 @@ def small_space():
     helix = {"type": "helix", "radius": 0.6, "pitch": 1.2, "turns": 0.3, "axis": [0, 0, 1], "center": [0, 0, 0]}
     end = [0.6 * np.cos(0.6 * np.pi), 0.6 * np.sin(0.6 * np.pi), 0.36]
     return {
-        "sections": {"s": UNLIKE, "thick": {"EI2": 4.0, "EI3": 2.0, "GJ": 1.5, "rhoA": 0.3}},
+        "sections": {"s": {**UNLIKE}, "thick": {"EI2": 4.0, "EI3": 2.0, "GJ": 1.5, "rhoA": 0.3}},
         "nodes": {
             "A": {"position": [1.2, -0.5, 0.1], "support": "clamped"},
             "B": {"position": [0.6, 0, 0]},
@@ -179,7 +179,7 @@ def small_space():
 def sliding_space():
     """A cylindrical joint along a flexible member, driven both ways, a universal joint, and an end that slides."""
     return {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {
             "A": {"position": [0, 0, 0], "support": "clamped"},
             "B": {"position": [0.9, 0.1, 0.2], "direction": [1, 0.2, 0.1]},
@@ -220,7 +220,7 @@ def sliding_space():
 def following():
     """Followers at the tip, inside and along a bent cantilever, and at the end of a rigid arm."""
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [1, 0.2]},
@@ -244,7 +244,7 @@ def following_space():
     """The same on a bend in space with a second, held foot; moments about fixed and carried axes."""
     end = [0.7, 0.3, 0.2]
     return {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {
             "A": {"position": [0, 0, 0], "support": "clamped"},
             "B": {"position": end},

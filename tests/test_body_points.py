@@ -492,7 +492,7 @@ def test_a_small_cantilever_vibrates_with_its_two_modes():
     ei, rho, force = UNLIKE["EI3"], UNLIKE["rhoA"], 1e-5
     table = {
         "dimension": "plane",
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s", "type": "small"}},
         "loads": {"f": {"type": "force", "node": "B", "value": [0, force]}},

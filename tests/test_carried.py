@@ -17,7 +17,7 @@ def tree(parents, forces, **more):
         nodes[str(k)] = {"position": place.tolist()}
         members[str(k)] = {"nodes": [str(parent), str(k)], "section": "s"}
     loads = {str(k): {"type": "force", "node": str(k), "value": [0.0, f]} for k, f in forces.items()}
-    return {"sections": {"s": SOFT}, "nodes": nodes, "members": members, "loads": loads, **more}
+    return {"sections": {"s": {**SOFT}}, "nodes": nodes, "members": members, "loads": loads, **more}
 
 
 def beyond(parents, forces, k):

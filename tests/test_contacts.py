@@ -18,7 +18,7 @@ FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
 def above(height, *, length=1.0, contact=None, **more):
     """A cantilever along x at a height above a floor."""
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {"A": {"position": [0, height], "support": "clamped"}, "B": {"position": [length, height]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "contacts": {"floor": contact or FLOOR},
@@ -37,7 +37,7 @@ def tip(value):
 def between_walls(gap, steps, *, nodes=True, support="hinge"):
     """A strip buckled between two walls by shortening; a start chooses the upper one."""
     table = {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {"A": {"position": [0, 0], "support": support}, "B": {"position": [1, 0], "support": support}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "contacts": {
@@ -462,7 +462,13 @@ def test_point_in_space_and_small_member_are_refused():
 def rods(count, height, *, contact=None, types=None):
     """Heavy links of 1 m in a row at a height, hinged to each other and to the ground."""
     floor = {key: value for key, value in FLOOR.items() if key != "member"} | {"members": "all"}
-    table = {"sections": {"s": SOFT}, "nodes": {}, "members": {}, "loads": {}, "contacts": {"floor": contact or floor}}
+    table = {
+        "sections": {"s": {**SOFT}},
+        "nodes": {},
+        "members": {},
+        "loads": {},
+        "contacts": {"floor": contact or floor},
+    }
     for i in range(count + 1):
         table["nodes"][f"n{i}"] = {"position": [i, height], **({"joint": "hinge"} if 0 < i < count else {})}
     table["nodes"]["n0"]["support"] = "hinge"
@@ -518,7 +524,7 @@ def test_body_that_falls_past_its_obstacle_is_refused():
     """Nothing is below it but a small drum, which a force along x pushes it off: no rest, and a sentence."""
     drum = {"type": "circle", "center": [0.262, -0.3594], "radius": 0.05, "members": "all"}
     table = {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {"A": {"position": [0, 0]}, "B": {"position": [1.1226, 0.2653]}, "C": {"position": [1.9707, -0.1681]}},
         "members": {
             "m": {"nodes": ["A", "B"], "section": "s"},
@@ -671,7 +677,7 @@ def test_edge_far_from_a_member_has_no_gap():
 def test_ring_is_flattened_on_a_floor():
     """Half a ring between sleeves pressed down: along the flat part the moment takes the curvature away."""
     table = {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "T": {"position": [0, 2], "support": "slider", "direction": [0, 1]},
             "B": {"position": [0, 0], "support": "slider", "direction": [0, 1]},

@@ -55,7 +55,7 @@ def chain(seed, kind):
             loads[f"p{name}"] = {"type": "force", "member": name, "at": float(rng.uniform(0.2, 0.8)), "value": lift}
     floor = {"type": "plane", "point": [0, 0], "normal": [0, 1], "members": "all"}
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": nodes,
         "members": members,
         "loads": loads,

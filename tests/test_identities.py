@@ -492,7 +492,7 @@ def test_stiffness_acts_about_the_sections_axes():
     b3 = np.cross(direction, b2)
     for across, key in ((b2, "EI3"), (b3, "EI2")):
         table = cantilever()
-        table["sections"]["s"] = UNLIKE
+        table["sections"]["s"] = {**UNLIKE}
         table["nodes"]["A"]["position"] = [0.5, 0.5, 0.5]
         table["nodes"]["B"]["position"] = (direction + 0.5).tolist()
         table["members"]["m"]["b2"] = (b2 + 0.4 * direction).tolist()
@@ -506,7 +506,7 @@ def test_twist_and_bending_of_a_quarter_ring():
     radius, force = 1.3, 1e-6
     end = [radius, radius, 0.0]
     table = {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": end}},
         "members": {
             "m": {"nodes": ["A", "B"], "section": "s", "shape": arc_across([0, 0, 0], end, np.pi / 2, np.eye(3)[2])}

@@ -51,7 +51,7 @@ def structures(draw, space):
         loads["q"] = {"type": "distributed", "member": "m0", "value": value}
     table = {
         "dimension": "space" if space else "plane",
-        "sections": {"soft": SOFT, "unlike": UNLIKE},
+        "sections": {"soft": {**SOFT}, "unlike": {**UNLIKE}},
         "nodes": nodes,
         "members": members,
         "loads": loads,

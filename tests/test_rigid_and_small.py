@@ -84,7 +84,7 @@ def chain(links, space=False):
         nodes[f"n{i + 1}"] = {"position": [1 + 0.01 * (i + 1), 0.003 * (i % 2)], "joint": "hinge"}
         members[f"link{i}"] = {"nodes": [f"n{i}", f"n{i + 1}"], "type": "rigid", "section": "s"}
     del nodes[f"n{links}"]["joint"]
-    table = {"sections": {"s": SOFT}, "nodes": nodes, "members": members, "gravity": [0, -1.0]}
+    table = {"sections": {"s": {**SOFT}}, "nodes": nodes, "members": members, "gravity": [0, -1.0]}
     return table | ({"dimension": "space"} if space else {})
 
 
@@ -246,7 +246,7 @@ def test_moments_inside_a_rigid_member_against_statics():
 def test_moments_inside_rigid_members_of_a_frame():
     """A rigid T: each arm carries what acts beyond it, also where three arms share a rotation."""
     table = {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [0, 1]},
@@ -397,7 +397,7 @@ def test_small_turned_far_is_flexible_turned_far(kind, load):
 def test_stiff_body_turned_far_is_solved_to_its_rounding():
     """Axially 1e9 times as stiff as in bending, at the end of a flexible member that turns by a radian."""
     table = condensed(matrix_of_unlike(1e9).tolist())
-    table["sections"] = {"s": UNLIKE}
+    table["sections"] = {"s": {**UNLIKE}}
     table["nodes"]["root"] = {"position": [-1, 0.2, 0], "support": "clamped"}
     del table["nodes"]["A"]["support"]
     table["members"]["beam"] = {"nodes": ["root", "A"], "section": "s"}
@@ -664,7 +664,7 @@ def test_reactions_balance_whatever_the_stiffness_ratio(ratio, space):
     other = {key: ratio * value for key, value in (("EI2", 2.0), ("EI3", 1.0), ("GJ", 0.8))}
     table = {
         "dimension": "space" if space else "plane",
-        "sections": {"s": SOFT, "t": other},
+        "sections": {"s": {**SOFT}, "t": other},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [1, 0.3]},

@@ -10,7 +10,7 @@ import sfetcas
 from sfetcas import SceneError, SolveError, Status, solve
 
 BAR = {
-    "sections": {"s": SOFT},
+    "sections": {"s": {**SOFT}},
     "nodes": {
         "A": {"position": [0, 0], "support": "clamped"},
         "B": {"position": [1, 0]},

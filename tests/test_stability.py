@@ -197,7 +197,7 @@ def test_smallest_eigenvalue_does_not_depend_on_the_mesh():
 def test_what_the_leaving_finds_has_less_energy():
     """Shallow arch pushed beyond its limit point: the other side is the answer, and it is stable."""
     table = {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {"A": {"position": [0, 0], "support": "ball"}, "B": {"position": [1, 0], "support": "ball"}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": -0.8}}},
         "loads": {"down": {"type": "force", "member": "m", "at": 0.5, "value": [0.0, -60.0]}},
@@ -299,7 +299,7 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
                 members[f"b{i}{j}"] = {"nodes": [f"n{i - 1}{j}", f"n{i}{j}"], "section": "s",
                                        "shape": {"type": "arc", "angle": 0.5}}  # fmt: skip
     top = f"n0{levels - 1}"
-    table = {"sections": {"s": SOFT}, "nodes": nodes, "members": members, "dimension": ("plane", "space")[seed % 2],
+    table = {"sections": {"s": {**SOFT}}, "nodes": nodes, "members": members, "dimension": ("plane", "space")[seed % 2],
              "loads": {"f": {"type": "force", "node": top, "value": [float(rng.normal()), -5.0]}}}  # fmt: skip
     if seed % 3 == 0:
         table["springs"] = {"k": {"type": "translational", "node": top, "stiffness": 3.0},
@@ -357,7 +357,7 @@ def redundant():
     hinge = {"joint": "hinge"}
     return {
         "dimension": "space",
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [0, 1]} | hinge,

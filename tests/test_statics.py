@@ -23,7 +23,7 @@ def together(travel, *, space=False, **analysis):
     table["motions"] = {"shorten": {"node": "B", "displacement": [-travel, 0]}}
     if space:
         table["dimension"] = "space"
-        table["sections"]["s"] = UNLIKE
+        table["sections"]["s"] = {**UNLIKE}
     return table | {"analysis": analysis}
 
 
@@ -402,7 +402,7 @@ def two_bars(rise, *, length=1.0, force=1.0, turned=0.0, kinds=("rigid", "rigid"
     """Two bars between hinges, loaded across where they meet, the joint by ``rise`` off their line."""
     x, y = np.array([np.cos(turned), np.sin(turned)]), np.array([-np.sin(turned), np.cos(turned)])
     return {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "hinge"},
             "B": {"position": (x + rise * y).tolist(), "joint": "hinge"},
@@ -504,7 +504,7 @@ def test_without_flexible_members_nothing_is_assembled_twice(monkeypatch):
 def test_failing_step_is_named_and_the_steps_before_it_are_kept(tmp_path, capsys):
     """A guide that pulls the tip farther than the beam is long: the first two steps are solved."""
     table = {
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {
             "A": {"position": [0, 0], "support": "clamped"},
             "B": {"position": [0.5, 0.5], "support": "slider", "direction": [1, 0]},

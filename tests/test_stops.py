@@ -14,7 +14,7 @@ def lever(steps, *, dimension="plane", stop=STOP, **more):
     """A rod on a hinge with a spring that has stops, under a force across its tip."""
     return {
         "dimension": dimension,
-        "sections": {"s": SOFT},
+        "sections": {"s": {**SOFT}},
         "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
         "springs": {"k": {"node": "A", "stiffness": 2.0, "stop": list(stop)}},

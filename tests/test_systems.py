@@ -457,7 +457,7 @@ def test_universal_support_and_joint_keep_their_axes_normal():
 def test_universal_support_of_a_flexible_member():
     """Its moment is normal to the axis in the ground and to the one that the member carries; a ball holds the rest."""
     table = {
-        "sections": {"s": UNLIKE},
+        "sections": {"s": {**UNLIKE}},
         "nodes": {
             "A": {"position": [0, 0, 0], "support": "universal", "axis": [0, 0.2, 1], "axis2": [0, 1, -0.2]},
             "B": {"position": [1, 0.4, 0.3], "support": "ball"},

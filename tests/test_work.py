@@ -364,7 +364,7 @@ def test_order_of_convergence_under_a_moment_in_space(order):
 
 def test_following_moment_is_the_fixed_one_of_its_last_direction():
     table = wound((0.6, 0.8, -0.5))
-    table["sections"]["s"] = UNLIKE
+    table["sections"]["s"] = {**UNLIKE}
     table["loads"]["m"]["frame"] = "follower"
     one = solved(table)
     other = copy.deepcopy(table)
@@ -389,7 +389,7 @@ def test_moment_about_the_axis_of_a_held_hinge_has_a_potential():
     """The certificate says stable; across the axis a moment goes to the support."""
     axis = np.array([0.2, 1.0, 0.3]) / np.linalg.norm([0.2, 1.0, 0.3])
     table = wound((0, 0, 0))
-    table["sections"]["s"] = UNLIKE
+    table["sections"]["s"] = {**UNLIKE}
     table["nodes"]["B"] |= {"support": "hinge", "axis": axis.tolist()}
     table["members"]["m"]["shape"] = {"type": "arc", "angle": 1.0}
     table["loads"]["m"] = {"type": "moment", "node": "B", "value": (0.9 * axis).tolist()}
