@@ -81,9 +81,7 @@ def _report_motion(motion: Trajectory) -> None:
     if len(ends) > 1:
         _report_course(motion)
     worst = ", ".join(f"{kind} {value:.1e}" for kind, value in motion.violation.items())
-    error = motion.error_estimate
-    said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
-    print(f"  worst violation: {worst}; {said}")
+    print(f"  worst violation: {worst}; {_accuracy(motion.error_estimate)}")
     for note in motion.notes:
         print(f"  note: {note}")
 
@@ -227,11 +225,13 @@ def _report_step(step: Equilibrium, place: str) -> None:
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate
-    error = proof.error_estimate
-    said = "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
-    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {said}")
+    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {_accuracy(proof.error_estimate)}")
     for note in step.notes:
         print(f"  note: {note}")
+
+
+def _accuracy(error: float | None) -> str:
+    return "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
 
 
 def _kind(step: Equilibrium) -> str:

@@ -20,7 +20,7 @@ from ..equilibria import statics
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished
-from ..equilibria.solution import Equilibrium
+from ..equilibria.solution import Equilibrium, heading
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import SparseSolver, smallest
@@ -175,13 +175,8 @@ class Modes:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer."""
-        model = self.motion.model
         return {
-            "status": self.status.value,
-            "title": self.scene.title,
-            "dimension": model.dimension,
-            "unknowns": model.unknowns,
-            "seconds": dict(self.seconds),
+            **heading(self, self.motion.model),
             "steps": [self.last.to_dict()],
             "modes": {**self.values(), "shapes": [mode.to_dict() for mode in self.modes], "notes": list(self.notes)},
         }

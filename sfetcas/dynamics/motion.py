@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..description.records import plain
-from ..equilibria.solution import Posture
+from ..equilibria.solution import Posture, heading
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.balance import three
@@ -188,14 +188,8 @@ class Trajectory:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer: every leaf is a list over ``times``."""
-        model = self.last.model
         return {
-            "status": self.status.value,
-            **({"failure": self.failure} if self.failure else {}),
-            "title": self.scene.title,
-            "dimension": model.dimension,
-            "unknowns": model.unknowns,
-            "seconds": dict(self.seconds),
+            **heading(self, self.last.model, self.failure),
             "integrator": self.integrator,
             "count": self.count,
             "error_estimate": self.error_estimate,

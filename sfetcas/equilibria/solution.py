@@ -21,7 +21,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.stability import Stability
 
-__all__ = ["Certificate", "Equilibrium", "Posture", "Solution", "at_factor", "equilibrium"]
+__all__ = ["Certificate", "Equilibrium", "Posture", "Solution", "at_factor", "equilibrium", "heading"]
 
 MOST_PLACES = 400
 """Places listed along a member at most; with more elements only their ends, thinned out."""
@@ -244,16 +244,19 @@ class Solution:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer."""
-        model = self.last.model
-        return {
-            "status": self.status.value,
-            **({"failure": self.failure} if self.failure else {}),
-            "title": self.scene.title,
-            "dimension": model.dimension,
-            "unknowns": model.unknowns,
-            "seconds": dict(self.seconds),
-            "steps": [step.to_dict() for step in self.steps],
-        }
+        return {**heading(self, self.last.model, self.failure), "steps": [step.to_dict() for step in self.steps]}
+
+
+def heading(answer: Any, model: Model, failure: str = "") -> dict[str, Any]:
+    """What every JSON answer begins with: how it ended, of which scene it is, its size and what it cost."""
+    return {
+        "status": answer.status.value,
+        **({"failure": failure} if failure else {}),
+        "title": answer.scene.title,
+        "dimension": model.dimension,
+        "unknowns": model.unknowns,
+        "seconds": dict(answer.seconds),
+    }
 
 
 def at_factor(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibria.solution import Equilibrium, Posture
+from ..equilibria.solution import Equilibrium, Posture, heading
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
@@ -214,15 +214,7 @@ class Path:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer."""
-        model = self.model
-        answer: dict[str, Any] = {
-            "status": self.status.value,
-            "title": self.scene.title,
-            "dimension": model.dimension,
-            "unknowns": model.unknowns,
-            "seconds": dict(self.seconds),
-            "path": self._arrays(self.main),
-        }
+        answer: dict[str, Any] = {**heading(self, self.model), "path": self._arrays(self.main)}
         for kind in ("steps", "limit_points", "bifurcations", "flutter_points"):
             entries = [
                 {**entry.to_dict(), "branch": i}
