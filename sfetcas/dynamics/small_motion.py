@@ -49,6 +49,36 @@ NEARER = 0.5
 FARTHER = 1e-5
 """The same of the highest that is wanted: at a critical point the lowest vanishes and would drown all others."""
 
+ATTEMPTS = 6
+"""Spaces at most: one to find the size of what is looked for, one with rigid motions beside it, one at the end."""
+
+VANISHING = 1e-13
+"""Inverses below this share of the largest are those of motions without mass."""
+
+SLOW = 1e-9
+"""Imaginary parts below this share of a square of a frequency are rounding."""
+
+WAVES = 1e-3
+"""Share of an exponent that its imaginary part has to be: exponents crowd where damping stops all waves."""
+
+NOTHING = 1e-4
+"""Exponents below this may be zeros, of which two that fall together are known to the root of rounding."""
+
+HELD = 1e-4
+"""Share of a shape by which it may miss the rows: they are a little soft in the factors."""
+
+OWN = 1e-5
+"""Share of the terms of its equation that an exponent may miss: of those that are converged it is rounding."""
+
+MOST_FREE = 40
+"""Zero exponents that are looked for at most."""
+
+SAME = 1e-6
+"""Shapes of zero exponents that differ by a smaller share, squared, are the same motion."""
+
+TINY = 1e-300
+"""Keeps zero by zero from being asked for."""
+
 
 @dataclass(frozen=True, eq=False)
 class Eigenmotions:
@@ -362,37 +392,6 @@ class SmallMotion:
             total, row, column, equations.rows, symmetric=self.symmetric and self.model.spinning is None
         )
         return (solver, np.flatnonzero(row == column)), found[0], found[1], found[2] + found[3]
-
-
-ATTEMPTS = 6
-"""Spaces at most: one to find the size of what is looked for, one with rigid motions beside it, one at the end."""
-
-VANISHING = 1e-13
-"""Inverses below this share of the largest are those of motions without mass."""
-
-SLOW = 1e-9
-"""Imaginary parts below this share of a square of a frequency are rounding."""
-
-WAVES = 1e-3
-"""Share of an exponent that its imaginary part has to be: exponents crowd where damping stops all waves."""
-
-NOTHING = 1e-4
-"""Exponents below this may be zeros, of which two that fall together are known to the root of rounding."""
-
-HELD = 1e-4
-"""Share of a shape by which it may miss the rows: they are a little soft in the factors."""
-
-OWN = 1e-5
-"""Share of the terms of its equation that an exponent may miss: of those that are converged it is rounding."""
-
-MOST_FREE = 40
-"""Zero exponents that are looked for at most."""
-
-SAME = 1e-6
-"""Shapes of zero exponents that differ by a smaller share, squared, are the same motion."""
-
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
 
 
 def _sorted(squares: Array, shapes: Array, rigid: Array, count: int, *, real: bool) -> Eigenmotions:
