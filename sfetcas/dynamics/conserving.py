@@ -95,15 +95,15 @@ class _Middle:
         self, system: StageEquations, begin: Begin, h: ca.MX, factors: ca.MX, q: ca.MX, y: ca.MX, lam: ca.MX
     ) -> None:
         model, n = system.model, len(system.model.positions.rows)
-        middle, end = ca.horzsplit(factors)
-        places, before = system.displacements(y, end), begin.x[: system.axes * system.places]
-        moved = system.quantities(q, places, begin.near) - begin.x
+        middle, end = (system.given(part) for part in ca.horzsplit(factors))
+        places, before = system.displacements(q, y, end), begin.x[: system.axes * system.places]
+        moved = system.quantities(q, places, end, begin.near) - begin.x
         forces = system.forces(moved / h, 2.0 * (moved / h - begin.rates) / h)
         c, b = 1.0 / h, 2.0 / h**2
         linear = forces[: system.linear]
-        on_places = times(system.by_place.T, linear) - times(system.force, middle)
-        turning = -times(system.moment, middle)
-        if not model.space and system.moment.nnz():
+        on_places = times(system.by_place.T, linear) - middle.force
+        turning = -middle.moment
+        if not model.space and system.acts("moment"):
             # Moments in the plane have a potential, that of the angle.  What their factor changes of the matrix is as
             # small as the angle of a step: it is left out.
             turning *= ca.vec(system.many(_share(), system.layout.rotations)(begin.q, q))
@@ -111,12 +111,12 @@ class _Middle:
         entries, full, coupled = [], [], []
         if system.elements:
             turns = model.rotations.turns.ravel().tolist()
-            pull = times(system.pull, middle) + times(system.closing.T, lam[:n, :])
+            pull = middle.pull + times(system.closing.T, lam[:n, :])
             pull += times(system.by_tangent.T, linear)
             pull = ca.reshape(pull, system.axes, system.elements * system.points)
             function = system.many(_element(model.element), system.elements)
-            moments, stiffness, mean, spin = function(begin.q[:, turns], q[:, turns], *system.given, pull)
-            gaps += times(system.closing, ca.vec(system.tangents(q)) - ca.DM(system.rest))
+            moments, stiffness, mean, spin = function(begin.q[:, turns], q[:, turns], end.stiffness, end.tangent, pull)
+            gaps += times(system.closing, ca.vec(system.tangents(q, end)) - ca.vec(end.tangent))
             turning += times(system.onto_rotations, ca.vec(moments))
             signs, picked = ca.DM(system.closed.value), system.closed.entry.tolist()
             entries += [ca.vec(stiffness), ca.vec(spin)[picked] * signs, ca.vec(mean)[picked] * signs]
@@ -127,10 +127,10 @@ class _Middle:
             count, width = len(group.data), group.kind.sizes[2]
             first = n + sum(len(g.rows) for g in model.connections[:number])
             own = ca.reshape(lam[first : first + count * width], width, count)
-            given = system.sides(group, begin.q, before, begin.near), system.sides(group, q, places, begin.near)
-            loads = [ca.reshape(times(system.loads[number], f), group.kind.sizes[4], count) for f in (middle, end)]
-            function = system.many(_between(group.kind), count)
-            gradient, stiffness, values, mean, spin = function(*given[0][:2], *given[1], *loads, own)
+            sides_of = *system.sides(group, begin.q, before), *system.sides(group, q, places)
+            loads = [system.link_load(number, given) for given in (middle, end)]
+            function, data = system.many(_between(group.kind), count), system.data(number, end, begin.near)
+            gradient, stiffness, values, mean, spin = function(*sides_of, data, *loads, own)
             full.append((sides, gradient))
             entries.append(ca.vec(stiffness))
             if width:
@@ -143,10 +143,10 @@ class _Middle:
         for seen, sides, (first, last) in zip(system.masses.observables, system.observed, system.ranges, strict=True):
             count, width = len(seen.data), seen.kind.sizes[2]
             own = ca.reshape(forces[first:last], width, count)
-            given = system.sides(seen, begin.q, before, begin.near), system.sides(seen, q, places, begin.near)
-            nothing = ca.MX(0, count)
+            sides_of = *system.sides(seen, begin.q, before), *system.sides(seen, q, places)
+            nothing, data = ca.MX(0, count), system.seen_data(seen, begin.near)
             function = system.many(_between(seen.kind), count)
-            gradient, stiffness, _, mean, spin = function(*given[0][:2], *given[1], nothing, nothing, own)
+            gradient, stiffness, _, mean, spin = function(*sides_of, data, nothing, nothing, own)
             full.append((sides, gradient))
             entries.append(ca.vec(stiffness))
             weight = b * ca.DM(seen.mass.T) + c * ca.DM(seen.damping.T)

@@ -62,7 +62,7 @@ class IndexOne:
         columns = np.full(n.rotations, len(self.turning))
         columns[self.turning] = np.arange(len(self.turning))
         q = ca.horzcat(ca.reshape(q, n.components, len(self.turning)), still)[:, columns.tolist()]
-        return self.system.held(q, factors)
+        return self.system.held(q, self.system.given(factors))
 
     @functools.cached_property
     def _seen(self) -> ca.Function:
@@ -72,10 +72,8 @@ class IndexOne:
         at, rate, second = (ca.MX.sym(name, size) for name in ("at", "rate", "second"))
         near = ca.MX.sym("near", n.near)
         q, y, factors = ca.vertsplit(at, np.cumsum([0, self.q_size, n.y, n.factors]).tolist())
-        q = self._full(q, factors)
-        seen = ca.vertcat(
-            system.quantities(q, system.displacements(y, factors), near), system.gaps(q, y, factors, near)
-        )
+        q, given = self._full(q, factors), system.given(factors)
+        seen = ca.vertcat(system.moving(q, y, given, near), system.gaps(q, y, given, near))
         first = ca.jtimes(seen, at, rate)
         bend = ca.jtimes(first, ca.vertcat(at, rate), ca.vertcat(rate, second))
         return ca.Function("seen", [at, rate, second, near], [seen, first, bend])

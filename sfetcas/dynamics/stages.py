@@ -21,12 +21,13 @@ import functools
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
+from ..mechanics.entries import Entries, Pattern
+from ..mechanics.expressions import Given, moved_by
 from ..mechanics.joints import by_turning
-from .entries import Entries, Pattern
-from .system import System, moved_by
+from ..mechanics.stationarity import Forces, Stationarity, StationarityPlaces, summed
+from .system import System
 
 __all__ = ["StageEquations"]
 
@@ -48,14 +49,11 @@ class StageEquations(System):
         c, b = ca.MX.sym("C", stages, stages), ca.MX.sym("B", stages, stages)
         factors, near = ca.MX.sym("factors", n.factors, stages), ca.MX.sym("near", n.near)
         parts = ca.horzsplit(q, n.rotations)
-        places = [self.displacements(y[:, i], factors[:, i]) for i in range(stages)]
-        x = ca.horzcat(*[self.quantities(parts[i], places[i], near) - x0 for i in range(stages)])
+        given = [self.given(factors[:, i]) for i in range(stages)]
+        x = ca.horzcat(*[self.moving(parts[i], y[:, i], given[i], near) - x0 for i in range(stages)])
         rates, accelerations = ca.mtimes(x, c.T) + v, ca.mtimes(x, b.T) + a
         forces = self.forces(rates, accelerations)
-        found = [
-            _Stage(self, parts[i], y[:, i], lam[:, i], places[i], forces[:, i], factors[:, i], near)
-            for i in range(stages)
-        ]
+        found = [_Stage(self, parts[i], y[:, i], lam[:, i], forces[:, i], given[i], near) for i in range(stages)]
         entries = [stage.entries for stage in found]
         for i, one in enumerate(found):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
@@ -96,44 +94,23 @@ class StageEquations(System):
 
     def stage(self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, factors: ca.MX, near: ca.MX) -> _Stage:
         """Residual and entries at given inertia and damping forces."""
-        return _Stage(self, q, y, lam, self.displacements(y, factors), forces, factors, near)
+        return _Stage(self, q, y, lam, forces, self.given(factors), near)
 
     def static_matrix(self, stage: _Stage) -> ca.MX:
         """Derivative of a stage's residual by its unknowns at given inertia and damping forces, (total, total)."""
-        return self._summed(self._static, stage.entries)
+        return summed(self.total, self._probe.tied, stage.entries)
 
     def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
         """Its derivative by rates (c) and accelerations (b) of the unknowns, (total, total)."""
-        return self._summed(self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
-
-    def _summed(self, places: tuple[Index, Index, Array, Index], entries: ca.MX) -> ca.MX:
-        row, column, weight, entry = places
-        cells, inverse = np.unique(column * self.total + row, return_inverse=True)
-        sums = sparse(inverse.ravel(), entry, weight, (len(cells), entries.shape[0]))
-        return ca.MX(pattern(self.total, cells % self.total, cells // self.total), ca.mtimes(sums, entries))
+        return summed(self.total, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
 
     @functools.cached_property
     def _probe(self) -> Places:
         return Places(self)
 
-    @functools.cached_property
-    def _static(self) -> tuple[Index, Index, Array, Index]:
-        """Places of the entries of a stage with those of the ties between displacements and rows."""
-        probe, w = self._probe, self.model.positions.W
-        row, column, value, entry = probe.static.places
-        ties = len(w.value)
-        r, c = self.equations.unknowns + w.row, self.equations.turning_unknowns + w.column
-        return (
-            np.concatenate([row, r, c]),
-            np.concatenate([column, c, r]),
-            np.concatenate([value, np.tile(w.value, 2)]),
-            # The entries of the ties between displacements and rows are one number, 1, after those of the stage.
-            np.concatenate([entry, np.full(2 * ties, probe.static.count)]),
-        )
-
     def _system(self, stages: int) -> Pattern:
         """Pattern of the matrix of all stages, unknown by unknown, each with its stages."""
-        probe, static = self._probe, self._static
+        probe, static = self._probe, self._probe.tied
         one, coupled = probe.static.count, probe.coupled.places
         rows, columns = (np.concatenate([static[k], coupled[k], np.arange(self.total)]) for k in (0, 1))
         both = np.unique(np.concatenate([columns * self.total + rows, rows * self.total + columns]))
@@ -161,26 +138,16 @@ SOFT = 1e-10
 """Softness of closings in the matrix over the inverse of what resists them, the whole mass being one."""
 
 
-class Places:
+class Places(StationarityPlaces):
     """Where the entries of a stage and of a pair of stages go, in the order in which :class:`_Stage` gives them."""
 
     def __init__(self, system: StageEquations) -> None:
-        self.static = Entries(system.unknown, system.weight)
+        super().__init__(system)
         self.coupled = Entries(system.unknown, system.weight)
         static, coupled, cells = self.static, self.coupled, system.cells
-        static.add(cells[:, None, :], cells[:, :, None])
-        static.add(system.closed.row, system.closed.cell)
-        static.add(system.closed.cell, system.closed.row)
-        for group, sides, labels in zip(system.model.connections, system.linked, system.link_rows, strict=True):
-            static.add(sides[:, None, :], sides[:, :, None])
-            if group.rows:
-                static.add(labels[:, None, :], sides[:, :, None])
-                static.add(sides[:, :, None], labels[:, None, :])
         for sides in system.observed:
             static.add(sides[:, None, :], sides[:, :, None])
             coupled.add(sides[:, None, :], sides[:, :, None])
-        for rows, columns in system.follower_cells():
-            static.add(rows, columns)
         inside = system.massive
         own, at = cells[inside], system.place_cells(system.start[inside])
         coupled.add(own[:, None, :], own[:, :, None])
@@ -205,69 +172,27 @@ class _Stage:
     """Residual and entries of one stage at given inertia and damping forces."""
 
     def __init__(
-        self,
-        system: StageEquations,
-        q: ca.MX,
-        y: ca.MX,
-        lam: ca.MX,
-        places: ca.MX,
-        forces: ca.MX,
-        factors: ca.MX,
-        near: ca.MX,
+        self, system: StageEquations, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, given: Given, near: ca.MX
     ) -> None:
-        self._system, model = system, system.model
-        closings = len(model.positions.rows)
-        full, entries = [], []
+        self._system = system
         # What acts along the elements: loads, internal forces, inertia.
         linear = forces[: system.linear]
-        on_places = times(system.by_place.T, linear) - times(system.force, factors)
-        gaps = system.open_gaps(y, factors)
-        turning = -times(system.moment, factors)
-        if system.elements:
-            pull = times(system.pull, factors) + times(system.closing.T, lam[:closings, :])
-            pull += times(system.by_tangent.T, linear) + system.carried(q, factors)
-            found = system.many(model.element.turning, system.elements)(
-                q[:, model.rotations.turns.ravel().tolist()],
-                system.given[0],
-                system.given[1],
-                ca.reshape(pull, system.axes, system.elements * system.points),
-            )
-            moments, stiffness, spin = found[2], found[3], found[5]
-            gaps += times(system.closing, ca.vec(system.tangents(q)) - ca.DM(system.rest))
-            turning += times(system.onto_rotations, ca.vec(moments))
-            closed = ca.vec(spin)[system.closed.entry.tolist()] * ca.DM(system.closed.value)
-            entries += [ca.vec(stiffness), closed, closed]
-            self._spin = spin[:, system.massive_columns]
-        else:
-            self._spin = ca.MX(system.axes, 0)
-        rows = [gaps]
-        for number, (group, sides) in enumerate(zip(model.connections, system.linked, strict=True)):
-            n, count = len(group.data), group.kind.sizes[2]
-            first = closings + sum(len(g.rows) for g in model.connections[:number])
-            own = ca.reshape(lam[first : first + n * count], count, n)
-            load = ca.reshape(times(system.loads[number], factors), group.kind.sizes[4], n)
-            found = system.many(by_turning(group.kind), n)(*system.sides(group, q, places, near), load, own)
-            full.append((sides, found[3]))
-            entries.append(ca.vec(found[4]))
-            if count:
-                rows.append(ca.vec(found[2]))
-                entries += [ca.vec(found[5]), ca.vec(found[5])]
+        further = Forces(times(system.by_place.T, linear), times(system.by_tangent.T, linear))
+        places = system.displacements(q, y, given)
+        static = Stationarity(system, q, y, lam, places, given, near, further)
+        entries, shares = static.entries, []
+        self._spin = static.spin[:, system.massive_columns]
         self._spins = []
-        for observed, sides, (begin, end) in zip(
-            system.masses.observables, system.observed, system.ranges, strict=True
-        ):
+        observables = zip(system.masses.observables, system.observed, system.ranges, strict=True)
+        for observed, sides, (begin, end) in observables:
             n, count = len(observed.data), observed.kind.sizes[2]
             own = ca.reshape(forces[begin:end], count, n)
-            found = system.many(by_turning(observed.kind), n)(
-                *system.sides(observed, q, places, near), ca.MX(0, n), own
-            )
-            full.append((sides, found[3]))
+            data = *system.sides(observed, q, places), system.seen_data(observed, near)
+            found = system.many(by_turning(observed.kind), n)(*data, ca.MX(0, n), own)
+            shares.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
             self._spins.append(found[5])
-        pushed, turned_by, followed = system.followed(q, factors)
-        entries += followed
-        turning, on_places = turning + turned_by, on_places + pushed
-        self.residual = system.gathered(turning, on_places, full, lam[:closings, :], rows)
+        self.residual = static.gathered(shares)
         self.entries = ca.vertcat(*entries, ca.MX(1))
 
     def coupled(self, other: _Stage, c: ca.MX, b: ca.MX) -> ca.MX:

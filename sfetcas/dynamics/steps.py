@@ -10,9 +10,9 @@ import functools
 import casadi as ca
 import numpy as np
 
+from ..mechanics.expressions import moved_by
 from .methods import Begin, Method
 from .stages import StageEquations
-from .system import moved_by
 
 __all__ = ["CONVERGED", "ITERATIONS", "step_function"]
 
@@ -44,14 +44,14 @@ def step_function(system: StageEquations, method: Method, linear: str = "qr") ->
     # Turns and shifts so far go on along the polynomials of the last step.
     spins = ca.horzsplit(turns, n.rotations)
     first = [sum((onward[i, j] * spins[j] for j in range(1, s)), onward[i, 0] * spins[0]) for i in range(s)]
-    begin = [system.held(moved_by(system, q, first[i]), factors[:, i]) for i in range(s)]
+    given = [system.given(factors[:, i]) for i in range(s)]
+    begin = [system.held(moved_by(system, q, first[i]), given[i]) for i in range(s)]
     guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
     constants = method.constants(Begin(q, y, x, rates, near), h, loads)
     newton = _newton(method.iteration(system, linear), polished=method.polished)
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
-    places = [system.displacements(moved[:, i], factors[:, i]) for i in range(s)]
-    there = ca.horzcat(*[system.quantities(parts[i], places[i], near) for i in range(s)])
+    there = ca.horzcat(*[system.moving(parts[i], moved[:, i], given[i], near) for i in range(s)])
     results = [
         parts[-1],
         moved[:, -1],
@@ -62,7 +62,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "qr") ->
         method.after(h, rates, there - ca.repmat(x, 1, s)),
         size,
         count,
-        ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], factors[:, -1], near))),
+        ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], given[-1], near))),
     ]
     names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "near"]
     arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, loads, near]

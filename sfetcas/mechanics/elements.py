@@ -188,6 +188,14 @@ class Element(Components):
         return self._function("reach_jacobian", [q, tangent], {"reach": reach, "jacobian": jacobian})
 
     @functools.cached_property
+    def turned(self) -> ca.Function:
+        """(q, tangent) -> turned tangents of the points, (axes, p + 1)."""
+        q, _, tangent, _ = self._symbols()
+        here = self._at_points(q)[0]
+        found = [self._tangent(here[:, k], tangent[:, k]) for k in range(self.order + 1)]
+        return self._function("turned", [q, tangent], {"turned": ca.densify(ca.horzcat(*found))})
+
+    @functools.cached_property
     def turning(self) -> ca.Function:
         """(q, stiffness, tangent, pull) -> strain energy, work, moments, turning stiffness, reach and its spin.
 

@@ -11,8 +11,8 @@ from typing import TypeVar
 import casadi as ca
 
 from ..mathematics.quaternion import product, turned
-from ..mechanics.elements import Element
-from ..mechanics.joints import Connection, name_of
+from .elements import Element
+from .joints import Connection, name_of
 
 __all__ = [
     "arms_product",
