@@ -10,7 +10,7 @@ The flow, in the order of the names below:
 
 Underneath: :func:`assemble` makes the :class:`Model` of a scene on a :class:`Mesh`; :class:`Prepared` keeps its
 solvers for repeated solves by :func:`solve_model`; :func:`equilibrium_nlp` opens the problem as a CasADi program
-that takes further terms, rows and bounds.
+that takes further terms, rows and bounds; :func:`export` writes a solver of its own as C.
 
 Source: Barraco and Munteanu, A special finite element for static and dynamic study of mechanical systems under
 large motion, Part 1.
@@ -18,6 +18,8 @@ large motion, Part 1.
 
 from .analyses import solve
 from .checks import check
+from .codegen.equilibrium import EquilibriumSolver
+from .codegen.folder import export
 from .description.contacts import Contact
 from .description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene, Until
 from .description.scenefile import dump, load
@@ -49,6 +51,7 @@ __all__ = [
     "CrossSection",
     "Curvature",
     "Equilibrium",
+    "EquilibriumSolver",
     "Expect",
     "Helix",
     "History",
@@ -85,6 +88,7 @@ __all__ = [
     "check",
     "dump",
     "equilibrium_nlp",
+    "export",
     "first_mesh",
     "load",
     "solve",

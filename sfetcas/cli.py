@@ -1,10 +1,11 @@
-"""The command line: run, check, info."""
+"""The command line: run, check, info, export."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
 import os
+import re
 import sys
 import time
 import traceback
@@ -16,6 +17,7 @@ import numpy as np
 
 from .analyses import solve
 from .checks import Answer, Check, check
+from .codegen.folder import export
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load
@@ -92,6 +94,24 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("file", type=Path)
     _add_overrides(info)
     info.set_defaults(command=_info)
+    code = commands.add_parser("export", help="write an equilibrium solver of the scene as C without dependencies")
+    code.add_argument("file", type=Path)
+    code.add_argument("folder", type=Path, metavar="DIR", help="a new folder")
+    code.add_argument("--name", help="of the files and of all names in C; that of the scene file without one")
+    code.add_argument(
+        "--argument",
+        action="append",
+        metavar="NAME[=LOW:HIGH]",
+        help="a number of the scene, as loads.tip.value; without any the factor, all loads and all motions",
+    )
+    code.add_argument("--result", action="append", metavar="NAME", help="as nodes.tip.position or stiffness.tip")
+    code.add_argument(
+        "--places", action="append", metavar="MEMBER=X,X,...", help="fractions of a member where it is told of"
+    )
+    code.add_argument("--sensitivities", action="store_true", help="derivatives of results by arguments, too")
+    code.add_argument("--overwrite", action="store_true", help="replace an earlier export")
+    _add_overrides(code)
+    code.set_defaults(command=_export)
     return parser
 
 
@@ -101,6 +121,7 @@ def _add_overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--elements", type=int, metavar="N", help="number of elements of each member")
     parser.add_argument("--integration", choices=("nodes", "gauss"), default="nodes", help="quadrature in elements")
     parser.add_argument("--assembly", choices=("auto", "closing", "nodal"), default="auto")
+    parser.add_argument("--solver", choices=("ipopt", "newton"), default="ipopt", help="what finds an equilibrium")
 
 
 def _settings(options: argparse.Namespace) -> Settings:
@@ -110,6 +131,7 @@ def _settings(options: argparse.Namespace) -> Settings:
         elements=options.elements,
         gauss=options.integration == "gauss",
         assembly=options.assembly,
+        solver=options.solver,
     )
 
 
@@ -217,3 +239,52 @@ def _info(options: argparse.Namespace) -> int:
     print(f"  {Prepared(model).diagnosis.sentence}{driven}")
     print(f"  units: length {model.scales.length:.6g} m, force {model.scales.force:.6g} N")
     return SOLVED
+
+
+def _export(options: argparse.Namespace) -> int:
+    scene, name = load(options.file), options.name or re.sub(r"\W", "_", options.file.stem, flags=re.ASCII)
+    spans = dict(_span(text) for text in options.argument) if options.argument else None
+    places = dict(_place(text) for text in options.places or ())
+    solver = _named(
+        options.file,
+        lambda: export(
+            scene,
+            options.folder,
+            name=name,
+            arguments=spans,
+            results=options.result,
+            places=places,
+            sensitivities=options.sensitivities,
+            settings=_settings(options),
+            overwrite=options.overwrite,
+        ),
+    )
+    print(f"{options.folder}: {name}.c, {name}.h and what belongs to them; `make check` there builds and compares")
+    print(f"  {flexible(solver.model)}, {counted(solver.arguments.expressions.total, 'unknown')}")
+    for one in solver.arguments.arguments:
+        print(f"  argument {one.name} [{one.unit}]: {', '.join(f'{x:.6g}' for x in one.default)}")
+    print(f"  {counted(solver.results.size, 'number')} in {counted(len(solver.results.results), 'result')}")
+    return SOLVED
+
+
+def _span(text: str) -> tuple[str, tuple[float, float] | None]:
+    """An argument with the range that it may have."""
+    name, equals, span = text.partition("=")
+    if not equals:
+        return name, None
+    low, colon, high = span.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return name, (float(low), float(high))
+    except ValueError:
+        raise SceneError(f"--argument: found {text!r}, accepted: NAME or NAME=LOW:HIGH") from None
+
+
+def _place(text: str) -> tuple[str, tuple[float, ...]]:
+    """Fractions of a member."""
+    name, _, numbers = text.partition("=")
+    try:
+        return name, tuple(float(x) for x in numbers.split(","))
+    except ValueError:
+        raise SceneError(f"--places: found {text!r}, accepted: MEMBER=0,0.5,1") from None

@@ -14,6 +14,7 @@ from typing import Any
 
 from .description.scene import Scene
 from .errors import SceneError
+from .files import write_file, write_folder
 
 __all__ = ["Output", "outputs_of"]
 
@@ -48,9 +49,9 @@ class Output:
             It could not be written; what was there before is left.
         """
         if self.folder:
-            _write_folder(self.path, lambda path: self.writer(answer, path))
+            write_folder(self.path, lambda path: self.writer(answer, path))
         else:
-            _write(self.path, lambda path: self.writer(answer, path))
+            write_file(self.path, lambda path: self.writer(answer, path))
 
 
 def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
@@ -151,22 +152,6 @@ def _check_writable(path: Path) -> None:
         raise SceneError(f"{path}: cannot be written; accepted: {accepted}")
 
 
-def _write(path: Path, writer: Callable[[Path], Any]) -> None:
-    """Write beside the final name first, so that nothing half-written is ever seen."""
-    name = ""
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-        os.close(handle)
-        writer(Path(name))
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
-    except (OSError, ValueError, ArithmeticError) as error:
-        raise SceneError(f"{path}: could not be written: {error}") from None
-    finally:
-        if name:
-            Path(name).unlink(missing_ok=True)
-
-
 OURS = re.compile(r"answers\.pvd|answer_\d+\.vtu")
 """Files of an earlier run in a folder, which a later one replaces."""
 
@@ -181,21 +166,3 @@ def _check_folder(path: Path) -> None:
     if not ours:
         accepted = "a new folder, or one that is empty or has nothing but files of an earlier run"
         raise SceneError(f"{path}: cannot be written; accepted: {accepted}")
-
-
-def _write_folder(path: Path, writer: Callable[[Path], Any]) -> None:
-    """The same for a folder of files, which takes the place of one that is there."""
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent) as place:
-            writer(Path(place) / "new")
-            if path.exists():
-                os.replace(path, Path(place) / "old")
-            os.replace(Path(place) / "new", path)
-    except (OSError, ValueError, ArithmeticError) as error:
-        raise SceneError(f"{path}: could not be written: {error}") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -122,9 +122,9 @@ class Piloting(Meshing):
         return found
 
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
-        """IPOPT from the start guess."""
+        """From the start guess at the full load."""
         try:
-            corrected, iterations = cold(pilot, loading)
+            corrected, iterations = cold(pilot, loading, self.settings.solver)
         except SolveError as error:
             return None, error
         return Found(pilot, corrected, pilot.stability(corrected), iterations=iterations), None

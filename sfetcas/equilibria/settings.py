@@ -8,6 +8,7 @@ from typing import Literal
 from ..description.task import checked_accuracy
 from ..errors import SceneError
 from ..mechanics.elements import ELEMENTS
+from .single import SolverName
 
 __all__ = ["Settings"]
 
@@ -28,6 +29,8 @@ class Settings:
         ``auto``, ``closing`` or ``nodal``.
     branch : bool
         Check the branch by following the loads from zero.
+    solver : str
+        ``ipopt``, or ``newton``: Newton's method from afar, which is faster, and IPOPT where that finds nothing.
     runs : int or None
         Newton runs at most in a search for several equilibria, for each factor; None takes what suits the size.
     """
@@ -38,6 +41,7 @@ class Settings:
     gauss: bool = False
     assembly: Literal["auto", "closing", "nodal"] = "auto"
     branch: bool = True
+    solver: SolverName = "ipopt"
     runs: int | None = None
 
     def __post_init__(self) -> None:
@@ -52,5 +56,7 @@ class Settings:
             raise SceneError(f"elements: found {self.elements}, accepted: 1 to 1000000")
         if self.runs is not None and not 0 <= self.runs <= 1_000_000:
             raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
+        if self.solver not in ("ipopt", "newton"):
+            raise SceneError(f"solver: found {self.solver!r}, accepted: ipopt, newton")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")

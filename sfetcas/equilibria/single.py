@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,12 +16,17 @@ from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
 from .solution import Equilibrium, equilibrium
 
-__all__ = ["cold", "finished", "solve_model"]
+__all__ = ["SolverName", "cold", "finished", "solve_model"]
+
+SolverName = Literal["ipopt", "newton"]
+"""What finds an equilibrium that none near is known of."""
 
 
 @single_threaded
-def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = None) -> Equilibrium:
-    """One equilibrium of a prepared model: IPOPT from the start guess, or Newton's method from a near answer.
+def solve_model(
+    model: Any, factor: float = 1.0, *, start: Equilibrium | None = None, solver: SolverName = "ipopt"
+) -> Equilibrium:
+    """One equilibrium of a prepared model: from the start guess, or by Newton's method from a near answer.
 
     Parameters
     ----------
@@ -31,6 +36,8 @@ def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = 
         Factor of loads and motions.
     start : Equilibrium, optional
         Answer of the same model for a near factor.
+    solver : str
+        From the start guess: ``ipopt``, or ``newton`` and IPOPT where that finds nothing.
 
     Raises
     ------
@@ -44,7 +51,7 @@ def solve_model(model: Any, factor: float = 1.0, *, start: Equilibrium | None = 
     loading = prepared.model.loading(factor)
     found, iterations = _warm(prepared, start, loading) if start is not None else None, 0
     if found is None:
-        found, iterations = cold(prepared, loading)
+        found, iterations = cold(prepared, loading, solver)
     return finished(prepared, found, loading, factor, prepared.stability(found), iterations=iterations)
 
 
@@ -53,14 +60,18 @@ def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected
     return found if found.converged else None
 
 
-def cold(prepared: Prepared, loading: Loading) -> tuple[Corrected, int]:
-    """The equilibrium from the start guess and IPOPT's iterations; what cannot be minimised is followed from zero.
+def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> tuple[Corrected, int]:
+    """The equilibrium from the start guess and the iterations; what cannot be minimised is followed from zero.
 
     Raises
     ------
     SolveError
         None was found.
     """
+    if solver == "newton":
+        found, iterations = prepared.globalised(loading)
+        if found is not None:
+            return found, iterations
     if not prepared.model.minimisable:
         start = prepared.equations.start(prepared.model.loading(0.0, 0.0))
         followed = follow(prepared, loading.scaled, start, leave=False)

@@ -102,6 +102,21 @@ class Element(Components):
         here = ca.mtimes(q, ca.DM(interpolation.evaluation(self.nodes, self.points).T)) if self.gauss else q
         return here, slope
 
+    def _curvature(self, here: ca.SX, slope: ca.SX) -> ca.SX:
+        """Change of the curvature times length at one point, about the fixed axes of the undeformed scene."""
+        if not self.space:
+            return slope[0]
+        q = ca.vertsplit(here)
+        k = 2.0 * ca.vertcat(*product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(slope))[1:])
+        return k / ca.dot(here, here) if self.gauss else k
+
+    def _section(self, stiffness: ca.SX) -> ca.SX:
+        """Stiffness of one point as a matrix."""
+        if not self.space:
+            return stiffness[0]
+        c = ca.vertsplit(stiffness)
+        return ca.vertcat(ca.horzcat(c[0], c[1], c[2]), ca.horzcat(c[1], c[3], c[4]), ca.horzcat(c[2], c[4], c[5]))
+
     def _strain_energy(self, here: ca.SX, slope: ca.SX, stiffness: ca.SX) -> ca.SX:
         """1/2 c k.k of one point, c the stiffness times weight over length, k the curvature times length."""
         if not self.space:
@@ -221,6 +236,30 @@ class Element(Components):
             "reach_spin": ca.densify(ca.mtimes(ca.jacobian(reach, q), spin)),
         }
         return self._function("turning", [q, *data], results)
+
+    @functools.cached_property
+    def convex(self) -> ca.Function:
+        """(q, stiffness, tangent, pull) -> a positive matrix in place of the turning stiffness of :attr:`turning`.
+
+        Of the strain energy the share of the first derivatives of the curvature (Gauss and Newton), exact in the plane;
+        of the pull what it resists where it is tension, and as much where it is compression, about both normals.
+        """
+        q, stiffness, tangent, pull = self._symbols()
+        here, slope = self._at_points(q)
+        spin = self._spin(q)
+        shape = interpolation.evaluation(self.nodes, self.points)
+        total = ca.SX(self.turns * (self.order + 1), self.turns * (self.order + 1))
+        for k in range(self.order + 1):
+            strain = self._curvature(here[:, k], slope[:, k])
+            by_turns = ca.mtimes(ca.jacobian(strain, q), spin)
+            total += ca.mtimes(by_turns.T, ca.mtimes(self._section(stiffness[:, k]), by_turns))
+            now = self._tangent(here[:, k], tangent[:, k])
+            length = ca.norm_2(now)
+            along = ca.dot(now, pull[:, k])
+            across = ca.SX.eye(3) - ca.mtimes(now, now.T) / length**2 if self.space else ca.SX(1)
+            row = ca.kron(ca.SX(shape[k : k + 1]), ca.SX.eye(self.turns))
+            total += ca.fabs(along) * ca.mtimes(row.T, ca.mtimes(across, row))
+        return self._function("convex", [q, stiffness, tangent, pull], {"convex": ca.densify(total)})
 
 
 ARGUMENTS = ("q", "stiffness", "tangent", "pull")

@@ -29,7 +29,7 @@ from .segments import Segment
 from .spinning import SPUN, SpunPair, SpunVectors
 from .work import Work
 
-__all__ = ["Equations", "Point", "State", "turned_tangents"]
+__all__ = ["UNLOADED", "Equations", "Point", "State", "turned_tangents"]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""

@@ -33,7 +33,7 @@ from .singles import (
     turned_vector,
 )
 
-__all__ = ["Expressions", "Given", "Layout", "moved_by"]
+__all__ = ["LOADS", "Expressions", "Given", "Layout", "moved_by"]
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Given:
         Moments on rotations, fixed and following.
     turn : (3 * rotations,)
         Prescribed rotation vectors.
-    following, tangential : (n * axes,) and (points * axes,)
-        What turns with a rotation, and along elements.
+    following, tangential, spread : (n * axes,) and (points * axes,)
+        What turns with a rotation, and along elements; distributed forces that ``pull`` was made of.
     data, loads : tuples of (data, n) and (loads * n,)
         Of each group of connections.
     """
@@ -89,6 +89,7 @@ class Given:
     turn: ca.MX
     following: ca.MX
     tangential: ca.MX
+    spread: ca.MX
     data: tuple[ca.MX, ...]
     loads: tuple[ca.MX, ...]
 
@@ -438,7 +439,7 @@ class Expressions:
         return residual + ca.vertcat(ca.MX.zeros(self.equations.turning_unknowns), below)
 
 
-LOADS = ("pull", "force", "shift", "moment", "twist", "turn", "following", "tangential")
+LOADS = ("pull", "force", "shift", "moment", "twist", "turn", "following", "tangential", "spread")
 """Parts of the loads that are linear in the factors of their groups."""
 
 

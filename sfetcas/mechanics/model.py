@@ -225,6 +225,7 @@ def assemble(
     mesh: Mesh,
     *,
     assembly: Literal["auto", "closing", "nodal"] = "auto",
+    scales: Scales | None = None,
 ) -> Model:
     """The model of a scene on a mesh.
 
@@ -237,6 +238,8 @@ def assemble(
         ``closing`` (unknowns are rotations only), ``nodal`` (and displacements of macro-nodes), or ``auto``: the
         one whose stationarity equations have fewer entries.  In turning axes it is ``nodal``, with a place at every
         cut, as masses need.
+    scales : Scales, optional
+        Units; without them those that suit the scene.
 
     Raises
     ------
@@ -246,7 +249,7 @@ def assemble(
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
-    scales, rotations = scales_of(scene), number_rotations(scene, mesh, element)
+    scales, rotations = scales or scales_of(scene), number_rotations(scene, mesh, element)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
     names = ("closing", "nodal") if assembly == "auto" else (assembly,)
     bodies = {name: ends[0] for name, ends in rotations.ends.items() if scene.members[name].type == "rigid"}

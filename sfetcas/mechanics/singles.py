@@ -16,6 +16,7 @@ from .joints import Connection, name_of
 
 __all__ = [
     "arms_product",
+    "counted_angle",
     "exponential",
     "moved_rotation",
     "rotation_between",
@@ -106,6 +107,25 @@ def rotation_between(space: bool) -> ca.Function:
     # The angle over its half sine, to all digits also where it vanishes.
     share = ca.if_else(sine < 1e-6, 2.0, 2.0 * ca.atan2(sine, r[0]) / sine)
     return ca.Function(f"vectors_{tag(space)}", [q, p], [share * r[1:]])
+
+
+@functools.cache
+def counted_angle() -> ca.Function:
+    """(a, b, axis, across, crossed, near) -> angle of side b against side a in space, nearest to ``near``.
+
+    See :class:`~sfetcas.mechanics.winding.Winding`.
+    """
+    a, b = ca.SX.sym("a", 4), ca.SX.sym("b", 4)
+    axis, across, crossed, near = ca.SX.sym("axis", 3), ca.SX.sym("across", 3), ca.SX.sym("crossed"), ca.SX.sym("near")
+    q = ca.vertsplit(a)
+    r = product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(b))
+    seen = ca.vertcat(*turned(r, ca.vertsplit(across)))
+    sine = ca.if_else(crossed, ca.dot(ca.cross(axis, across), seen), ca.dot(axis, ca.vertcat(*r[1:])))
+    cosine = ca.if_else(crossed, ca.dot(across, seen), r[0])
+    share = ca.if_else(crossed, 1.0, 2.0)
+    raw, period = share * ca.atan2(sine, cosine), 2.0 * ca.pi * share
+    angle = raw + period * ca.floor((near - raw) / period + 0.5)
+    return ca.Function("counted_angle", [a, b, axis, across, crossed, near], [angle])
 
 
 @functools.cache

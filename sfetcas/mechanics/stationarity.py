@@ -75,6 +75,8 @@ class Stationarity:
         Moments on the nodes of elements.
     shares : list of (Index, MX)
         Full coordinates of the sides of connections, and what these do to them.
+    on_places, couples : MX
+        Forces on places, as a residual, and moments on rotations, as loads; what follows is as it is there.
     spin : MX (axes, turns * nodes of elements)
         Derivatives of the reaches of elements by rotations of their nodes.
     """
@@ -129,6 +131,7 @@ class Stationarity:
         pushed, turned_by, followed = expressions.followed(q, given)
         self.entries += followed
         self.turning, self.on_places = turning + turned_by, on_places + pushed
+        self.couples = given.moment - turned_by
         self._lam, self._rows, self._expressions = lam[:closings, :], rows, expressions
 
     def gathered(self, more: list[tuple[Index, ca.MX]]) -> ca.MX:

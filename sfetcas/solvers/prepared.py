@@ -16,14 +16,17 @@ from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
+from ..mechanics.expressions import Expressions
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .divergence import TangentTest
 from .doctor import Diagnosis, contradiction, diagnose, free_motions
 from .downhill import flow
+from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
 from .newton import Corrected, correct, loose_rows
 from .problem import EquilibriumProblem
+from .program import Program
 from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
@@ -230,6 +233,23 @@ class Prepared:
         lam = found.state.lam - loose @ (loose.T @ found.state.lam)
         least = self.correct(replace(found.state, lam=lam), loading)
         return least if least.converged and self.distance(least.state, found.state) < SAME else found
+
+    @functools.cached_property
+    def _globalised(self) -> Globalised:
+        expressions = Expressions(self.equations, self.kernels, self._evaluations)
+        return Globalised(Program(expressions), self.weight, Rules(escapes=0))
+
+    def globalised(self, loading: Loading) -> tuple[Corrected | None, int]:
+        """The equilibrium by Newton's method from afar, stable or not, and its iterations; None where it fails."""
+        method = self._globalised
+        start = None
+        if self.lacks_slack or any(node.start is not None for node in self.model.scene.nodes.values()):
+            start = method.program.flat(self.guess(loading)[0])
+        outcome = method(method.program.given_of(loading), start)
+        if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
+            return None, outcome.iterations
+        found = self.correct(method.program.state(outcome.state), loading)
+        return (found if found.residual <= SOLVED else None), outcome.iterations
 
     def downhill(self, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium below a state, or where its forces carry it without an energy; None where they do not rest.

@@ -1,0 +1,1 @@
+"""Generated C: an equilibrium as one file without dependencies."""

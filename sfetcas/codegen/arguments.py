@@ -1,0 +1,331 @@
+"""Numbers of a scene that are arguments of the generated code, and what is given as a function of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.records import plain, unknown
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations
+from ..mechanics.expressions import LOADS, Expressions
+from ..mechanics.model import Model, assemble
+from ..solvers.program import Program, data_of, is_data
+from .dependence import Dependence, Number, found
+
+__all__ = ["FACTOR", "Argument", "Arguments", "argument", "default_arguments"]
+
+FACTOR = "factor"
+"""The argument that multiplies all loads and motions without a history."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One argument of the generated code: a number or a vector.
+
+    Attributes
+    ----------
+    name : str
+        As in the scene: ``loads.tip.value``.
+    default : tuple of float
+    unit, meaning : str
+    low, high : float or None
+        The range of each number, where it needs one.
+    components : tuple of int or None
+        Which numbers of a list these are; None of a single number.
+    """
+
+    name: str
+    default: tuple[float, ...]
+    unit: str
+    meaning: str
+    low: float | None = None
+    high: float | None = None
+    components: tuple[int, ...] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each number."""
+        if self.components is None:
+            return (self.name,)
+        return tuple(f"{self.name}.{i}" for i in self.components)
+
+
+def default_arguments(scene: Scene) -> list[str]:
+    """The factor where it multiplies anything, those of histories, all loads, and what all motions prescribe."""
+    free = [one for table in (scene.loads, scene.motions) for one in table.values() if one.history is None]
+    names = [FACTOR] if free or scene.gravity is not None else []
+    names += [f"histories.{name}" for name in scene.histories]
+    names += [f"loads.{name}.value" for name in scene.loads]
+    for name, motion in scene.motions.items():
+        keys = ("displacement", "rotation")
+        names += [f"motions.{name}.{key}" for key in keys if getattr(motion, key) is not None]
+    return names
+
+
+def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -> Argument:
+    """The argument of a name.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such number.
+    """
+    low, high = span if span is not None else (None, None)
+    if low is not None and high is not None and not low < high:
+        raise SceneError(f"found {low:g} to {high:g}, accepted: a range from low to high", ("arguments", name))
+    path = name.split(".")
+    if name == FACTOR:
+        default = float(scene.analysis.steps[-1])
+        return Argument(name, (default,), "1", "factor of all loads and motions without a history", low, high)
+    if path[0] == "histories" and len(path) == 2 and path[1] in scene.histories:
+        default = scene.histories[path[1]].factor(float(scene.analysis.steps[-1]))
+        return Argument(name, (default,), "1", f"factor of what has the history {path[1]}", low, high)
+    value = _value(scene, path, name)
+    if isinstance(value, (list, tuple)):
+        count = len(value)
+        if scene.resolved_dimension == "plane" and count == 3 and path[-1] in ("value", "displacement", "position"):
+            # What is out of the plane is no number of a plane scene; a moment is about z.
+            chosen = [2] if path[0] == "loads" and scene.loads[path[1]].type == "moment" else [0, 1]
+        else:
+            chosen = list(range(count))
+        values = tuple(float(value[i]) for i in chosen)
+        return Argument(name, values, _unit(scene, path), _meaning(path), low, high, tuple(chosen))
+    return Argument(name, (float(value),), _unit(scene, path), _meaning(path), low, high)
+
+
+def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
+    """The number, or list of numbers, at a path of a scene."""
+    here: Any = scene
+    for i, key in enumerate(path):
+        if isinstance(here, Mapping):
+            known = list(here)
+        elif isinstance(here, (list, tuple)):
+            known = [str(k) for k in range(len(here))]
+        else:
+            known = list(getattr(type(here), "model_fields", ()))
+        if key not in known:
+            where = ".".join(path[:i]) or "the scene"
+            raise SceneError(f"{name} of {where}: {unknown(key, known, 'such numbers')}", ("arguments",))
+        here = here[key] if isinstance(here, Mapping) else here[int(key)] if key.isdigit() else getattr(here, key)
+    here = plain(here)
+    numbers = here if isinstance(here, list) else [here]
+    if not numbers or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in numbers):
+        raise SceneError(f"found {name!r}, accepted: a number of the scene, or a list of numbers", ("arguments",))
+    return here
+
+
+UNITS = {
+    "displacement": "m",
+    "rotation": "rad",
+    "position": "m",
+    "gravity": "m/s2",
+    "rhoA": "kg/m",
+    "mass": "kg",
+    "E": "Pa",
+    "G": "Pa",
+    "rho": "kg/m3",
+    "factor": "1",
+}
+"""Units of numbers by their keys."""
+
+
+def _unit(scene: Scene, path: Sequence[str]) -> str:
+    key = next((part for part in reversed(path) if not part.isdigit()), "")
+    if path[0] == "loads" and key == "value":
+        return {"force": "N", "moment": "N m", "distributed": "N/m"}[scene.loads[path[1]].type]
+    if path[0] == "springs" and len(path) > 2:
+        turning = scene.springs[path[1]].type == "rotational"
+        return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
+    if path[0] == "sections":
+        if re.match(r"EI|GJ", key):
+            return "N m2"
+        return UNITS.get(key, "m")
+    return UNITS.get(key, "as in the scene")
+
+
+def _meaning(path: Sequence[str]) -> str:
+    kinds = {"loads": "load", "motions": "motion", "sections": "section", "nodes": "node", "springs": "spring"}
+    if len(path) < 2:
+        return path[0]
+    return f"{'.'.join(path[2:])} of the {kinds.get(path[0], path[0])} {path[1]}"
+
+
+class Arguments:
+    """What is given as a function of the arguments.
+
+    Attributes
+    ----------
+    arguments : tuple of Argument
+    model : Model
+        At values where nothing vanishes by chance: its structure is that of all values.
+    program : Program
+    rest : what is told of a model beside its data: undeformed positions
+    defaults : ndarray (numbers,)
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        base: Model,
+        arguments: Sequence[Argument],
+        rest: Callable[[Model], Array],
+        prefix: str = "",
+    ) -> None:
+        self._rest, self._undeformed = rest, len(rest(base))
+        self.arguments, self._scene, self._base = tuple(arguments), scene, base
+        self.defaults = np.array([x for one in self.arguments for x in one.default])
+        numbers: list[Number] = []
+        for one in self.arguments:
+            numbers += [Number(n, x, one.low, one.high) for n, x in zip(one.names, one.default, strict=True)]
+        self._numbers = numbers
+        self._groups = list(base.groups)
+        # Factors multiply what the other numbers say: they are no matter for probes.
+        self._own = [i for i, number in enumerate(numbers) if not self._is_factor(number.name)]
+        self._mesh = base.mesh
+        self.model = self._assembled(self._generic()) if self._own else base
+        self.expressions = Expressions(Equations(self.model, kernels="interpreted"), "interpreted")
+        everything = Program(self.expressions, self._every())
+        self._layout = everything.sizes
+        self.dependence = self._dependence(everything)
+        self.program = Program(self.expressions, self._varying(), prefix=prefix)
+
+    def _is_factor(self, name: str) -> bool:
+        return name == FACTOR or bool(re.fullmatch(r"histories\.[^.]+", name))
+
+    # -- probes -------------------------------------------------------------------------------------
+
+    def _generic(self) -> list[float]:
+        values = []
+        for i in self._own:
+            number = self._numbers[i]
+            centre, half = number.span
+            values.append(centre + half * (0.37 + 0.11 * np.sin(1.0 + i)))
+        return values
+
+    def _assembled(self, values: Sequence[float]) -> Model:
+        table = self._scene.to_dict()
+        for i, value in zip(self._own, values, strict=True):
+            _put(self._scene, table, self._numbers[i].name.split("."), float(value))
+        try:
+            scene = Scene.from_dict(table)
+            assembly: Any = self._base.assembly
+            return assemble(scene, self._mesh, assembly=assembly, scales=self._base.scales)
+        except SceneError as error:
+            raise SceneError(f"{error} (asked for by the arguments)") from None
+
+    def _every(self) -> dict[str, bool]:
+        names = ["stiffness", "tangent", *LOADS]
+        count = len(self.model.connections)
+        return dict.fromkeys(
+            [*names, *(f"data_{i}" for i in range(count)), *(f"loads_{i}" for i in range(count))], True
+        )
+
+    def _data(self, model: Model, everything: Program) -> Array:
+        """Data of a model, then its loads group by group, flat."""
+        first = everything.slice_of_loads.start
+        loads = [everything.given_of(model.groups[name])[first:] for name in self._groups]
+        return np.concatenate([self._rest(model), *data_of(model).values(), *loads])
+
+    def _dependence(self, everything: Program) -> Dependence:
+        sizes = everything.sizes
+        loads = [size for name, size in sizes.items() if not is_data(name)]
+        data = [size for name, size in sizes.items() if is_data(name)]
+        bounds = np.cumsum([0, self._undeformed, *data, *(loads * len(self._groups))]).tolist()
+        parts = [slice(a, b) for a, b in zip(bounds, bounds[1:], strict=False)]
+        shape = self._data(self.model, everything).shape
+
+        def probe(values: Sequence[float]) -> Array:
+            model = self._assembled(values) if self._own else self._base
+            if [g.names for g in model.connections] != [g.names for g in self.model.connections]:
+                raise SceneError("found arguments that change which joints and springs there are", ("arguments",))
+            flat = self._data(model, everything)
+            if flat.shape != shape:
+                raise SceneError("found arguments that change what the model is made of", ("arguments",))
+            return flat
+
+        return found([self._numbers[i] for i in self._own], probe, parts)
+
+    def _split(self, flat: Any, cut: Callable[[Any, list[int]], Any]) -> tuple[list[Any], list[list[Any]]]:
+        """Data, and loads by groups."""
+        flat = cut(flat, [0, self._undeformed, flat.shape[0]])[1]
+        data = [name for name in self._layout if is_data(name)]
+        loads = [name for name in self._layout if name not in data]
+        sizes = [self._layout[name] for name in data]
+        sizes += [self._layout[name] for name in loads] * len(self._groups)
+        parts = cut(flat, np.cumsum([0, *sizes]).tolist())
+        rest = parts[len(data) :]
+        return parts[: len(data)], [rest[i * len(loads) : (i + 1) * len(loads)] for i in range(len(self._groups))]
+
+    def _varying(self) -> dict[str, bool]:
+        """Parts that are not constant: data that numbers change, loads that there are."""
+
+        def cut(flat: Array, bounds: list[int]) -> list[Array]:
+            return [flat[a:b] for a, b in zip(bounds, bounds[1:], strict=False)]
+
+        data, loads = self._split(self.dependence.changing, cut)
+        names = list(self._layout)
+        flags = {name: bool(part.any()) for name, part in zip(names, data, strict=False)}
+        changed = np.any([[part.any() for part in group] for group in loads], axis=0)
+        acting = np.any([[part.any() for part in group] for group in self._split(self.dependence.base, cut)[1]], axis=0)
+        flags |= {n: bool(a or b) for n, a, b in zip(names[len(data) :], changed, acting, strict=True)}
+        return flags
+
+    def undeformed(self, p: ca.MX) -> ca.MX:
+        """What ``rest`` tells, for numbers (numbers,)."""
+        own = p[self._own] if self._own else ca.MX(0, 1)
+        return self.dependence.value(own)[: self._undeformed]
+
+    # -- the function ---------------------------------------------------------------------------------
+
+    def given(self, p: ca.MX) -> ca.MX:
+        """What is given, as :class:`~sfetcas.solvers.program.Program` takes it, for numbers (numbers,)."""
+        own = p[self._own] if self._own else ca.MX(0, 1)
+        data, loads = self._split(self.dependence.value(own), ca.vertsplit)
+        names = list(self._layout)
+        found: dict[str, ca.MX] = dict(zip(names, data, strict=False))
+        for i, name in enumerate(names[len(data) :]):
+            found[name] = sum(
+                (self._factor(p, group) * parts[i] for group, parts in zip(self._groups[1:], loads[1:], strict=True)),
+                self._factor(p, self._groups[0]) * loads[0][i],
+            )
+        if self.model.spinning is not None:
+            raise SceneError("found turning axes, accepted: a scene without", ("rotating",))
+        return ca.vertcat(ca.MX(0, 1), *(found[name] for name in self.program.sizes))
+
+    def _factor(self, p: ca.MX, group: str | None) -> ca.MX | float:
+        name = FACTOR if group is None else f"histories.{group}"
+        for i, number in enumerate(self._numbers):
+            if number.name == name:
+                return p[i]
+        return float(self._base.factors(float(self._scene.analysis.steps[-1]))[group])
+
+    def prepare(self, name: str) -> ca.Function:
+        """(arguments) -> given."""
+        p = ca.MX.sym("arguments", len(self.defaults))
+        return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def _put(scene: Scene, table: dict[str, Any], path: Sequence[str], value: float) -> None:
+    """Put a number to its place in a table of the scene."""
+    here: Any = table
+    record: Any = scene
+    for key in path[:-1]:
+        record = record[key] if isinstance(record, Mapping) else getattr(record, key)
+        if key not in here:
+            here[key] = plain(record)
+        here = here[key]
+        if isinstance(here, tuple):
+            raise AssertionError
+    last = path[-1]
+    if isinstance(here, list):
+        here[int(last)] = value
+    else:
+        here[last] = value

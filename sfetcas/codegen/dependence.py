@@ -1,0 +1,290 @@
+"""How data depend on numbers: polynomials found by probing, exact or to rounding, or a refusal.
+
+Most of what a scene says enters the data of a model linearly, or as a product of such numbers: then a few probes give
+it exactly.  What does not is expanded in Chebyshev polynomials over the range that the number may have.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mathematics.constants import times
+
+__all__ = ["Dependence", "Number", "found"]
+
+EXACT = 1e-12
+"""Share of the largest value of a part that a polynomial may miss where it is tested: rounding of the probes."""
+
+DEGREES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+"""Degrees that are tried one after the other."""
+
+GLOBAL = 4
+"""Up to this degree a polynomial holds beyond the range it was found in: stiffness goes with the fourth power."""
+
+MOST_PROBES = 3000
+"""Probes at most for numbers that act together."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number that data depend on.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+        Where data are known exactly.
+    low, high : float or None
+        Its range, where it is given.
+    """
+
+    name: str
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Where it is probed: centre and half width."""
+        if self.low is not None and self.high is not None:
+            return 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
+        return self.value, 0.5 * abs(self.value) or 1.0
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Numbers that act together: their polynomial is a sum over products of Chebyshev polynomials."""
+
+    numbers: tuple[int, ...]
+    degrees: tuple[int, ...]
+    entries: Array
+    coefficients: Array
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Data as a function of numbers.
+
+    Attributes
+    ----------
+    numbers : tuple of Number
+    base : ndarray (data,)
+        Where all numbers have their values.
+    groups : tuple
+        Polynomials of what differs from the base.
+    """
+
+    numbers: tuple[Number, ...]
+    base: Array
+    groups: tuple[_Together, ...]
+
+    @property
+    def changing(self) -> Array:
+        """Which of the data depend on any number, (data,) bool."""
+        flags = np.zeros(len(self.base), dtype=bool)
+        for group in self.groups:
+            flags[group.entries] = True
+        return flags
+
+    def value(self, p: ca.MX) -> ca.MX:
+        """The data, (data,), for numbers (numbers,)."""
+        total = ca.MX(ca.DM(self.base))
+        for group in self.groups:
+            chosen = [self.numbers[i] for i in group.numbers]
+            terms = _basis(chosen, group.degrees)(p[list(group.numbers)])
+            rows = ca.sparsify(ca.DM(_scattered(group, len(self.base))))
+            total += times(rows, terms)
+        return total
+
+
+def _scattered(group: _Together, size: int) -> Array:
+    whole = np.zeros((size, group.coefficients.shape[1]))
+    whole[group.entries] = group.coefficients
+    return whole
+
+
+def _polynomials(x: ca.SX, number: Number, degree: int) -> list[ca.SX]:
+    """Chebyshev polynomials of a number in its span; of degree one the difference from its value itself."""
+    if degree == 1:
+        return [ca.SX(1), x - number.value]
+    centre, half = number.span
+    t = (x - centre) / half
+    terms = [ca.SX(1), t]
+    for _ in range(degree - 1):
+        terms.append(2 * t * terms[-1] - terms[-2])
+    return terms
+
+
+def _basis(numbers: Sequence[Number], degrees: Sequence[int]) -> ca.Function:
+    """(numbers) -> all products of their polynomials but the constant one, less what they are at the values."""
+    x = ca.SX.sym("x", len(numbers))
+    each = [_polynomials(x[i], number, degree) for i, (number, degree) in enumerate(zip(numbers, degrees, strict=True))]
+    products = [ca.SX(1)]
+    for terms in each:
+        products = [a * b for a in products for b in terms]
+    all_of_them = ca.vertcat(*products[1:])
+    known = ca.evalf(ca.substitute(all_of_them, x, ca.DM([number.value for number in numbers])))
+    return ca.Function("basis", [x], [all_of_them - ca.DM(known)])
+
+
+def found(numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], parts: Sequence[slice]) -> Dependence:
+    """The dependence of what a probe gives on numbers.
+
+    Parameters
+    ----------
+    numbers : sequence of Number
+    probe : callable
+        Data for values of the numbers.
+    parts : sequence of slice
+        Of the data: rounding of each is judged by its own largest value.
+
+    Raises
+    ------
+    SceneError
+        No polynomial tells it.
+    """
+    probing = _Probing(numbers, probe, parts)
+    groups = tuple(probing.fitted(group) for group in probing.groups())
+    result = Dependence(tuple(numbers), probing.base, tuple(group for group in groups if len(group.entries)))
+    probing.check(result)
+    return result
+
+
+class _Probing:
+    """Probes of one set of numbers."""
+
+    def __init__(
+        self, numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], parts: Sequence[slice]
+    ) -> None:
+        self.numbers, self._probe = list(numbers), probe
+        self._values = [number.value for number in numbers]
+        self.base = probe(self._values)
+        self.unit = np.zeros(len(self.base))
+        self._parts = parts
+        self._see(self.base)
+
+    def _see(self, data: Array) -> None:
+        """Judge by the largest values seen."""
+        for part in self._parts:
+            self.unit[part] = np.maximum(self.unit[part], np.abs(data[part]).max(initial=0.0))
+
+    def at(self, changes: dict[int, float]) -> Array:
+        """Data where some numbers have other values."""
+        values = list(self._values)
+        for i, value in changes.items():
+            values[i] = value
+        data = self._probe(values)
+        if data.shape != self.base.shape or not np.isfinite(data).all():
+            raise SceneError(f"{self._told(changes)}: found no such model")
+        self._see(data)
+        return data
+
+    def _told(self, changes: dict[int, float]) -> str:
+        return ", ".join(f"{self.numbers[i].name} = {value:.6g}" for i, value in changes.items())
+
+    def differs(self, a: Array, b: Array) -> Array:
+        """Which data differ by more than rounding."""
+        return np.abs(a - b) > EXACT * np.maximum(self.unit, 1e-300)
+
+    def groups(self) -> list[tuple[int, ...]]:
+        """Numbers that act together on any datum."""
+        count = len(self.numbers)
+        ends = [self._end(i) for i in range(count)]
+        moved = [self.at({i: ends[i]}) for i in range(count)]
+        touched = [self.differs(data, self.base) for data in moved]
+        parent = list(range(count))
+
+        def root(i: int) -> int:
+            while parent[i] != i:
+                i = parent[i]
+            return i
+
+        for i, j in itertools.combinations(range(count), 2):
+            both = self.at({i: ends[i], j: ends[j]})
+            mixed = both - moved[i] - moved[j] + self.base
+            if (np.abs(mixed) > 4.0 * EXACT * np.maximum(self.unit, 1e-300)).any():
+                parent[root(i)] = root(j)
+        self.touched = touched
+        roots = [root(i) for i in range(count)]
+        return [tuple(i for i in range(count) if roots[i] == r) for r in dict.fromkeys(roots)]
+
+    def _end(self, i: int) -> float:
+        number = self.numbers[i]
+        centre, half = number.span
+        # Anywhere but where symmetry might hide something.
+        return centre + 0.83 * half if number.value <= centre + 0.4 * half else centre - 0.83 * half
+
+    def degree(self, i: int) -> int:
+        """Least degree that tells how data depend on one number, the others at their values."""
+        number = self.numbers[i]
+        centre, half = number.span
+        tests = [centre + half * x for x in (-0.97, -0.31, 0.47, 0.89)]
+        wanted = [self.at({i: x}) for x in tests]
+        for degree in DEGREES:
+            nodes = centre + half * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+            values = np.stack([self.at({i: x}) for x in nodes.tolist()])
+            fit = np.polynomial.chebyshev.chebfit((nodes - centre) / half, values, degree)
+            there = [np.asarray(np.polynomial.chebyshev.chebval((x - centre) / half, fit)) for x in tests]
+            if not any(self.differs(a, b).any() for a, b in zip(there, wanted, strict=True)):
+                if degree > GLOBAL and number.low is None:
+                    break
+                return degree
+        else:
+            degree = DEGREES[-1] + 1
+        if number.low is None:
+            accepted = f"{number.name}: [low, high], the range that it may have, as the model depends on it by no power"
+            raise SceneError(f"{number.name}: found no range, accepted: {accepted}", ("arguments",))
+        message = f"found {number.low:g} to {number.high:g}, where no polynomial tells how the model depends on it"
+        raise SceneError(f"{message}, accepted: a smaller range", ("arguments", number.name))
+
+    def fitted(self, group: tuple[int, ...]) -> _Together:
+        """The polynomial of numbers that act together."""
+        degrees = tuple(self.degree(i) for i in group)
+        count = int(np.prod([degree + 1 for degree in degrees]))
+        names = ", ".join(self.numbers[i].name for i in group)
+        if count > MOST_PROBES:
+            raise SceneError(f"found {names}, which act together, accepted: fewer of them", ("arguments",))
+        grids = []
+        for i, degree in zip(group, degrees, strict=True):
+            centre, half = self.numbers[i].span
+            nodes = centre + half * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+            grids.append(nodes.tolist() if degree > 1 else [self.numbers[i].value, self._end(i)])
+        points = list(itertools.product(*grids))
+        basis = _basis([self.numbers[i] for i in group], degrees)
+        rows = np.array([np.array(basis(ca.DM(point))).ravel() for point in points])
+        values = np.stack([self.at(dict(zip(group, point, strict=True))) for point in points]) - self.base
+        entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, 1e-300)).any(axis=0))
+        coefficients = np.linalg.lstsq(rows, values[:, entries], rcond=None)[0].T
+        largest = np.abs(rows).max(axis=0)
+        coefficients[np.abs(coefficients) * largest < 1e-3 * EXACT * self.unit[entries, None]] = 0.0
+        return _Together(group, degrees, entries, coefficients)
+
+    def check(self, result: Dependence) -> None:
+        """Refuse what misses the model at random values.
+
+        Raises
+        ------
+        SceneError
+            It does.
+        """
+        if not self.numbers:
+            return
+        p = ca.MX.sym("p", len(self.numbers))
+        value = ca.Function("value", [p], [result.value(p)])
+        random = np.random.default_rng(0)
+        for _ in range(4):
+            spans = [number.span for number in self.numbers]
+            point = [c + h * x for (c, h), x in zip(spans, random.uniform(-0.95, 0.95, len(spans)), strict=True)]
+            wanted = self.at(dict(enumerate(point)))
+            missed = np.abs(np.array(value(point)).ravel() - wanted) > 1e2 * EXACT * np.maximum(self.unit, 1e-300)
+            if missed.any():
+                names = ", ".join(number.name for number in self.numbers)
+                message = f"found {names}, for which together the model is no polynomial"
+                raise SceneError(f"{message}, accepted: fewer of them", ("arguments",))

@@ -1,0 +1,110 @@
+"""CasADi functions as static C, and tables of constants."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array
+
+__all__ = ["functions_in_c", "sizes_of", "sparsity_table", "table"]
+
+DEFINITION = re.compile(r"^(?:static )?(?:int|void|double|casadi_real|casadi_int|const \w+\*) (\w+)\(")
+"""First line of a function in generated code."""
+
+
+def functions_in_c(functions: Sequence[ca.Function], prefix: str, roots: Iterable[str]) -> str:
+    """Functions as static C, with nothing that is not reached from the roots; needs the mathematics of C only.
+
+    Parameters
+    ----------
+    functions : what to write
+    prefix : of all names that CasADi gives
+    roots : names of what is called from outside; of CasADi's own as in ``casadi_ldl``
+    """
+    generator = ca.CodeGenerator(f"{prefix}.c", {"with_header": False, "casadi_int": "int", "with_export": False})
+    for function in functions:
+        generator.add(function)
+    head, chunks = _chunks(generator.dump())
+    wanted, reached = list(roots), set[str]()
+    while wanted:
+        name = wanted.pop()
+        if name in chunks and name not in reached:
+            reached.add(name)
+            wanted += NAME.findall(chunks[name])
+    head = "\n".join(
+        line for line in head.splitlines() if not line.startswith("#define casadi_") or _kept(line, reached)
+    )
+    text = "\n".join([head, *(chunk for name, chunk in chunks.items() if name in reached)])
+    return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
+
+
+NAME = re.compile(r"\b[A-Za-z_]\w*")
+
+TABLE = re.compile(r"^static const \w+ (\w+)\[")
+
+
+def _kept(line: str, reached: set[str]) -> bool:
+    """Whether a definition of a name is of something that is there."""
+    name = line.split()[1]
+    return name in reached or name in ("casadi_real", "casadi_int")
+
+
+def _chunks(text: str) -> tuple[str, dict[str, str]]:
+    """What stands before all definitions, and functions and tables by their names, in order and static."""
+    # Nothing here has a name outside: the frames of C++ are for what has.
+    text = re.sub(r'#ifdef __cplusplus\n(extern "C" \{|\} /\* extern "C" \*/)\n#endif\n', "", text)
+    head: list[str] = []
+    chunks: dict[str, str] = {}
+    name = None
+    for line in map(str.rstrip, text.splitlines()):
+        match = DEFINITION.match(line) or TABLE.match(line)
+        if name is None and match:
+            name = match.group(1)
+            chunks[name] = line if line.startswith("static ") else f"static {line}"
+        elif name is not None:
+            chunks[name] += f"\n{line}"
+        elif not line.startswith("/*") or not chunks:
+            head.append(line)
+            continue
+        else:
+            continue
+        if line.startswith("}") or line.endswith("};") or (match and line.endswith("}")):
+            chunks[name] += "\n"
+            name = None
+    return "\n".join(head), chunks
+
+
+def sizes_of(functions: Iterable[ca.Function]) -> dict[str, int]:
+    """Work that functions need, one after the other."""
+    functions = list(functions)
+    return {
+        "arg": max(3, *(f.sz_arg() for f in functions)),
+        "res": max(5, *(f.sz_res() for f in functions)),
+        "iw": max(1, *(f.sz_iw() for f in functions)),
+        "w": max(1, *(f.sz_w() for f in functions)),
+    }
+
+
+def table(name: str, values: Array, kind: str = "double") -> str:
+    """A constant array; an empty one has one zero, which C asks for."""
+    flat = np.asarray(values).ravel()
+    texts = [repr(float(x)) if kind == "double" else str(int(x)) for x in flat.tolist()] or ["0"]
+    lines, line = [], ""
+    for text in texts:
+        if len(line) + len(text) > 110:
+            lines.append(line)
+            line = ""
+        line += f"{text}, "
+    lines.append(line)
+    inner = "\n".join(f"  {part.rstrip()}" for part in lines).rstrip(",")
+    return f"static const {kind} {name}[{len(texts)}] = {{\n{inner}\n}};\n"
+
+
+def sparsity_table(name: str, sparsity: ca.Sparsity) -> str:
+    """A pattern as the generated functions read it."""
+    rows, columns = sparsity.shape
+    return table(name, np.array([rows, columns, *sparsity.colind(), *sparsity.row()]), "int")

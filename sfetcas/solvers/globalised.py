@@ -1,0 +1,419 @@
+"""Newton's method from afar: the equilibrium from the undeformed state, without IPOPT.
+
+An iteration turns every node by a rotation vector, so that norms hold by construction and what is left is a
+minimisation of the energy on the closings.  Where the energy is not convex on them, which the signs of the pivots of
+the factorised matrix tell (Sylvester), a positive matrix takes the place of the elements' share, made firmer until the
+signs are right; steps are shortened until potential and gaps fall.  Near the answer steps are taken whole.  What is
+unstable is left along its softest shape.  Loads without potential, and what does not come down, are followed from zero.
+
+Every operation on numbers is one of the functions of :class:`~sfetcas.solvers.program.Program`; generated C takes the
+same decisions on the same numbers, with the same :class:`Rules`.
+
+Sources: Nocedal and Wright 2006, chapters 3 and 18 (line search on an l1 merit function); Vanderbei 1995
+(quasidefinite matrices have factors in any order).
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array
+from .program import Program
+
+__all__ = ["MEANINGS", "Code", "Globalised", "Outcome", "Rules"]
+
+
+class Code(enum.IntEnum):
+    """How a solve ended."""
+
+    SOLVED = 0
+    UNSTABLE = 1
+    ITERATIONS = 2
+    STALLED = 3
+    NOT_FINITE = 4
+    BAD_ARGUMENT = 5
+
+
+MEANINGS = {
+    Code.SOLVED: "an equilibrium, stable or neutral where there is an energy that tells",
+    Code.UNSTABLE: "an equilibrium, but an unstable one, from which no way led to a stable one",
+    Code.ITERATIONS: "no equilibrium within the iterations allowed",
+    Code.STALLED: "no equilibrium: no step led further",
+    Code.NOT_FINITE: "no equilibrium: the numbers left what can be computed",
+    Code.BAD_ARGUMENT: "an argument or the start is not a finite number",
+}
+"""What the codes say."""
+
+
+NOT_DEFINED = -1
+"""Ways out where no energy tells."""
+
+FAILED = -1_000_000
+"""Pivots of a matrix that could not be factorised."""
+
+FIRMEST = 1e12
+"""Firmness at which there is no use in more."""
+
+TINY = 1e-30
+"""Keeps zero from being divided by."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The numbers that decide.
+
+    Attributes
+    ----------
+    iterations : int
+        At most, of all that is tried.
+    converged, rounding : float
+        Relative residual that counts as converged; at which there is nothing left to gain.
+    gain : float
+        Share of a converged residual that a further step must leave at most, to be worth it.
+    turn : float
+        Largest rotation of a node in a step under forces, rad; moments may roll up at once.
+    near : float
+        Steps shorter than this, rad, are taken whole.
+    proximal, soft : float
+        Weight on the diagonal of rotations; softness of displacements and closings, which refinement takes back.
+    firm, firmer : float
+        First share of the weight by which a matrix is made firmer, and by how many times it grows.
+    rounds : int
+        Of refinement at most.
+    left : float
+        Share of the right side that refinement may leave.
+    armijo : float
+        Share of the promised decrease that is asked for.
+    noise : float
+        Rounding of the potential.
+    halvings : int
+        Of a step at most.
+    escapes : int
+        Unstable equilibria that are left; none to keep what is found.
+    nudge : float
+        Largest rotation by which they are left, rad.
+    sweeps : int
+        Of inverse iteration for their softest shape.
+    corrections : int
+        Newton steps at one share of the loads.
+    shortest : float
+        Least share of the loads in a step from zero.
+    far : float
+        Largest rotation of a Newton step that follows loads, rad.
+    """
+
+    iterations: int = 300
+    converged: float = 1e-10
+    rounding: float = 3e-15
+    gain: float = 0.25
+    turn: float = 1.2
+    near: float = 0.05
+    proximal: float = 1e-10
+    soft: float = 5e-8
+    firm: float = 1e-3
+    firmer: float = 10.0
+    rounds: int = 8
+    left: float = 1e-6
+    armijo: float = 0.3
+    noise: float = 1e-12
+    halvings: int = 40
+    escapes: int = 8
+    nudge: float = 0.2
+    sweeps: int = 60
+    corrections: int = 12
+    shortest: float = 1e-4
+    far: float = 1.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where the method arrived.
+
+    Attributes
+    ----------
+    code : Code
+    state : ndarray
+        As :meth:`~sfetcas.solvers.program.Program.state` reads it.
+    residual : float
+        Relative to what is added up.
+    negative : int
+        Ways out of the equilibrium; -1 where no energy tells.
+    iterations : int
+    """
+
+    code: Code
+    state: Array
+    residual: float
+    negative: int
+    iterations: int
+
+
+@dataclass(frozen=True)
+class _Here:
+    """A state and the equations there."""
+
+    state: Array
+    residual: Array
+    size: float
+    potential: float
+    gaps: float
+    entries: Array
+
+
+class Globalised:
+    """The method for one program.
+
+    Parameters
+    ----------
+    program : Program
+    weight : ndarray (turning unknowns,)
+        See :class:`~sfetcas.solvers.stability.StabilityTest`.
+    """
+
+    def __init__(self, program: Program, weight: Array, rules: Rules | None = None) -> None:
+        self.program, self.rules = program, rules or Rules()
+        equations = program.equations
+        self._turning, self._unknowns, self._total = equations.turning_unknowns, equations.unknowns, equations.total
+        # What firmness acts upon: rotations by their weight, displacements; softness, with the signs of the pivots.
+        self.mass = np.concatenate([weight, np.ones(self._unknowns - self._turning), np.zeros(equations.rows)])
+        self.soft = np.repeat([0.0, 1.0, -1.0], [self._turning, self._unknowns - self._turning, equations.rows])
+        row, column = (np.array(part) for part in program.sparsity.get_triplet())
+        self.diagonal = np.flatnonzero(row == column)
+        self._symmetric = program.model.has_potential
+        if self._symmetric and self._total:
+            self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
+            self._solver.sfact(ca.DM(program.sparsity, 1.0))
+        self._left = 0
+
+    # -- linear algebra -----------------------------------------------------------------------------
+
+    def _factor(self, entries: Array, firm: float) -> int:
+        """Factorise a matrix made firmer; its negative pivots, less those of the closings."""
+        rules = self.rules
+        self._target = entries.copy()
+        self._target[self.diagonal] += (rules.proximal + firm) * self.mass
+        matrix = self._target.copy()
+        matrix[self.diagonal] += rules.soft * self.soft
+        self._matrix = ca.DM(self.program.sparsity, matrix)
+        if not self._symmetric:
+            return 0
+        try:
+            self._solver.nfact(self._matrix)
+        except RuntimeError:
+            return FAILED
+        return int(self._solver.neig(self._matrix)) - (self._total - self._unknowns)
+
+    def _backward(self, b: Array) -> Array:
+        if not self._symmetric:
+            return np.array(self.program.linear(self._matrix.nz[:], b)).ravel()
+        return np.array(self._solver.solve(self._matrix, b)).ravel()
+
+    def _solved(self, b: Array) -> Array | None:
+        """Solution for the matrix factorised last, the softness taken back by refinement; None where that fails."""
+        x, best, left, last = np.zeros(self._total), None, b, np.inf
+        largest = float(np.abs(b).max(initial=0.0))
+        for _ in range(self.rules.rounds):
+            x = x + self._backward(left)
+            left = np.array(self.program.left(self._target, x, b)).ravel()
+            size = float(np.abs(left).max(initial=0.0))
+            if not size < last:
+                break
+            best, gained, last = x, last > 4.0 * size, size
+            if size <= 1e-16 * largest or not gained:
+                break
+        return best if last <= self.rules.left * largest else None
+
+    def _newton(self, here: _Here) -> tuple[Array | None, int]:
+        """Newton's step, None where there is none, and the number of ways out."""
+        negative = self._factor(here.entries, 0.0)
+        return (None if negative == FAILED else self._solved(-here.residual)), negative
+
+    def _downwards(self, here: _Here, given: Array) -> Array | None:
+        """A step downhill by a positive matrix, as firm as it takes."""
+        entries = np.array(self.program.convex(here.state, given)).ravel()
+        firm = 0.0
+        while firm < FIRMEST:
+            if self._factor(entries, firm) == 0:
+                step = self._solved(-here.residual)
+                if step is not None:
+                    return step
+            firm = max(self.rules.firm, self.rules.firmer * firm)
+        return None
+
+    # -- states ---------------------------------------------------------------------------------------
+
+    def _at(self, state: Array, given: Array) -> _Here:
+        residual, size, potential, gaps, entries = (np.array(a).ravel() for a in self.program.at(state, given))
+        return _Here(state, residual, float(size[0]), float(potential[0]), float(gaps[0]), entries)
+
+    def _moved(self, state: Array, step: Array, share: float) -> Array:
+        return np.array(self.program.move(state, step, share)).ravel()
+
+    def _length(self, step: Array) -> float:
+        return float(np.abs(step[: self._turning]).max(initial=0.0))
+
+    def _multipliers(self, state: Array) -> Array:
+        end = len(state) - self.program.expressions.layout.near
+        return state[end - (self._total - self._unknowns) : end]
+
+    # -- the method -----------------------------------------------------------------------------------
+
+    def __call__(self, given: Array, start: Array | None = None) -> Outcome:
+        """The equilibrium from a state, or from the undeformed one."""
+        program, rules = self.program, self.rules
+        if not np.isfinite(given).all() or (start is not None and not np.isfinite(start).all()):
+            return Outcome(Code.BAD_ARGUMENT, np.full(program.states, np.nan), np.inf, NOT_DEFINED, 0)
+        self._left = rules.iterations
+        state = np.array(program.begin(given) if start is None else program.hold(start, given)).ravel()
+        found = self._from(state, given)
+        if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
+            followed = self._followed(given)
+            found = followed if followed.code is Code.SOLVED else found
+        return replace(found, iterations=rules.iterations - self._left)
+
+    def _from(self, state: Array, given: Array) -> Outcome:
+        """Downhill from a state, and out of what is unstable."""
+        if not self.program.model.minimisable:
+            return self._corrected(self._at(state, given), given, self._left)
+        for _ in range(self.rules.escapes + 1):
+            found = self._descended(self._at(state, given), given)
+            if found.code is not Code.SOLVED or found.negative <= 0:
+                return found
+            state = self._nudged(found.state, given)
+        return replace(found, code=Code.UNSTABLE)
+
+    def _ended(self, code: Code, here: _Here, negative: int = NOT_DEFINED) -> Outcome:
+        return Outcome(code, here.state, here.size, negative, 0)
+
+    def _descended(self, here: _Here, given: Array) -> Outcome:
+        """Downhill to an equilibrium, stable or not."""
+        rules, scale, first = self.rules, 1.0, True
+        while self._left:
+            self._left -= 1
+            if not np.isfinite(here.size):
+                return self._ended(Code.NOT_FINITE, here)
+            step, negative = self._newton(here)
+            if not first and here.size <= rules.rounding:
+                return self._ended(Code.SOLVED, here, negative)
+            first = False
+            if step is not None and self._length(step) < rules.near:
+                # Near an equilibrium, stable or not, Newton's own step leads to it.
+                there = self._at(self._moved(here.state, step, 1.0), given)
+                if here.size <= rules.converged and not there.size <= rules.gain * here.size:
+                    best = there if there.size < here.size else here
+                    return self._ended(Code.SOLVED, best, self._factor(best.entries, 0.0))
+                if there.size < here.size or negative == 0:
+                    here = there
+                    continue
+            if step is None or negative != 0:
+                step = self._downwards(here, given)
+            if step is None or not np.isfinite(self._length(step)):
+                return self._ended(Code.STALLED, here)
+            most = np.inf if given[self.program.slice_of("moment")].any() else rules.turn
+            scale = min(1.0, 4.0 * scale, most / max(self._length(step), TINY))
+            found = self._shortened(here, step, scale, given)
+            if found is None:
+                return self._ended(Code.STALLED, here)
+            here, scale = found
+        return self._ended(Code.ITERATIONS, here)
+
+    def _shortened(self, here: _Here, step: Array, scale: float, given: Array) -> tuple[_Here, float] | None:
+        """Where a step leads, shortened until potential and gaps fall, and its share; None where they never do."""
+        rules, n = self.rules, self._unknowns
+        lam = self._multipliers(here.state)
+        penalty = 2.0 * float(np.abs(lam + step[n:]).max(initial=0.0))
+        # The slope of the potential alone: the residual without the multipliers' share.
+        slope = float(here.residual[:n] @ step[:n]) + float(lam @ here.residual[n:]) - penalty * here.gaps
+        slope, before = min(slope, 0.0), here.potential + penalty * here.gaps
+        for halving in range(rules.halvings):
+            state = self._moved(here.state, step, scale)
+            if halving == 0:
+                there = self._at(state, given)
+                potential, gaps = there.potential, there.gaps
+            else:
+                potential, gaps = (float(value) for value in self.program.merit(state, given))
+            wanted = rules.armijo * (scale - 0.5 * scale**2) * slope
+            if potential + penalty * gaps - before <= wanted + rules.noise * abs(before):
+                return (there if halving == 0 else self._at(state, given)), scale
+            scale *= 0.5
+        return None
+
+    # -- out of what is unstable ----------------------------------------------------------------------
+
+    def _nudged(self, state: Array, given: Array) -> Array:
+        """The state moved along its softest shape to the side of lower energy."""
+        shape = self._softest(self._at(state, given).entries)
+        shape *= self.rules.nudge / max(self._length(shape), TINY)
+        sides = [self._moved(state, shape, share) for share in (1.0, -1.0)]
+        up, down = (float(self.program.merit(side, given)[0]) for side in sides)
+        # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
+        return sides[1] if up - down > 1e-9 * max(abs(up), abs(down)) else sides[0]
+
+    def _softest(self, entries: Array) -> Array:
+        """The shape of the lowest eigenvalue, by inverse iteration from below it."""
+        firm = self.rules.firm
+        while self._factor(entries, firm) != 0 and firm < FIRMEST:
+            firm *= self.rules.firmer
+        x = np.zeros(self._total)
+        # Any shape that no symmetry makes orthogonal to the one that is looked for.
+        x[: self._unknowns] = 1.0 / (1.0 + np.arange(self._unknowns))
+        for _ in range(self.rules.sweeps):
+            x = self._backward(self.mass * x)
+            x[self._unknowns :] = 0.0
+            x /= max(float(np.abs(x).max(initial=0.0)), TINY)
+        return x
+
+    # -- loads that grow ------------------------------------------------------------------------------
+
+    def _followed(self, given: Array) -> Outcome:
+        """Where the loads lead, growing from zero."""
+        program, rules = self.program, self.rules
+        state = np.array(program.begin(self._shared(given, 0.0))).ravel()
+        share, reached, step = 0.0, state, 1.0
+        found = None
+        while share < 1.0 and self._left:
+            there = min(1.0, share + step)
+            loads = self._shared(given, there)
+            held = np.array(program.hold(reached, loads)).ravel()
+            found = self._corrected(self._at(held, loads), loads, rules.corrections)
+            if found.code is Code.SOLVED:
+                share, reached, step = there, found.state, 2.0 * step
+                continue
+            step *= 0.5
+            if step < rules.shortest:
+                return found
+        if found is None or share < 1.0:
+            return Outcome(Code.ITERATIONS, reached, np.inf, NOT_DEFINED, 0)
+        if found.negative > 0 and rules.escapes and program.model.minimisable:
+            return self._from(self._nudged(reached, given), given)
+        return found
+
+    def _shared(self, given: Array, share: float) -> Array:
+        """What is given with a share of all loads and motions."""
+        loads = self.program.slice_of_loads
+        return np.concatenate([given[: loads.start], share * given[loads]])
+
+    def _corrected(self, here: _Here, given: Array, most: int) -> Outcome:
+        """Newton's method from a near state."""
+        rules, last, first = self.rules, np.inf, True
+        for _ in range(min(most, self._left)):
+            self._left -= 1
+            if not np.isfinite(here.size):
+                return self._ended(Code.NOT_FINITE, here)
+            step, negative = self._newton(here)
+            negative = negative if self._symmetric else NOT_DEFINED
+            if not first and here.size <= rules.rounding:
+                return self._ended(Code.SOLVED, here, negative)
+            length = np.inf if step is None else self._length(step)
+            if step is None or not length <= rules.far or length > max(last, rules.near):
+                return self._ended(Code.STALLED, here)
+            first, last = False, length
+            there = self._at(self._moved(here.state, step, 1.0), given)
+            if here.size <= rules.converged and not there.size <= rules.gain * here.size:
+                return self._ended(Code.SOLVED, there if there.size < here.size else here, negative)
+            here = there
+        return self._ended(Code.SOLVED if here.size <= rules.converged else Code.ITERATIONS, here)

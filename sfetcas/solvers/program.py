@@ -1,0 +1,459 @@
+"""The equilibrium of a model as functions of flat vectors: what Newton's method from afar and generated C are made of.
+
+A *state* is one vector: rotations (quaternions or angles) of all nodes, displacements kept as unknowns, multipliers,
+and the values near which angles count turns.  What is *given* is another one: the loads, and whatever else of the
+data of the equations shall vary.  Every operation of the solver is a CasADi Function of these two, so that the same
+numbers come out of Python and of C.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.constants import constant, sparse, times
+from ..mathematics.linear import pattern
+from ..mechanics.connections import GROUND
+from ..mechanics.equations import UNLOADED, State
+from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
+from ..mechanics.joints import by_turning
+from ..mechanics.loading import Loading
+from ..mechanics.model import Model
+from ..mechanics.rotations import Turn
+from ..mechanics.singles import counted_angle, turned_vector
+from ..mechanics.stationarity import Stationarity, StationarityPlaces, summed
+
+__all__ = ["Program", "data_of", "is_data"]
+
+
+class Program:
+    """The functions of one model.
+
+    Parameters
+    ----------
+    expressions : Expressions
+    varying : mapping of str to bool, optional
+        Which parts of :class:`~sfetcas.mechanics.expressions.Given` are not constant; without one the loads that the
+        model has.
+    prefix : str
+        Of the names of all functions.
+
+    Attributes
+    ----------
+    states : int
+        Numbers of a state.
+    sizes : mapping of str to int
+        Of the parts that vary, in the order in which they stand in what is given.
+    """
+
+    def __init__(
+        self, expressions: Expressions, varying: Mapping[str, bool] | None = None, *, prefix: str = ""
+    ) -> None:
+        self._prefix = prefix
+        self.expressions, self.model = expressions, expressions.model
+        self.equations = expressions.equations
+        n = expressions.layout
+        self.states = n.components * n.rotations + n.y + n.lam + n.near
+        self._bounds = np.cumsum([0, n.components * n.rotations, n.y, n.lam, n.near]).tolist()
+        self._loads = len(self.model.connections)
+        still = expressions.given(ca.MX.zeros(n.factors))
+        parts = self._parts(still)
+        varying = varying if varying is not None else self._loaded()
+        self.sizes = {name: part.numel() for name, part in parts.items() if varying.get(name)}
+        self.symbol = ca.MX.sym("given", sum(self.sizes.values()))
+        self.given = self._given(parts)
+
+    def _loaded(self) -> dict[str, bool]:
+        expressions = self.expressions
+        found = {name: expressions.acts(name) for name in LOADS}
+        return found | {f"loads_{i}": any(g.loads[i].any() for g in expressions.loadings) for i in range(self._loads)}
+
+    @staticmethod
+    def _parts(given: Given) -> dict[str, ca.MX]:
+        """All parts by their names; those of groups of connections are numbered."""
+        parts: dict[str, ca.MX] = {"stiffness": given.stiffness, "tangent": given.tangent}
+        parts |= {f"data_{i}": part for i, part in enumerate(given.data)}
+        parts |= {name: getattr(given, name) for name in LOADS}
+        return parts | {f"loads_{i}": part for i, part in enumerate(given.loads)}
+
+    def _given(self, parts: Mapping[str, ca.MX]) -> Given:
+        bounds = np.cumsum([0, *self.sizes.values()]).tolist()
+        cut = dict(zip(self.sizes, ca.vertsplit(self.symbol, bounds), strict=True)) if self.sizes else {}
+        found: dict[str, Any] = {}
+        for name, part in parts.items():
+            value = ca.reshape(cut[name], *part.shape) if name in cut else part
+            base, _, number = name.partition("_")
+            if number:
+                found[base] = (*found.get(base, ()), value)
+            else:
+                found[name] = value
+        return Given(**{"data": (), "loads": ()} | found)
+
+    def given_of(self, loading: Loading, model: Model | None = None) -> Array:
+        """What is given under loads, with the data of this model or of another one of the same structure."""
+        data = data_of(model or self.model)
+        parts = [data[name] if name in data else self._load(name, loading) for name in self.sizes]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def _load(self, name: str, loading: Loading) -> Array:
+        base, _, number = name.partition("_")
+        part = loading.loads[int(number)] if number else getattr(loading, base)
+        if base in ("moment", "twist"):
+            part = part[:, 3 - self.expressions.turns :]
+        part = part.ravel()
+        if base == "pull" and self.expressions.reaching.nnz():
+            part = part - (self.expressions.reaching.T @ ca.DM(loading.force.ravel())).full().ravel()
+        return np.asarray(part)
+
+    # -- states -----------------------------------------------------------------------------------
+
+    def flat(self, state: State) -> Array:
+        """A state as one vector."""
+        return np.concatenate([state.q.ravel(), state.y, state.lam, state.wound])
+
+    def state(self, flat: Array) -> State:
+        """The state of a vector."""
+        q, y, lam, near = np.split(flat, self._bounds[1:-1])
+        return State(q.reshape(-1, self.expressions.layout.components), y, lam, near)
+
+    def _split(self, state: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
+        q, y, lam, near = ca.vertsplit(state, self._bounds)
+        return ca.reshape(q, self.expressions.layout.components, self.expressions.layout.rotations), y, lam, near
+
+    @functools.cached_property
+    def _symbols(self) -> tuple[ca.MX, tuple[ca.MX, ca.MX, ca.MX, ca.MX]]:
+        state = ca.MX.sym("state", self.states)
+        return state, self._split(state)
+
+    @property
+    def parts(self) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
+        """Rotations (components, rotations), displacements, multipliers and counted angles of the state's symbol."""
+        return self._symbols[1]
+
+    @property
+    def state_symbol(self) -> ca.MX:
+        """The state of which all expressions are made."""
+        return self._symbols[0]
+
+    def moved_expression(self, step: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Rotations and displacements after a step of all unknowns and multipliers."""
+        q, y, _, _ = self.parts
+        bounds = [0, self.equations.turning_unknowns, self.equations.unknowns, self.expressions.total]
+        return moved_by(self.expressions, q, self.expressions.spins(step)), y + ca.vertsplit(step, bounds)[1]
+
+    @functools.cached_property
+    def matrix(self) -> ca.MX:
+        """Newton's matrix, (total, total)."""
+        return self._matrix(self.stationarity.entries)
+
+    @functools.cached_property
+    def strain(self) -> ca.MX:
+        """Elastic energy of elements and connections."""
+        expressions, given, model = self.expressions, self.given, self.model
+        q, y, _, near = self.parts
+        total = ca.MX(0)
+        if expressions.elements:
+            turns = model.rotations.turns.ravel().tolist()
+            nothing = ca.MX.zeros(expressions.axes, expressions.elements * expressions.points)
+            energy = expressions.many(model.element.energy, expressions.elements)
+            total += ca.sum2(energy(q[:, turns], given.stiffness, given.tangent, nothing))
+        for found in self._linked(y, q, near):
+            total += ca.sum2(found[1])
+        return total
+
+    def _linked(self, y: ca.MX, q: ca.MX, near: ca.MX) -> Iterator[Sequence[ca.MX]]:
+        """Results of connections without multipliers, group by group."""
+        expressions, given = self.expressions, self.given
+        places = expressions.displacements(q, y, given)
+        for number, group in enumerate(self.model.connections):
+            n, count = len(group.data), group.kind.sizes[2]
+            data = *expressions.sides(group, q, places), expressions.data(number, given, near)
+            function = expressions.many(by_turning(group.kind), n)
+            yield function.call([*data, expressions.link_load(number, given), ca.MX.zeros(count, n)])
+
+    def _function(self, name: str, arguments: Mapping[str, ca.MX], results: Mapping[str, ca.MX]) -> ca.Function:
+        return ca.Function(
+            self._prefix + name, list(arguments.values()), list(results.values()), list(arguments), list(results)
+        )
+
+    # -- counted turns ------------------------------------------------------------------------------
+
+    def _angles(self, q: ca.MX, near: ca.MX) -> ca.MX:
+        """The angles that count turns, of all that look the same those nearest to ``near``."""
+        winding = self.model.winding
+        sides = np.where(winding.sides == GROUND, self.expressions.layout.rotations, winding.sides)
+        q = ca.horzcat(q, ca.DM([1.0, 0.0, 0.0, 0.0]))
+        crossed = np.asarray(winding.across.any(axis=1), dtype=float)
+        function = self.expressions.many(counted_angle(), winding.count)
+        a, b = (q[:, side.tolist()] for side in sides.T)
+        return function(a, b, ca.DM(winding.axis.T), ca.DM(winding.across.T), ca.DM(crossed[None, :]), near.T).T
+
+    def _wound(self, q: ca.MX, near: ca.MX, phi: ca.MX, there: ca.MX) -> ca.MX:
+        """The angles after rotations have turned by vectors about the fixed axes."""
+        winding = self.model.winding
+        if not winding.count:
+            return near
+        sides = np.where(winding.sides == GROUND, self.expressions.layout.rotations, winding.sides)
+        q_all, phi_all = ca.horzcat(q, ca.DM([1.0, 0.0, 0.0, 0.0])), ca.horzcat(phi, ca.DM.zeros(3))
+        carried = self.expressions.many(turned_vector(True), winding.count)(
+            q_all[:, sides[:, 0].tolist()], ca.DM(winding.axis.T)
+        )
+        apart = phi_all[:, sides[:, 1].tolist()] - phi_all[:, sides[:, 0].tolist()]
+        gained = ca.sum1(carried * apart).T
+        return self._angles(there, self._angles(q, near) + gained)
+
+    def _prescribed(self) -> ca.MX:
+        """Angles that motions prescribe, where rotations turn about one axis each, (near,)."""
+        winding, n = self.model.winding, self.expressions.layout
+        turn = ca.horzcat(ca.reshape(self.given.turn, 3, n.rotations), ca.DM.zeros(3))
+        sides = np.where(winding.sides == GROUND, n.rotations, winding.sides)
+        apart = turn[:, sides[:, 1].tolist()] - turn[:, sides[:, 0].tolist()]
+        about = ca.sum1(apart * ca.DM(winding.axis.T)).T
+        return ca.sign(about) * ca.sqrt(ca.sum1(apart**2)).T
+
+    def _held_near(self, near: ca.MX) -> ca.MX:
+        """Values near which angles count, those at their values that motions prescribe."""
+        winding = self.model.winding
+        held = np.append(self.model.rotations.kind == Turn.HELD, True)[winding.sides].all(axis=1)
+        known, prescribed = [near[i] for i in range(winding.count)], self._prescribed()
+        for i in np.flatnonzero(held).tolist():
+            known[i] = prescribed[i]
+        for angle, group, number, sign in winding.driven:
+            known[angle] = sign * self.given.loads[group][number]
+        return ca.vertcat(*known)
+
+    # -- functions ----------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def begin(self) -> ca.Function:
+        """(given) -> the undeformed state with held rotations at their prescribed values."""
+        n = self.expressions.layout
+        q = ca.DM.zeros(n.components, n.rotations)
+        if self.model.space:
+            q[0, :] = 1.0
+        parts = [ca.vec(self.expressions.held(ca.MX(q), self.given)), ca.MX.zeros(n.y + n.lam)]
+        if n.near:
+            parts.append(self._held_near(self._prescribed()))
+        return self._function("begin", {"given": self.symbol}, {"state": ca.densify(ca.vertcat(*parts))})
+
+    @functools.cached_property
+    def held_expression(self) -> ca.MX:
+        """The state with held rotations moved to their prescribed values."""
+        q, y, lam, near = self.parts
+        near = self._held_near(near) if self.expressions.layout.near else near
+        return ca.vertcat(ca.vec(self.expressions.held(ca.MX(q), self.given)), y, lam, near)
+
+    def moving(self, total: int) -> ca.MX:
+        """Derivative of the state by a step of all unknowns and multipliers, (states, total)."""
+        q, y, lam, near = self.parts
+        step = ca.MX.sym("step", total)
+        _, shift, more = ca.vertsplit(step, [0, self.equations.turning_unknowns, self.equations.unknowns, total])
+        there = moved_by(self.expressions, q, self.expressions.spins(step))
+        moved = ca.vertcat(ca.vec(there), y + shift, lam + more, near)
+        return ca.substitute([ca.jacobian(moved, step)], [step], [ca.DM.zeros(total)])[0]
+
+    @functools.cached_property
+    def hold(self) -> ca.Function:
+        """(state, given) -> the state with held rotations moved to their prescribed values."""
+        state, there = self._symbols[0], self.held_expression
+        return self._function("hold", {"state": state, "given": self.symbol}, {"held": there})
+
+    @functools.cached_property
+    def move(self) -> ca.Function:
+        """(state, step, share) -> the state after a share of a step of all unknowns and multipliers."""
+        state, (q, y, lam, near) = self._symbols
+        step, share = ca.MX.sym("step", self.expressions.total), ca.MX.sym("share")
+        turning, unknowns = self.equations.turning_unknowns, self.equations.unknowns
+        taken = share * step
+        _, shift, more = ca.vertsplit(taken, [0, turning, unknowns, self.expressions.total])
+        phi = self.expressions.spins(taken)
+        there = moved_by(self.expressions, q, phi)
+        moved = ca.vertcat(ca.vec(there), y + shift, lam + more, self._wound(q, near, phi, there))
+        return self._function("move", {"state": state, "step": step, "share": share}, {"moved": moved})
+
+    @functools.cached_property
+    def stationarity(self) -> Stationarity:
+        """The equations at :attr:`parts`."""
+        _, (q, y, lam, near) = self._symbols
+        places = self.expressions.displacements(q, y, self.given)
+        return Stationarity(self.expressions, q, y, lam, places, self.given, near)
+
+    @functools.cached_property
+    def places(self) -> StationarityPlaces:
+        """Where the entries of the matrix go."""
+        return StationarityPlaces(self.expressions)
+
+    def _matrix(self, entries: list[ca.MX]) -> ca.MX:
+        """The matrix with its whole diagonal, which regularisation and shifts are put on."""
+        row, column, weight, entry = self.places.tied
+        count, every = self.places.static.count, np.arange(self.expressions.total)
+        whole = (
+            np.concatenate([row, every]),
+            np.concatenate([column, every]),
+            np.concatenate([weight, np.ones(len(every))]),
+            np.concatenate([entry, np.full(len(every), count + 1)]),
+        )
+        return summed(self.expressions.total, whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
+
+    @functools.cached_property
+    def potential(self) -> ca.MX:
+        """Potential energy, zero of the undeformed, unloaded scene; without that of what has none."""
+        expressions, given, model = self.expressions, self.given, self.model
+        _, (q, y, _, near) = self._symbols
+        total = ca.MX(0)
+        if expressions.elements:
+            turns = model.rotations.turns.ravel().tolist()
+            pull = ca.reshape(given.pull, expressions.axes, expressions.elements * expressions.points)
+            energy = expressions.many(model.element.energy, expressions.elements)
+            total += ca.sum2(energy(q[:, turns], given.stiffness, given.tangent, pull))
+            total -= ca.dot(pull, given.tangent)
+        positions = model.positions
+        fixed = times(constant(positions.Y), y) + times(constant(positions.B), given.shift)
+        total -= ca.dot(given.force, fixed)
+        for found in self._linked(y, q, near):
+            total += ca.sum2(found[0])
+        if not model.space:
+            total -= ca.dot(given.moment, ca.vec(q))
+        elif model.winding.about:
+            angles = self._angles(q, near)
+            for turn, angle in model.winding.about.items():
+                moment = given.moment[3 * turn : 3 * turn + 3]
+                total -= ca.dot(moment, ca.DM(model.winding.axis[angle])) * angles[angle]
+        return total
+
+    @functools.cached_property
+    def _gaps(self) -> ca.MX:
+        _, (q, y, _, near) = self._symbols
+        return self.expressions.gaps(q, y, self.given, near)
+
+    @functools.cached_property
+    def at(self) -> ca.Function:
+        """(state, given) -> residual, its size relative to what is added up, potential, gaps, entries of the matrix."""
+        state, _ = self._symbols
+        residual = ca.densify(self.stationarity.residual)
+        size = ca.norm_inf(residual / ca.fmax(self.scale, TINY)) if self.expressions.total else ca.MX(0)
+        results = {
+            "residual": residual,
+            "size": size,
+            "potential": self.potential,
+            "gaps": self._sum_of_gaps(ca.vertsplit(residual, [0, self.equations.unknowns, self.expressions.total])[1]),
+            "entries": self.matrix.nz[:],
+        }
+        return self._function("at", {"state": state, "given": self.symbol}, results)
+
+    @functools.cached_property
+    def merit(self) -> ca.Function:
+        """(state, given) -> potential and sum of the gaps."""
+        state, _ = self._symbols
+        results = {"potential": self.potential, "gaps": self._sum_of_gaps(self._gaps)}
+        return self._function("merit", {"state": state, "given": self.symbol}, results)
+
+    def _sum_of_gaps(self, gaps: ca.MX) -> ca.MX:
+        return ca.norm_1(gaps) if self.equations.rows else ca.MX(0)
+
+    @property
+    def slice_of_loads(self) -> slice:
+        """Where loads and motions stand in what is given: after all data."""
+        data = sum(size for name, size in self.sizes.items() if is_data(name))
+        return slice(data, self.symbol.shape[0])
+
+    def slice_of(self, part: str) -> slice:
+        """Where a part stands in what is given; empty where it does not vary."""
+        names, bounds = list(self.sizes), np.cumsum([0, *self.sizes.values()]).tolist()
+        at = names.index(part) if part in names else None
+        return slice(0, 0) if at is None else slice(bounds[at], bounds[at + 1])
+
+    @functools.cached_property
+    def convex(self) -> ca.Function:
+        """(state, given) -> entries of the matrix with the elements' share made positive."""
+        expressions, model = self.expressions, self.model
+        state, (q, _, _, _) = self._symbols
+        entries = list(self.stationarity.entries)
+        if expressions.elements:
+            pull = ca.reshape(self.stationarity.pull, expressions.axes, expressions.elements * expressions.points)
+            function = expressions.many(model.element.convex, expressions.elements)
+            turns = model.rotations.turns.ravel().tolist()
+            entries[0] = ca.vec(function(q[:, turns], self.given.stiffness, self.given.tangent, pull))
+        matrix = self._matrix(entries).nz[:]
+        return self._function("convex", {"state": state, "given": self.symbol}, {"entries": matrix})
+
+    @functools.cached_property
+    def sparsity(self) -> ca.Sparsity:
+        """Pattern of the matrix."""
+        row, column, _, _ = self.places.tied
+        every = np.arange(self.expressions.total)
+        cells = np.unique(np.concatenate([column, every]) * self.expressions.total + np.concatenate([row, every]))
+        return pattern(self.expressions.total, cells % self.expressions.total, cells // self.expressions.total)
+
+    @functools.cached_property
+    def left(self) -> ca.Function:
+        """(entries, x, b) -> b - matrix x: what is left of a linear system."""
+        n = self.expressions.total
+        entries, x, b = ca.MX.sym("entries", self.sparsity.nnz()), ca.MX.sym("x", n), ca.MX.sym("b", n)
+        rest = b - ca.mtimes(ca.MX(self.sparsity, entries), x)
+        return self._function("left", {"entries": entries, "x": x, "b": b}, {"left": ca.densify(rest)})
+
+    @functools.cached_property
+    def linear(self) -> ca.Function:
+        """(entries, b) -> the solution of the linear system, which need not be symmetric."""
+        entries, b = ca.MX.sym("entries", self.sparsity.nnz()), ca.MX.sym("b", self.expressions.total)
+        x = ca.solve(ca.MX(self.sparsity, entries), b, "qr", {"eps": 1e-300})
+        return self._function("linear", {"entries": entries, "b": b}, {"x": ca.densify(x)})
+
+    @functools.cached_property
+    def scale(self) -> ca.MX:
+        """What rounding of each residual is judged by, as in :class:`~sfetcas.mechanics.equations.Point`."""
+        expressions, model, equations = self.expressions, self.model, self.equations
+        found = self.stationarity
+        _, (_, _, lam, _) = self._symbols
+        total = ca.MX(equations.noise)
+        absolute = ca.fabs(expressions.gather)
+        sums = ca.MX.zeros(expressions.of_places)
+        if expressions.elements:
+            pull = ca.reshape(ca.fabs(found.pull), expressions.axes * expressions.points, expressions.elements)
+            weights = np.repeat(model.beams.weight, expressions.axes, axis=1).T
+            carried = ca.sum1(pull * ca.DM(weights))
+            width = expressions.points * expressions.turns
+            moments = ca.fabs(found.moments) + ca.vec(ca.repmat(carried, width, 1))
+            sums += times(ca.fabs(expressions.onto_rotations), moments)
+        sums += ca.fabs(found.couples)
+        total += ca.mtimes(absolute[:, : expressions.of_places], sums)
+        for sides, values in found.shares:
+            total += times(ca.fabs(expressions.onto_unknowns(sides)), ca.fabs(ca.vec(values)))
+        if equations.displacement_unknowns:
+            closings = len(model.positions.rows)
+            acting = times(constant(model.positions.W.T.absolute), ca.fabs(lam[:closings]))
+            acting += times(constant(model.positions.Y.T.absolute), ca.fabs(found.on_places))
+            acting += UNLOADED * ca.norm_inf(acting) + 1e-12
+            turning = equations.turning_unknowns
+            total += ca.vertcat(ca.MX.zeros(turning), acting, ca.MX.zeros(equations.rows))
+            kept = equations.place_number[(model.positions.kept >= 0).all(axis=1)]
+            if len(kept):
+                flat = ca.reshape(total[kept.ravel().tolist()], expressions.axes, len(kept))
+                largest = functools.reduce(ca.fmax, ca.vertsplit(flat))
+                spread = ca.vec(ca.repmat(largest, expressions.axes, 1))
+                onto = sparse(kept.ravel(), np.arange(kept.size), np.ones(kept.size), (expressions.total, kept.size))
+                others = np.ones(expressions.total)
+                others[kept.ravel()] = 0.0
+                total = total * ca.DM(others) + ca.densify(ca.mtimes(onto, spread))
+        return total
+
+
+def data_of(model: Model) -> dict[str, Array]:
+    """The data of a model by their names, flat."""
+    found = {"stiffness": model.beams.stiffness.ravel(), "tangent": model.beams.tangent.ravel()}
+    return found | {f"data_{i}": group.data.ravel() for i, group in enumerate(model.connections)}
+
+
+def is_data(name: str) -> bool:
+    """Whether a part of what is given is data, and no load."""
+    return name in ("stiffness", "tangent") or name.startswith("data_")
+
+
+TINY = 1e-14
+"""Of the units of the model: where nothing acts and nothing is stiff, less than this is nothing."""
