@@ -91,9 +91,10 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     value = _value(scene, path, name)
     if isinstance(value, (list, tuple)):
         count = len(value)
-        if scene.resolved_dimension == "plane" and count == 3 and path[-1] in ("value", "displacement", "position"):
-            # What is out of the plane is no number of a plane scene; a moment is about z.
-            chosen = [2] if path[0] == "loads" and scene.loads[path[1]].type == "moment" else [0, 1]
+        if scene.resolved_dimension == "plane" and count == 3 and path[-1] in VECTORS:
+            # What is out of the plane is no number of a plane scene; moments and rotations are about z.
+            about = path[-1] == "rotation" or (path[0] == "loads" and scene.loads[path[1]].type == "moment")
+            chosen = [2] if about else [0, 1]
         else:
             chosen = list(range(count))
         values = tuple(float(value[i]) for i in chosen)
@@ -121,6 +122,9 @@ def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
         raise SceneError(f"found {name!r}, accepted: a number of the scene, or a list of numbers", ("arguments",))
     return here
 
+
+VECTORS = ("value", "displacement", "rotation", "position", "gravity", "direction", "anchor")
+"""Keys of vectors."""
 
 UNITS = {
     "displacement": "m",

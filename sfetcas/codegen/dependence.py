@@ -22,7 +22,7 @@ __all__ = ["Dependence", "Number", "found"]
 EXACT = 1e-12
 """Share of the largest value of a part that a polynomial may miss where it is tested: rounding of the probes."""
 
-DEGREES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+DEGREES = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 """Degrees that are tried one after the other."""
 
 GLOBAL = 4
@@ -189,16 +189,15 @@ class _Probing:
     def _told(self, changes: dict[int, float]) -> str:
         return ", ".join(f"{self.numbers[i].name} = {value:.6g}" for i, value in changes.items())
 
-    def differs(self, a: Array, b: Array) -> Array:
-        """Which data differ by more than rounding."""
-        return np.abs(a - b) > EXACT * np.maximum(self.unit, 1e-300)
+    def differs(self, a: Array, b: Array, times: float = 1.0) -> Array:
+        """Which data differ by more than rounding, or some times that."""
+        return np.abs(a - b) > times * EXACT * np.maximum(self.unit, 1e-300)
 
     def groups(self) -> list[tuple[int, ...]]:
         """Numbers that act together on any datum."""
         count = len(self.numbers)
         ends = [self._end(i) for i in range(count)]
-        moved = [self.at({i: ends[i]}) for i in range(count)]
-        touched = [self.differs(data, self.base) for data in moved]
+        self.moved = [self.at({i: ends[i]}) for i in range(count)]
         parent = list(range(count))
 
         def root(i: int) -> int:
@@ -206,12 +205,16 @@ class _Probing:
                 i = parent[i]
             return i
 
-        for i, j in itertools.combinations(range(count), 2):
-            both = self.at({i: ends[i], j: ends[j]})
-            mixed = both - moved[i] - moved[j] + self.base
-            if (np.abs(mixed) > 4.0 * EXACT * np.maximum(self.unit, 1e-300)).any():
-                parent[root(i)] = root(j)
-        self.touched = touched
+        def mixed(chosen: Sequence[int]) -> bool:
+            """Whether some numbers do more together than each does by itself."""
+            apart = sum((self.moved[i] - self.base for i in chosen), self.base)
+            return bool(self.differs(self.at({i: ends[i] for i in chosen}), apart, 4.0).any())
+
+        # Mostly none do: one probe says so.
+        if count > 1 and mixed(range(count)):
+            for i, j in itertools.combinations(range(count), 2):
+                if mixed((i, j)):
+                    parent[root(i)] = root(j)
         roots = [root(i) for i in range(count)]
         return [tuple(i for i in range(count) if roots[i] == r) for r in dict.fromkeys(roots)]
 
@@ -225,6 +228,8 @@ class _Probing:
         """Least degree that tells how data depend on one number, the others at their values."""
         number = self.numbers[i]
         centre, half = number.span
+        if self._linear(i):
+            return 1
         tests = [centre + half * x for x in (-0.97, -0.31, 0.47, 0.89)]
         wanted = [self.at({i: x}) for x in tests]
         for degree in DEGREES:
@@ -244,9 +249,22 @@ class _Probing:
         message = f"found {number.low:g} to {number.high:g}, where no polynomial tells how the model depends on it"
         raise SceneError(f"{message}, accepted: a smaller range", ("arguments", number.name))
 
+    def _linear(self, i: int) -> bool:
+        """Whether data depend on one number linearly, the others at their values."""
+        number = self.numbers[i]
+        (centre, half), slope = number.span, (self.moved[i] - self.base) / (self._end(i) - number.value)
+        for x in (centre - 0.61 * half, centre + 0.37 * half):
+            if self.differs(self.at({i: x}), self.base + slope * (x - number.value), 2.0).any():
+                return False
+        return True
+
     def fitted(self, group: tuple[int, ...]) -> _Together:
         """The polynomial of numbers that act together."""
         degrees = tuple(self.degree(i) for i in group)
+        if degrees == (1,):
+            values = (self.moved[group[0]] - self.base)[None, :]
+            rows = np.array([[self._end(group[0]) - self.numbers[group[0]].value]])
+            return self._solved(group, degrees, rows, values)
         count = int(np.prod([degree + 1 for degree in degrees]))
         names = ", ".join(self.numbers[i].name for i in group)
         if count > MOST_PROBES:
@@ -260,6 +278,10 @@ class _Probing:
         basis = _basis([self.numbers[i] for i in group], degrees)
         rows = np.array([np.array(basis(ca.DM(point))).ravel() for point in points])
         values = np.stack([self.at(dict(zip(group, point, strict=True))) for point in points]) - self.base
+        return self._solved(group, degrees, rows, values)
+
+    def _solved(self, group: tuple[int, ...], degrees: tuple[int, ...], rows: Array, values: Array) -> _Together:
+        """Coefficients by what the basis is at some probes, and what data gain there."""
         entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, 1e-300)).any(axis=0))
         coefficients = np.linalg.lstsq(rows, values[:, entries], rcond=None)[0].T
         largest = np.abs(rows).max(axis=0)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
+from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
@@ -46,6 +47,8 @@ class EquilibriumSolver:
     rules : Rules
     start : ndarray or None
         State that a cold solve begins with; None for the undeformed one.
+    answer : Equilibrium
+        That of statics for the last step of the scene, on a finer mesh: what the accuracy was checked by.
     """
 
     name: str
@@ -54,6 +57,7 @@ class EquilibriumSolver:
     results: Results
     rules: Rules
     start: Array | None
+    answer: Equilibrium
 
     @property
     def model(self) -> Model:
@@ -153,7 +157,7 @@ def equilibrium_solver(
         A scene that cannot be exported, a number or a result that it does not have.
     """
     _refuse(scene)
-    mesh, assembly = _mesh(scene, settings or Settings())
+    mesh, assembly, answer = _mesh(scene, settings or Settings())
     base = assemble(scene, mesh, assembly=assembly)
     prepared = Prepared(base)
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
@@ -167,7 +171,7 @@ def equilibrium_solver(
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = known.program.flat(prepared.guess(base.loading(scene.analysis.steps[-1]))[0])
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
-    return EquilibriumSolver(name, scene, known, told, rules, start)
+    return EquilibriumSolver(name, scene, known, told, rules, start, answer)
 
 
 def _refuse(scene: Scene) -> None:
@@ -191,8 +195,8 @@ def _refuse(scene: Scene) -> None:
         raise SceneError("found 'modes', accepted: static or path, whose equilibria are exported", ("analysis", "type"))
 
 
-def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any]:
-    """The mesh that the accuracy asks for, and the assembly."""
+def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
+    """The mesh that the accuracy asks for, the assembly, and the answer of statics."""
     static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
     still = scene.model_copy(update={"analysis": static})
     try:
@@ -206,7 +210,7 @@ def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any]:
         # The answer of statics is on twice the elements that its accuracy asks for.
         flexible = [n for n, member in scene.members.items() if member.type == "flexible"]
         mesh = replace(mesh, cuts={n: every_other(c) if n in flexible else c for n, c in mesh.cuts.items()})
-    return mesh, model.assembly
+    return mesh, model.assembly, solution.last
 
 
 def _places(members: Sequence[str], given: Place) -> dict[str, tuple[float, ...]]:

@@ -179,6 +179,7 @@ def _manifest(solver: EquilibriumSolver, sensitivities: bool) -> dict[str, Any]:
         "elements": solver.model.mesh.elements,
         "element": solver.model.element.name,
         "unknowns": program.expressions.total,
+        "error_estimate": solver.answer.certificate.error_estimate,
         "functions": ["solve", "defaults", "message", *(["sensitivities"] if sensitivities else [])],
         "sizes": {
             "arguments": len(solver.arguments.defaults),

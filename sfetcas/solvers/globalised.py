@@ -262,6 +262,8 @@ class Globalised:
 
     # -- the method -----------------------------------------------------------------------------------
 
+    # What overflows is seen where it is not finite, in C as here.
+    @np.errstate(over="ignore", invalid="ignore")
     def __call__(self, given: Array, start: Array | None = None) -> Outcome:
         """The equilibrium from a state, or from the undeformed one."""
         program, rules = self.program, self.rules

@@ -55,7 +55,7 @@ int main(void) {
     if (!(d <= worst)) worst = d;
   }
   for (k = 0; k < @NAME@_ARGUMENTS; ++k) bad[k] = NAN;
-  if (@NAME@_ARGUMENTS && @name@_solve(&memory, bad, state, 0, found, 0) != @NAME@_BAD_ARGUMENT) {
+  if (@NAME@_ARGUMENTS > 0 && @name@_solve(&memory, bad, state, 0, found, 0) != @NAME@_BAD_ARGUMENT) {
     printf("what is not a number was not refused\n");
     ++failed;
   }

@@ -1,0 +1,441 @@
+"""Generated C: the same numbers as in process, to the last bit; arguments, results, and what is refused."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import systems
+from scenes import cantilever, helix
+
+from sfetcas import Scene, SceneError, Settings, assemble, export, load, solve, solve_model
+from sfetcas.codegen.arguments import argument, default_arguments
+from sfetcas.codegen.equilibrium import equilibrium_solver
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.fields import Fields
+from sfetcas.solvers.globalised import Code
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+STATIC = [
+    file for file in sorted(PROBLEMS.glob("*.toml")) if load(file).analysis.type == "static" and not load(file).contacts
+]
+FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
+
+needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
+
+
+def built(folder, name, *, source="check.c", flags=FLAGS, compiler="gcc"):
+    """An executable of the folder."""
+    out = folder / f"{Path(source).stem}_built"
+    files = [str(folder / source), str(folder / f"{name}.c")]
+    subprocess.run([compiler, *flags, "-o", str(out), *files, "-lm", "-pthread"], check=True, cwd=folder)
+    return out
+
+
+def said(program, *arguments, code=0):
+    run = subprocess.run([str(program), *arguments], capture_output=True, text=True, check=False)
+    assert run.returncode == code, run.stdout + run.stderr
+    return run.stdout
+
+
+def beam(**more):
+    return Scene.from_dict(cantilever(value=[0.3, 4.0], **more))
+
+
+# -- the same numbers -----------------------------------------------------------------------------
+
+
+@needs_compiler
+@pytest.mark.parametrize("file", STATIC, ids=lambda file: file.stem)
+def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
+    scene = load(file)
+    solver = export(scene, tmp_path / "c", name="structure")
+    words = re.fullmatch(
+        r"(\d+) of (\d+) cases agree, (\d+) of them to the last bit.*\n", said(built(tmp_path / "c", "structure"))
+    )
+    assert words
+    outcome, results = solver.solve()
+    assert outcome.code in (Code.SOLVED, Code.UNSTABLE)
+    # What has no solution is told by its status only.
+    cases = int(words[2])
+    assert int(words[1]) == cases
+    assert int(words[3]) >= cases - 2
+    # Where the whole loads carry the undeformed structure is where they lead to when they grow, or its mirror image.
+    found, wanted = solver.by_name(results)["energy.elastic"], solver.answer.energy["elastic"]
+    assert float(found) == pytest.approx(wanted, rel=30.0 * scene.analysis.accuracy, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["linked", "sliding_plane", "linked_space", "sliding_space", "following_space"])
+def test_results_are_those_of_the_answer(name):
+    scene = Scene.from_dict(getattr(systems, name)())
+    places = {n: (0.0, 0.37, 1.0) for n, m in scene.members.items() if m.type == "flexible"}
+    solver = equilibrium_solver(scene, "c", places=places)
+    outcome, flat = solver.solve()
+    assert outcome.code is Code.SOLVED
+    program, model = solver.arguments.program, solver.model
+    base = assemble(scene, model.mesh, assembly=model.assembly)
+    fields = Fields(Equations(base), program.state(outcome.state), base.loading(scene.analysis.steps[-1]))
+    units = {"force": base.scales.force, "moment": base.scales.moment, "position": base.scales.length}
+    for result, value in solver.by_name(flat).items():
+        kind, _, rest = result.partition(".")
+        what, _, key = rest.rpartition(".")
+        if kind == "nodes":
+            wanted = fields.position(what) if key == "position" else fields.rotation(what)
+        elif kind == "reactions":
+            wanted = fields.reaction(what)[key == "moment"]
+        elif kind == "members":
+            wanted = fields.along(what, np.array(places[what]))["rotation" if key in ("angle", "quaternion") else key]
+        elif kind == "springs":
+            wanted = fields.spring(what).to_dict()[key]
+        else:
+            continue
+        difference = np.abs(value - np.reshape(wanted, value.shape)).max()
+        # Residuals of 1e-10 are left.
+        assert difference <= 1e-9 * units.get(key, 1.0) * max(1.0, np.abs(wanted).max()), result
+
+
+# -- arguments ------------------------------------------------------------------------------------
+
+
+def changed(table, path, value):
+    """A table of a scene with another number."""
+    table = json.loads(json.dumps(table))
+    *way, last = path.split(".")
+    here = table
+    for key in way:
+        here = here[int(key)] if isinstance(here, list) else here[key]
+    here[int(last) if isinstance(here, list) else last] = value
+    return table
+
+
+ARGUMENTS = [
+    ("linked", "loads.tip.value.1", None, -1.7),
+    ("linked", "springs.knee.stiffness", None, 2.9),
+    ("helix", "sections.s.GJ", None, 1.3),
+    ("cantilever", "sections.s.EI3", None, 0.37),
+    ("cantilever", "nodes.B.position.0", (0.7, 1.4), 1.21),
+    ("cantilever", "factor", None, -0.8),
+]
+
+
+def table_of(name):
+    if name == "cantilever":
+        return cantilever(value=[0.3, 4.0])
+    return helix() if name == "helix" else getattr(systems, name)()
+
+
+@pytest.mark.parametrize(("name", "path", "span", "value"), ARGUMENTS)
+def test_arguments_are_numbers_of_the_scene(name, path, span, value):
+    scene = Scene.from_dict(table_of(name))
+    solver = equilibrium_solver(scene, "c", arguments={path: span})
+    outcome, flat = solver.solve([value])
+    assert outcome.code is Code.SOLVED
+    factor = value if path == "factor" else scene.analysis.steps[-1]
+    other = scene if path == "factor" else Scene.from_dict(changed(scene.to_dict(), path, value))
+    # IPOPT on the same mesh: nothing of the export takes part.
+    answer = solve_model(assemble(other, solver.model.mesh, assembly=solver.model.assembly), factor)
+    found = solver.by_name(flat)
+    for node in scene.nodes:
+        assert found[f"nodes.{node}.position"] == pytest.approx(answer.position(node), abs=1e-9)
+    for node, record in scene.nodes.items():
+        if record.support != "free":
+            assert found[f"reactions.{node}.force"] == pytest.approx(answer.reaction(node)[0], abs=1e-8)
+
+
+def test_arguments_that_act_together():
+    table = cantilever(value=[0.0, 1.0])
+    table["gravity"] = [0.0, -2.0]
+    table["sections"]["s"]["rhoA"] = 0.7
+    scene = Scene.from_dict(table)
+    names = ["gravity", "sections.s.rhoA", "loads.tip.value", "factor"]
+    solver = equilibrium_solver(scene, "c", arguments=names)
+    assert solver.arguments.arguments[0].names == ("gravity.0", "gravity.1")
+    numbers = [0.4, -1.3, 1.9, 0.3, 0.6, 1.7]
+    _, flat = solver.solve(numbers)
+    table["gravity"], table["sections"]["s"]["rhoA"] = numbers[:2], numbers[2]
+    table["loads"]["tip"]["value"] = numbers[3:5]
+    answer = solve_model(assemble(Scene.from_dict(table), solver.model.mesh), numbers[5])
+    assert solver.by_name(flat)["nodes.B.position"] == pytest.approx(answer.position("B"), abs=1e-10)
+
+
+def test_sensitivities_are_differences():
+    scene = Scene.from_dict(systems.linked())
+    first = next(iter(scene.loads))
+    names = [f"loads.{first}.value", f"springs.{next(iter(scene.springs))}.stiffness"]
+    solver = equilibrium_solver(scene, "c", arguments=names)
+    base = solver.arguments.defaults
+    outcome, _ = solver.solve()
+    given = np.array(solver.prepare(base)).ravel()
+    found = np.array(solver.sensitivities(base, outcome.state, given)).reshape(-1, len(base))
+    for i in range(len(base)):
+        step = np.zeros(len(base))
+        step[i] = 1e-5
+        ahead, behind = (solver.solve(base + sign * step)[1] for sign in (1.0, -1.0))
+        wanted = (ahead - behind) / 2e-5
+        # Rounding of results of residual 1e-12 over the step, and its square.
+        assert np.abs(found[:, i] - wanted).max() <= 1e-6 * max(1.0, np.abs(wanted).max())
+
+
+def test_compliance_is_what_a_small_load_does():
+    scene = beam()
+    names = ["nodes.B.position", "nodes.B.angle", "compliance.B", "stiffness.B"]
+    solver = equilibrium_solver(scene, "c", arguments=["loads.tip.value"], results=names)
+    found = solver.by_name(solver.solve()[1])
+    assert found["compliance.B"] @ found["stiffness.B"] == pytest.approx(np.eye(3), abs=1e-9)
+    for i in range(2):
+        step = np.zeros(2)
+        step[i] = 1e-5
+        ahead, behind = (
+            solver.by_name(solver.solve(solver.arguments.defaults + sign * step)[1]) for sign in (1.0, -1.0)
+        )
+        wanted = (ahead["nodes.B.position"][:2] - behind["nodes.B.position"][:2]) / 2e-5
+        assert found["compliance.B"][:2, i] == pytest.approx(wanted, rel=1e-6, abs=1e-7)
+        turned = float(ahead["nodes.B.angle"] - behind["nodes.B.angle"]) / 2e-5
+        assert found["compliance.B"][2, i] == pytest.approx(turned, rel=1e-6, abs=1e-7)
+
+
+def test_default_arguments():
+    assert default_arguments(beam()) == ["factor", "loads.tip.value"]
+    assert argument(beam(), "loads.tip.value").default == (0.3, 4.0)
+    scene = load(PROBLEMS / "portal_frame_sprung_feet.toml")
+    assert "factor" not in default_arguments(scene) or scene.gravity is not None
+
+
+# -- the files ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("generated") / "c"
+    export(beam(), place, name="strip", results=["nodes.B.position", "reactions.A.moment"], sensitivities=True)
+    return place
+
+
+def test_files_stand_alone(folder):
+    source = (folder / "strip.c").read_text()
+    assert {line for line in source.splitlines() if line.startswith("#include")} == {
+        '#include "strip.h"',
+        "#include <math.h>",
+    }
+    assert not re.search(r"\b(malloc|calloc|realloc|free)\b", source)
+    # All that is static is a function or constant: nothing is kept from call to call.
+    kept = [line for line in source.splitlines() if re.match(r"\s*static ", line) and "const" not in line]
+    assert all("(" in line for line in kept)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert [one["name"] for one in manifest["arguments"]] == ["factor", "loads.tip.value"]
+    assert manifest["arguments"][1]["default"] == [0.3, 4.0]
+    assert manifest["results"][0] == {
+        "name": "nodes.B.position",
+        "constant": "STRIP_RES_NODES_B_POSITION",
+        "first": 0,
+        "size": 3,
+        "shape": [3],
+        "unit": "m",
+        "meaning": "position of the node B",
+    }
+    names = {file.name for file in folder.iterdir()}
+    own = {"strip.c", "strip.h", "strip.py", "main.c", "check.c", "manifest.json"}
+    assert own | {"Makefile", "CMakeLists.txt", "README.md"} <= names
+
+
+@needs_compiler
+def test_example_reads_arguments_and_prints(folder):
+    program = built(folder, "strip", source="main.c")
+    lines = said(program, "factor=0.5", "loads.tip.value.1=8").splitlines()
+    found = [float(x) for x in lines[1].partition(": ")[2].split()]
+    wanted = solve(Scene.from_dict(cantilever(value=[0.15, 4.0]))).last.position("B")
+    assert found == pytest.approx(wanted, abs=2e-4)
+    assert said(program, "loads.tip.value=1", code=2) == ""
+    assert said(program, "factor=", code=2) == ""
+
+
+@needs_compiler
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs a C++ compiler")
+def test_cpp_takes_it(folder):
+    flags = ["-x", "c++", "-O1", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
+    assert "agree" in said(built(folder, "strip", flags=flags, compiler="g++"))
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="needs clang")
+def test_clang_takes_it(folder):
+    assert "agree" in said(built(folder, "strip", compiler="clang"))
+
+
+@needs_compiler
+def test_sanitizers_are_silent(folder):
+    flags = ["-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    assert "agree" in said(built(folder, "strip", flags=flags))
+
+
+THREADS = """
+#include <pthread.h>
+#include <stdio.h>
+#include "strip.h"
+#define N 4
+#define SOLVES 200
+typedef struct { strip_memory memory; double p[STRIP_ARGUMENTS], x[STRIP_STATE], r[SOLVES][STRIP_RESULTS]; } job;
+static job jobs[N], serial;
+static void work(job *one, int which) {
+  int i;
+  strip_defaults(one->p);
+  for (i = 0; i < SOLVES; ++i) {
+    one->p[0] = 0.1 * which + 0.01 * i;
+    strip_solve(&one->memory, one->p, one->x, 0, one->r[i], 0);
+  }
+}
+static void *start(void *one) { work((job *)one, (int)((job *)one - jobs)); return 0; }
+int main(void) {
+  pthread_t threads[N];
+  int i, k, n, wrong = 0;
+  for (i = 0; i < N; ++i) pthread_create(&threads[i], 0, start, &jobs[i]);
+  for (i = 0; i < N; ++i) pthread_join(threads[i], 0);
+  for (i = 0; i < N; ++i) {
+    work(&serial, i);
+    for (k = 0; k < SOLVES; ++k)
+      for (n = 0; n < STRIP_RESULTS; ++n) wrong += serial.r[k][n] != jobs[i].r[k][n];
+  }
+  printf("%d", wrong);
+  return 0;
+}
+"""
+
+
+@needs_compiler
+def test_threads_give_the_serial_answers(folder):
+    (folder / "threads.c").write_text(THREADS)
+    assert said(built(folder, "strip", source="threads.c", flags=["-std=c99", "-O1"])) == "0"
+
+
+@needs_compiler
+def test_two_exports_in_one_program(folder, tmp_path):
+    other = tmp_path / "other"
+    export(beam(), other, name="second", arguments=[])
+    text = '#include "strip.h"\n#include "second.h"\n#include <stdio.h>\n'
+    text += "static strip_memory a; static second_memory b; static double x[9999], p[9], r[999];\n"
+    text += "int main(void){int s; strip_defaults(p); s = strip_solve(&a, p, x, 0, r, 0);\n"
+    text += 's += second_solve(&b, p, x, 0, r, 0); printf("%d %s", s, second_message(0)); return 0;}\n'
+    (tmp_path / "both.c").write_text(text)
+    files = [str(tmp_path / "both.c"), str(folder / "strip.c"), str(other / "second.c")]
+    out = tmp_path / "both"
+    command = ["gcc", "-std=c99", "-O1", f"-I{folder}", f"-I{other}", "-o", str(out), *files, "-lm"]
+    subprocess.run(command, check=True)
+    assert said(out).startswith("0 an equilibrium")
+
+
+@needs_compiler
+def test_loader_needs_neither_sfetcas_nor_numpy(folder):
+    subprocess.run(["make", "libstrip.so"], cwd=folder, check=True, capture_output=True)
+    text = "import sys, strip\ns = strip.Solver()\na = s.solve({'factor': 0.5})\n"
+    text += "b = s.solve({'factor': 0.51}, warm=True)\nbad = s.solve({'factor': float('nan')})\n"
+    text += "assert 'numpy' not in sys.modules\n"
+    text += "print(a['status'], b['iterations'] < a['iterations'], bad['nodes.B.position'], *a['nodes.B.position'])\n"
+    run = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=True)
+    status, sooner, bad, *position = run.stdout.split()
+    assert (status, sooner, bad) == ("0", "True", "None")
+    wanted = solve(Scene.from_dict(cantilever(value=[0.15, 2.0]))).last.position("B")
+    assert [float(x) for x in position] == pytest.approx(wanted, abs=2e-4)
+    wrong = "import strip; strip.Solver().solve({'loads.tip.value': [1.0]})"
+    run = subprocess.run([sys.executable, "-c", wrong], cwd=folder, capture_output=True, text=True, check=False)
+    assert "loads.tip.value: found 1 numbers, accepted: 2" in run.stderr
+
+
+@needs_compiler
+def test_no_solution_is_a_status_and_no_numbers(tmp_path):
+    scene = Scene.from_dict({**cantilever(value=[0.0, 1.0]), "analysis": {"type": "static"}})
+    solver = export(scene, tmp_path / "c", name="c")
+    for load_of in (1e300, -1e200):
+        outcome, results = solver.solve([load_of, 0.0, 1.0])
+        if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
+            assert np.isnan(results).all()
+    outcome, results = solver.solve([np.nan, 0.0, 1.0])
+    assert outcome.code is Code.BAD_ARGUMENT
+    assert np.isnan(results).all()
+    text = '#include "c.h"\n#include <stdio.h>\n#include <math.h>\nstatic c_memory m; static double x[C_STATE];\n'
+    text += "int main(void){double p[C_ARGUMENTS], r[C_RESULTS]; c_report e; int s; c_defaults(p); p[0] = 1e300;\n"
+    text += 's = c_solve(&m, p, x, 0, r, &e); printf("%d %d", s == e.status, s <= 1 ? isfinite(r[0]) : isnan(r[0]));\n'
+    text += "return 0;}\n"
+    (tmp_path / "c" / "huge.c").write_text(text)
+    assert said(built(tmp_path / "c", "c", source="huge.c")) == "1 1"
+
+
+# -- in process -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["lee", "bend_45_degrees", "four", "spatial_loop_ball", "clamped_rod_end_twist"])
+def test_newton_in_process_gives_the_answers_of_ipopt(name):
+    files = [file for file in STATIC if name in file.stem][:2]
+    for file in files:
+        scene = load(file)
+        both = [solve(scene, Settings(solver=solver)).steps for solver in ("ipopt", "newton")]
+        for one, other in zip(*both, strict=True):
+            for node in scene.nodes:
+                size = scene.size * scene.analysis.accuracy
+                assert one.position(node) == pytest.approx(other.position(node), abs=2.0 * size)
+
+
+def test_newton_is_deterministic():
+    solver = equilibrium_solver(beam(), "c")
+    first, second = (solver.solve() for _ in range(2))
+    assert np.array_equal(first[0].state, second[0].state)
+    warm, _ = solver.solve(start=first[0].state)
+    assert warm.iterations < first[0].iterations
+    assert warm.code is Code.SOLVED
+
+
+# -- refusals -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"arguments": ["loads.tup.value"]}, "found 'tup', accepted: tip; did you mean 'tip'?"),
+        ({"arguments": ["loads.tip.type"]}, "found 'loads.tip.type', accepted: a number of the scene"),
+        ({"arguments": ["nodes.B.position.0"]}, "found no range, accepted"),
+        ({"arguments": {"factor": (2.0, 1.0)}}, "found 2 to 1, accepted: a range from low to high"),
+        ({"arguments": {"nodes.B.position.0": (0.0, 1.0)}}, "arguments"),
+        ({"results": ["nodes.B.speed"]}, "found 'speed', accepted: angle, position"),
+        ({"results": ["shape"]}, "found 'shape', accepted: nodes.*"),
+        ({"places": {"m": (0.0, 1.5)}}, "found [1.5], accepted: fractions from 0 to 1"),
+        ({"places": {"bean": (0.0,)}}, "found 'bean', accepted: a flexible member"),
+        ({"name": "2nd"}, "found '2nd', accepted: a name of letters"),
+        ({"name": "struct"}, "found 'struct', accepted"),
+    ],
+)
+def test_what_cannot_be_exported_is_said(options, sentence, tmp_path):
+    with pytest.raises(SceneError, match=re.escape(sentence)):
+        export(beam(), tmp_path / "c", **options)
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "sentence"),
+    [
+        ("floor_heavy_cantilever", "contacts: contact is found by a search that is not exported"),
+        ("vibration_turning_1", "turning axes are not exported"),
+        ("vibration_clamped_free", "analysis.type: found 'modes', accepted"),
+    ],
+)
+def test_scenes_that_cannot_be_exported(file, sentence, tmp_path):
+    with pytest.raises(SceneError, match=re.escape(sentence)):
+        export(load(PROBLEMS / f"{file}.toml"), tmp_path / "c")
+
+
+def test_folders_are_not_lost(tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("x")
+    with pytest.raises(SceneError, match="exists and is not empty"):
+        export(beam(), tmp_path / "full")
+    with pytest.raises(SceneError, match="holds no earlier export"):
+        export(beam(), tmp_path / "full", overwrite=True)
+    with pytest.raises(SceneError, match="is no folder"):
+        export(beam(), tmp_path / "full" / "mine.txt")
+    with pytest.raises(SceneError, match="found no folder"):
+        export(beam(), tmp_path / "none" / "c")
+    export(beam(), tmp_path / "c", arguments=[])
+    export(beam(), tmp_path / "c", overwrite=True)
+    assert "factor" in (tmp_path / "c" / "manifest.json").read_text()
+    assert [file.name for file in (tmp_path / "full").iterdir()] == ["mine.txt"]
