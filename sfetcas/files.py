@@ -33,10 +33,15 @@ def write_folder(path: Path, writer: Callable[[Path], Any]) -> None:
     """Write a folder of files beside its final name first; it takes the place of one that is there."""
     try:
         with tempfile.TemporaryDirectory(dir=path.parent) as place:
-            writer(Path(place) / "new")
+            new, old = Path(place) / "new", Path(place) / "old"
+            writer(new)
             if path.exists():
-                os.replace(path, Path(place) / "old")
-            os.replace(Path(place) / "new", path)
+                os.replace(path, old)
+            try:
+                os.replace(new, path)
+            finally:
+                if old.exists() and not path.exists():
+                    os.replace(old, path)
     except (OSError, ValueError, ArithmeticError) as error:
         raise SceneError(f"{path}: could not be written: {error}") from None
 

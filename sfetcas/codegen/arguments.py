@@ -51,6 +51,15 @@ class Argument:
     components: tuple[int, ...] | None = None
 
     @property
+    def limits(self) -> tuple[float, float]:
+        """Least and largest value that is accepted: its range, and of sections what is positive."""
+        if self.low is not None and self.high is not None:
+            return self.low, self.high
+        if self.name.startswith("sections."):
+            return float(np.nextafter(0.0, 1.0)), np.inf
+        return (0.0 if self.name.endswith(".stiffness") else -np.inf), np.inf
+
+    @property
     def names(self) -> tuple[str, ...]:
         """A name for each number."""
         if self.components is None:
@@ -86,7 +95,9 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
         default = float(scene.analysis.steps[-1])
         return Argument(name, (default,), "1", "factor of all loads and motions without a history", low, high)
     if path[0] == "histories" and len(path) == 2 and path[1] in scene.histories:
-        default = scene.histories[path[1]].factor(float(scene.analysis.steps[-1]))
+        # Of a motion what it begins with.
+        when = 0.0 if scene.analysis.type == "dynamic" else float(scene.analysis.steps[-1])
+        default = scene.histories[path[1]].factor(when)
         return Argument(name, (default,), "1", f"factor of what has the history {path[1]}", low, high)
     value = _value(scene, path, name)
     if isinstance(value, (list, tuple)):
@@ -189,6 +200,10 @@ class Arguments:
         numbers: list[Number] = []
         for one in self.arguments:
             numbers += [Number(n, x, one.low, one.high) for n, x in zip(one.names, one.default, strict=True)]
+        names = [number.name for number in numbers]
+        for name in names:
+            if names.count(name) > 1:
+                raise SceneError(f"found {name} more than once, accepted: each number once", ("arguments",))
         self._numbers = numbers
         self._groups = list(base.groups)
         # Factors multiply what the other numbers say: they are no matter for probes.
@@ -204,6 +219,11 @@ class Arguments:
     def _is_factor(self, name: str) -> bool:
         return name == FACTOR or bool(re.fullmatch(r"histories\.[^.]+", name))
 
+    def accepted(self, values: Array) -> bool:
+        """Whether values of the numbers are finite and within their limits."""
+        limits = [one.limits for one in self.arguments for _ in one.default]
+        return all(low <= x <= high and np.isfinite(x) for x, (low, high) in zip(values, limits, strict=True))
+
     # -- probes -------------------------------------------------------------------------------------
 
     def _generic(self) -> list[float]:
@@ -216,6 +236,7 @@ class Arguments:
 
     def _assembled(self, values: Sequence[float]) -> Model:
         table = self._scene.to_dict()
+        table["dimension"] = self._scene.resolved_dimension
         for i, value in zip(self._own, values, strict=True):
             _put(self._scene, table, self._numbers[i].name.split("."), float(value))
         try:
@@ -239,11 +260,7 @@ class Arguments:
         return np.concatenate([self._rest(model), *data_of(model).values(), *loads])
 
     def _dependence(self, everything: Program) -> Dependence:
-        sizes = everything.sizes
-        loads = [size for name, size in sizes.items() if not is_data(name)]
-        data = [size for name, size in sizes.items() if is_data(name)]
-        bounds = np.cumsum([0, self._undeformed, *data, *(loads * len(self._groups))]).tolist()
-        parts = [slice(a, b) for a, b in zip(bounds, bounds[1:], strict=False)]
+        lengths = self._lengths(everything)
         shape = self._data(self.model, everything).shape
 
         def probe(values: Sequence[float]) -> Array:
@@ -255,7 +272,27 @@ class Arguments:
                 raise SceneError("found arguments that change what the model is made of", ("arguments",))
             return flat
 
-        return found([self._numbers[i] for i in self._own], probe, parts)
+        return found([self._numbers[i] for i in self._own], probe, lengths)
+
+    def _lengths(self, everything: Program) -> Array:
+        """Lengths of the rows of what :meth:`_data` gives: of a point, an element, a place, a connection."""
+        expressions, sizes = self.expressions, everything.sizes
+        points, axes = expressions.points, expressions.axes
+        known = {"stiffness": points * self.model.element.stiffnesses, "tangent": points * axes, "turn": 3}
+        known |= dict.fromkeys(("pull", "tangential", "spread"), points * axes)
+        known |= dict.fromkeys(("force", "shift", "following"), axes)
+        known |= dict.fromkeys(("moment", "twist"), expressions.turns)
+        for i, group in enumerate(self.model.connections):
+            known |= {f"data_{i}": group.data.shape[1], f"loads_{i}": group.kind.sizes[4]}
+
+        def rows(names: Sequence[str]) -> list[Array]:
+            return [np.full(sizes[n] // max(known[n], 1), known[n], dtype=np.intp) for n in names]
+
+        data = [name for name in sizes if is_data(name)]
+        loads = [name for name in sizes if not is_data(name)]
+        rest = np.full(self._undeformed // 3, 3, dtype=np.intp)
+        found = np.concatenate([rest, *rows(data), *(rows(loads) * len(self._groups))])
+        return found[found > 0]
 
     def _split(self, flat: Any, cut: Callable[[Any, list[int]], Any]) -> tuple[list[Any], list[list[Any]]]:
         """Data, and loads by groups."""

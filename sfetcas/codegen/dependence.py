@@ -20,7 +20,10 @@ from ..mathematics.constants import times
 __all__ = ["Dependence", "Number", "found"]
 
 EXACT = 1e-12
-"""Share of the largest value of a part that a polynomial may miss where it is tested: rounding of the probes."""
+"""Share of its largest value that a polynomial of a datum may miss where it is tested: rounding of the probes."""
+
+ROUNDING = 1e-3
+"""What is less than this share of EXACT beside other data of its row is rounding of them."""
 
 DEGREES = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 """Degrees that are tried one after the other."""
@@ -134,7 +137,7 @@ def _basis(numbers: Sequence[Number], degrees: Sequence[int]) -> ca.Function:
     return ca.Function("basis", [x], [all_of_them - ca.DM(known)])
 
 
-def found(numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], parts: Sequence[slice]) -> Dependence:
+def found(numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], lengths: Array) -> Dependence:
     """The dependence of what a probe gives on numbers.
 
     Parameters
@@ -142,15 +145,15 @@ def found(numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], 
     numbers : sequence of Number
     probe : callable
         Data for values of the numbers.
-    parts : sequence of slice
-        Of the data: rounding of each is judged by its own largest value.
+    lengths : ndarray of int
+        Of rows of data that belong together, as those of an element: rounding is judged row by row.
 
     Raises
     ------
     SceneError
         No polynomial tells it.
     """
-    probing = _Probing(numbers, probe, parts)
+    probing = _Probing(numbers, probe, lengths)
     groups = tuple(probing.fitted(group) for group in probing.groups())
     result = Dependence(tuple(numbers), probing.base, tuple(group for group in groups if len(group.entries)))
     probing.check(result)
@@ -160,20 +163,19 @@ def found(numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], 
 class _Probing:
     """Probes of one set of numbers."""
 
-    def __init__(
-        self, numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], parts: Sequence[slice]
-    ) -> None:
+    def __init__(self, numbers: Sequence[Number], probe: Callable[[Sequence[float]], Array], lengths: Array) -> None:
         self.numbers, self._probe = list(numbers), probe
         self._values = [number.value for number in numbers]
         self.base = probe(self._values)
         self.unit = np.zeros(len(self.base))
-        self._parts = parts
+        self._lengths, self._rows = lengths, np.cumsum(lengths) - lengths
         self._see(self.base)
 
     def _see(self, data: Array) -> None:
-        """Judge by the largest values seen."""
-        for part in self._parts:
-            self.unit[part] = np.maximum(self.unit[part], np.abs(data[part]).max(initial=0.0))
+        """Judge each datum by the largest value that was seen of it, and rounding by the largest beside it."""
+        own = np.abs(data)
+        beside = np.maximum.reduceat(own, self._rows) if len(own) else own
+        np.maximum(self.unit, np.maximum(own, ROUNDING * np.repeat(beside, self._lengths)), out=self.unit)
 
     def at(self, changes: dict[int, float]) -> Array:
         """Data where some numbers have other values."""
@@ -198,6 +200,10 @@ class _Probing:
         count = len(self.numbers)
         ends = [self._end(i) for i in range(count)]
         self.moved = [self.at({i: ends[i]}) for i in range(count)]
+        for number, moved in zip(self.numbers, self.moved, strict=True):
+            if not self.differs(moved, self.base).any():
+                message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
+                raise SceneError(message, ("arguments", number.name))
         parent = list(range(count))
 
         def root(i: int) -> int:

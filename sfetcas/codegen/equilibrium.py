@@ -17,6 +17,7 @@ from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import every_other
+from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.globalised import Code, Globalised, Outcome, Rules
@@ -24,7 +25,7 @@ from ..solvers.prepared import Prepared
 from .arguments import Argument, Arguments, argument, default_arguments
 from .results import Results, default_results
 
-__all__ = ["EquilibriumSolver", "Place", "equilibrium_solver"]
+__all__ = ["EquilibriumSolver", "Place", "chosen_places", "equilibrium_solver", "refuse_search"]
 
 Place = Mapping[str, Sequence[float]]
 """Fractions of the length of members."""
@@ -93,16 +94,15 @@ class EquilibriumSolver:
         program, total = self.arguments.program, self.arguments.expressions.total
         p, state, given = ca.MX.sym("arguments", len(self.arguments.defaults)), program.state_symbol, program.symbol
         told = self.results.expression(program, self.arguments.undeformed(p))
-        by_p, by_state, by_given = (ca.jacobian(told, x) for x in (p, state, given))
-        given_by_p = ca.jacobian(self.arguments.given(p), p)
-        held = ca.jacobian(program.held_expression, given)
+        # Along the arguments only: whole derivatives by states would be a hundred times the code.
+        given_by_p = ca.densify(ca.jacobian(self.arguments.given(p), p))
         residual = program.stationarity.residual
         # What motions prescribe turns held nodes, too.
-        out = ca.jacobian(residual, given) + ca.mtimes(ca.jacobian(residual, state), held)
-        step = -ca.solve(program.matrix, ca.densify(ca.mtimes(out, given_by_p)), "qr", {"eps": 1e-300})
-        moves = program.moving(total)
-        changed = ca.mtimes(held, given_by_p) + ca.mtimes(moves, step)
-        found = by_p + ca.mtimes(by_given, given_by_p) + ca.mtimes(by_state, changed)
+        held_by_p = ca.densify(ca.jtimes(program.held_expression, given, given_by_p))
+        out = ca.jtimes(residual, given, given_by_p) + ca.jtimes(residual, state, held_by_p)
+        step = -ca.solve(program.matrix, ca.densify(out), "qr", {"eps": 1e-300})
+        changed = ca.densify(held_by_p + ca.mtimes(program.moving(total), step))
+        found = ca.jacobian(told, p) + ca.jtimes(told, given, given_by_p) + ca.jtimes(told, state, changed)
         names = ["arguments", "state", "given"]
         flat = ca.vec(ca.densify(found).T)
         return ca.Function(f"{self.name}_sensitivity", [p, state, given], [flat], names, ["sensitivities"])
@@ -117,11 +117,16 @@ class EquilibriumSolver:
         """
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         given = np.array(self.prepare(p)).ravel()
-        finite = bool(np.isfinite(p).all())
-        outcome = self.method(given if finite else given * np.nan, self.start if start is None else start)
+        good = self.arguments.accepted(p)
+        outcome = self.method(given if good else given * np.nan, self.start if start is None else start)
+        nothing = np.full(self.results.size, np.nan)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
-            return outcome, np.full(self.results.size, np.nan)
-        return outcome, np.array(self.tell(p, outcome.state, given)).ravel()
+            return outcome, nothing
+        try:
+            return outcome, np.array(self.tell(p, outcome.state, given)).ravel()
+        except RuntimeError:
+            # A stiffness of what is singular.
+            return outcome, nothing
 
     def by_name(self, results: Array) -> dict[str, Array]:
         """The results by their names, in their shapes."""
@@ -156,12 +161,17 @@ def equilibrium_solver(
     SceneError
         A scene that cannot be exported, a number or a result that it does not have.
     """
-    _refuse(scene)
+    refuse_search(scene)
+    if scene.analysis.type == "modes":
+        message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
+        raise SceneError(message, ("analysis", "type"))
     mesh, assembly, answer = _mesh(scene, settings or Settings())
     base = assemble(scene, mesh, assembly=assembly)
     prepared = Prepared(base)
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
-    told = Results(base, results or default_results(base), _places(members, places or {}))
+    unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
+    names = results or default_results(base, unique=unique)
+    told = Results(base, names, chosen_places(members, places or {}), unique=unique)
     chosen = arguments if arguments is not None else default_arguments(scene)
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
     own: list[Argument] = [argument(scene, n, span) for n, span in spans.items()]
@@ -171,11 +181,37 @@ def equilibrium_solver(
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = known.program.flat(prepared.guess(base.loading(scene.analysis.steps[-1]))[0])
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
-    return EquilibriumSolver(name, scene, known, told, rules, start, answer)
+    solver = EquilibriumSolver(name, scene, known, told, rules, start, answer)
+    return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
 
 
-def _refuse(scene: Scene) -> None:
-    """Refuse what this solver does not hold.
+def _answered(solver: EquilibriumSolver) -> Array:
+    """The answer of statics as a state to begin with."""
+    return solver.arguments.program.flat(transferred(solver.answer.model, solver.answer.state, solver.model))
+
+
+def _same(solver: EquilibriumSolver) -> bool:
+    """Whether a cold solve of the defaults leads to the answer of statics, on another mesh or not."""
+    outcome, _ = solver.solve()
+    if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
+        return False
+    found, wanted = outcome.state, _answered(solver)
+    turned = solver.arguments.program.state(found).q, solver.arguments.program.state(wanted).q
+    if solver.model.space:
+        apart = np.minimum(*(np.abs(turned[0] - sign * turned[1]).max(axis=1) for sign in (1.0, -1.0)))
+        return bool((apart < APART).all())
+    return bool((np.abs(turned[0] - turned[1]) < APART).all())
+
+
+APART = 0.05
+"""Rotations that differ by more, rad, are those of another equilibrium: meshes differ by less."""
+
+NOT_UNIQUE = "reactions are not unique"
+"""How a note of statics begins where closings depend on each other."""
+
+
+def refuse_search(scene: Scene) -> None:
+    """Refuse what takes a search that is not exported.
 
     Raises
     ------
@@ -191,8 +227,6 @@ def _refuse(scene: Scene) -> None:
             raise SceneError(message, ("springs", name, "stop"))
     if scene.rotating is not None:
         raise SceneError(f"turning axes are not exported, {instead}", ("rotating",))
-    if scene.analysis.type == "modes":
-        raise SceneError("found 'modes', accepted: static or path, whose equilibria are exported", ("analysis", "type"))
 
 
 def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
@@ -213,7 +247,14 @@ def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
     return mesh, model.assembly, solution.last
 
 
-def _places(members: Sequence[str], given: Place) -> dict[str, tuple[float, ...]]:
+def chosen_places(members: Sequence[str], given: Place) -> dict[str, tuple[float, ...]]:
+    """Where each member is told of.
+
+    Raises
+    ------
+    SceneError
+        A place that is none, or of what is no flexible member.
+    """
     for name, places in given.items():
         if name not in members:
             raise SceneError(f"found {name!r}, accepted: a flexible member", ("places",))

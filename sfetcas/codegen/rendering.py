@@ -1,24 +1,39 @@
-"""The C files of an equilibrium solver: its functions, its tables and the driver, put together."""
+"""What is common to all that is written as C: names, tables, constants, manifest, build files."""
 
 from __future__ import annotations
 
+import abc
+import json
 import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from importlib import resources
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from ..solvers.globalised import MEANINGS, Code
-from .equilibrium import EquilibriumSolver
-from .source import functions_in_c, sizes_of, sparsity_table, table
+from ..description.scene import Scene
+from ..mathematics.arrays import Array
+from ..mechanics.model import Model
+from .arguments import Arguments
+from .results import Results
+from .source import functions_in_c, sizes_of
 
-__all__ = ["constants", "filled", "identifiers", "solver_files", "template"]
+__all__ = ["Status", "Writer", "enumerated", "filled", "identifiers", "numbers", "row", "rows", "template"]
+
+Status = tuple[str, int, str]
+"""How a call may end: name, number, meaning."""
+
+WARNINGS = """#if defined(__GNUC__)
+/* What CasADi generates takes arguments that it may not need. */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+"""
 
 
 def template(name: str) -> str:
-    """A file of the driver."""
+    """A file that is filled in."""
     return resources.files(__package__).joinpath("templates").joinpath(name).read_text()
 
 
@@ -31,92 +46,265 @@ def identifiers(names: Iterable[str]) -> list[str]:
     """Names as parts of C identifiers, no two alike."""
     found: list[str] = []
     for name in names:
-        plain = re.sub(r"\W", "_", name).upper()
-        count = 2
-        unique = plain
+        plain = re.sub(r"\W", "_", name, flags=re.ASCII).upper()
+        count, unique = 2, plain
         while unique in found:
-            unique = f"{plain}_{count}"
-            count += 1
+            unique, count = f"{plain}_{count}", count + 1
         found.append(unique)
     return found
 
 
-def solver_files(solver: EquilibriumSolver, *, sensitivities: bool = False) -> dict[str, str]:
-    """Texts of ``NAME.c`` and ``NAME.h``."""
-    values = constants(solver, sensitivities)
-    header = filled(template("solver.h"), values)
-    functions = _functions(solver, sensitivities)
-    roots = {function.name() for function in functions} - {PIVOTS} | {"casadi_ldl", "casadi_ldl_solve"}
-    parts = [
-        f"/* {values['title']}\n *\n * Made by sfetcas; not meant to be read or changed. */",
-        '#include "@name@.h"\n',
-        "#if defined(__GNUC__)\n/* What CasADi generates takes arguments that it may not need. */\n"
-        '#pragma GCC diagnostic ignored "-Wunused-parameter"\n#endif\n',
-        functions_in_c(functions, solver.name, roots),
-        "/* ---- tables ---- */\n",
-        *_tables(solver),
-        template("solver.c"),
-        template("defaults.c"),
-    ]
-    if sensitivities:
-        parts.append(template("sensitivities.c"))
-    return {f"{solver.name}.h": header, f"{solver.name}.c": filled("\n".join(parts), values)}
+def enumerated(values: Sequence[Status]) -> str:
+    """Constants of an enum with what they mean."""
+    last = len(values) - 1
+    ends = ["," if i < last else "" for i in range(len(values))]
+    return "\n".join(f"  {n} = {v}{end} /* {_comment(what)} */" for (n, v, what), end in zip(values, ends, strict=True))
 
 
-def _functions(solver: EquilibriumSolver, sensitivities: bool) -> list[ca.Function]:
-    program, model = solver.arguments.program, solver.model
-    found = [solver.prepare, solver.tell, program.begin, program.hold, program.move, program.at, program.left]
-    if model.minimisable:
-        found += [program.merit, program.convex]
-    found.append(_pivots() if model.has_potential else program.linear)
-    return [*found, solver.sensitivities] if sensitivities else found
+def _comment(text: str) -> str:
+    """A text that no comment of C ends in, on one line."""
+    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
-PIVOTS = "with_pivots_as_they_come"
+def numbers(values: Array) -> str:
+    """Numbers in one line, no digit lost."""
+    return ", ".join(repr(float(x)) for x in np.asarray(values).ravel()) or "0.0"
 
 
-def _pivots() -> ca.Function:
-    """Any function that solves without pivots: the driver makes and uses factors itself, with what this one calls."""
-    matrix, b = ca.MX.sym("matrix", 2, 2), ca.MX.sym("b", 2)
-    return ca.Function(PIVOTS, [matrix, b], [ca.solve(matrix, b, "ldl")])
+def row(values: Array) -> str:
+    """Numbers in lines of five; zero for what is none."""
+    texts = [repr(float(x)) if np.isfinite(x) else "0.0" for x in values] or ["0.0"]
+    lines = [", ".join(texts[i : i + 5]) for i in range(0, len(texts), 5)]
+    return ",\n   ".join(lines)
 
 
-def constants(solver: EquilibriumSolver, sensitivities: bool = False) -> dict[str, object]:
-    """What the marks of the templates stand for."""
-    name, program = solver.name, solver.arguments.program
-    functions = _functions(solver, sensitivities)
-    sizes = sizes_of(functions)
-    total, entries = program.expressions.total, program.sparsity.nnz()
-    lower = _lower(program.sparsity)[0].nnz() if solver.model.has_potential else 0
-    sizes["w"] = max(sizes["w"], total)
-    upper = name.upper()
-    arguments = solver.arguments.arguments
-    results = solver.results.results
-    return {
-        "name": name,
-        "NAME": upper,
-        "title": (solver.scene.title or "an untitled scene").replace("*/", "* /"),
-        "casadi": ca.CasadiMeta.version(),
-        "arguments_in_words": _in_words([one.name for one in arguments]),
-        "n_arguments": len(solver.arguments.defaults),
-        "n_results": solver.results.size,
-        "n_states": program.states,
-        "argument_places": _places(f"{upper}_ARG", [(a.name, len(a.default), a.unit) for a in arguments]),
-        "result_places": _places(f"{upper}_RES", [(r.name, r.size, r.unit) for r in results]),
-        "statuses": _enumerated([(f"{upper}_{code.name}", int(code), MEANINGS[code]) for code in Code]),
-        "sz_given": max(1, program.symbol.shape[0]),
-        "sz_state": max(1, program.states),
-        "sz_total": max(1, total),
-        "sz_entries": max(1, entries),
-        "sz_lower": max(1, lower),
-        **{f"sz_{key}": value for key, value in sizes.items()},
-        "indent": " " * len(f"int {name}_solve("),
-        "defaults": ", ".join(repr(float(x)) for x in solver.arguments.defaults) or "0.0",
-        "messages": "\n".join(f'    case {upper}_{code.name}: return "{MEANINGS[code]}";' for code in Code),
-        "sensitivities_declared": filled(template("sensitivities.h"), {"name": name, "NAME": upper})
-        if sensitivities
-        else "",
-    }
+def rows(values: Sequence[Array]) -> str:
+    """The lines of an array of arrays."""
+    return ",\n".join(f"  {{{row(one)}}}" for one in values)
+
+
+class Writer(abc.ABC):
+    """Files of one export.
+
+    Parameters
+    ----------
+    name, scene, arguments, results
+        Of what is exported.
+    """
+
+    header: str
+    """Templates of the header, of the example, of the check, of the loader and of the README."""
+    example: str
+    check: str
+    loader: str
+    readme: str
+    bodies: tuple[str, ...]
+    """Templates of the driver."""
+
+    def __init__(self, name: str, scene: Scene, arguments: Arguments, results: Results) -> None:
+        self.name, self.scene, self.arguments, self.results = name, scene, arguments, results
+
+    # -- what each kind gives -----------------------------------------------------------------------
+
+    @property
+    @abc.abstractmethod
+    def functions(self) -> list[ca.Function]:
+        """What CasADi writes."""
+
+    @property
+    def roots(self) -> set[str]:
+        """What the driver calls: all functions, without others."""
+        return {function.name() for function in self.functions}
+
+    @property
+    @abc.abstractmethod
+    def statuses(self) -> list[Status]:
+        """How a call may end."""
+
+    @property
+    @abc.abstractmethod
+    def tables(self) -> list[str]:
+        """Constants of the driver."""
+
+    @property
+    @abc.abstractmethod
+    def states(self) -> int:
+        """Numbers of a state."""
+
+    @property
+    @abc.abstractmethod
+    def memory(self) -> int:
+        """Doubles of the memory beside those of the functions."""
+
+    @property
+    @abc.abstractmethod
+    def own(self) -> dict[str, object]:
+        """Marks that only this kind has."""
+
+    @property
+    @abc.abstractmethod
+    def cases(self) -> dict[str, object]:
+        """Marks of the check: what was computed in process."""
+
+    @property
+    @abc.abstractmethod
+    def about(self) -> dict[str, Any]:
+        """What the manifest says of this kind."""
+
+    # -- files ----------------------------------------------------------------------------------------
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.arguments.model
+
+    @property
+    def where(self) -> str:
+        """The dimension in words."""
+        return "space" if self.model.space else "the plane"
+
+    def files(self) -> dict[str, str]:
+        """Texts by the names of their files."""
+        values = {**self._values(), **self.own}
+        header = filled(template(self.header), values)
+        parts = [
+            "/* @title@\n *\n * Made by sfetcas; not meant to be read or changed. */",
+            '#include "@name@.h"\n',
+            WARNINGS,
+            functions_in_c(self.functions, self.name, self.roots),
+            "/* ---- tables ---- */\n",
+            *self.tables,
+            *(template(body) for body in (*self.bodies, "defaults.c")),
+        ]
+        source = filled("\n".join(parts), values)
+        manifest = self._manifest()
+        values |= self.cases | self._words(manifest)
+        values |= {mark: filled(template(f"{mark}.c"), values) for mark in ("entries", "put")}
+        return {
+            f"{self.name}.h": header,
+            f"{self.name}.c": source,
+            "manifest.json": json.dumps(manifest, indent=1) + "\n",
+            "main.c": filled(template(self.example), values),
+            "check.c": filled(template(self.check), values),
+            f"{self.name}.py": filled(template(self.loader), values),
+            "Makefile": filled(template("Makefile"), values),
+            "CMakeLists.txt": filled(template("CMakeLists.txt"), values),
+            "README.md": filled(template(self.readme), values),
+        }
+
+    def _values(self) -> dict[str, object]:
+        name, upper = self.name, self.name.upper()
+        known, told = self.arguments.arguments, self.results.results
+        sizes = sizes_of(self.functions)
+        sizes["w"] = max(sizes["w"], self.arguments.expressions.total)
+        statuses = [(f"{upper}_{key}", value, meaning) for key, value, meaning in self.statuses]
+        return {
+            "name": name,
+            "NAME": upper,
+            "title": _comment(self.scene.title or "an untitled scene"),
+            "title_in_python": json.dumps(self.scene.title or "an untitled scene")[1:-1],
+            "casadi": ca.CasadiMeta.version(),
+            "arguments_in_words": _in_words([one.name for one in known]),
+            "n_arguments": len(self.arguments.defaults),
+            "n_results": self.results.size,
+            "n_states": self.states,
+            "argument_places": _places(f"{upper}_ARG", [(a.name, len(a.default), a.unit) for a in known]),
+            "result_places": _places(f"{upper}_RES", [(r.name, r.size, r.unit) for r in told]),
+            "statuses": enumerated(statuses),
+            "messages": "\n".join(f'    case {key}: return "{meaning}";' for key, _, meaning in statuses),
+            "defaults": numbers(self.arguments.defaults),
+            "sz_state": max(1, self.states),
+            "sz_p": max(1, len(self.arguments.defaults)),
+            "sz_r": max(1, self.results.size),
+            **{f"sz_{key}": value for key, value in sizes.items()},
+        }
+
+    def _memory_bytes(self) -> int:
+        """An upper bound of the memory of a call, where pointers take eight bytes."""
+        sizes = sizes_of(self.functions)
+        work = max(sizes["w"], self.arguments.expressions.total)
+        return 8 * (work + self.memory + sizes["arg"] + sizes["res"]) + 4 * (sizes["iw"] + 1)
+
+    def _manifest(self) -> dict[str, Any]:
+        """What every argument and result is."""
+        arguments, first = [], 0
+        known, told = self.arguments.arguments, self.results.results
+        for identifier, one in zip(identifiers(a.name for a in known), known, strict=True):
+            entry: dict[str, Any] = {"name": one.name, "constant": f"{self.name.upper()}_ARG_{identifier}"}
+            entry |= {"first": first, "size": len(one.default), "unit": one.unit, "meaning": one.meaning}
+            entry["default"] = one.default[0] if one.components is None else list(one.default)
+            if one.components is not None:
+                entry["components"] = list(one.components)
+            if one.low is not None:
+                entry["range"] = [one.low, one.high]
+            arguments.append(entry)
+            first += len(one.default)
+        results, first = [], 0
+        for identifier, result in zip(identifiers(r.name for r in told), told, strict=True):
+            entry = {"name": result.name, "constant": f"{self.name.upper()}_RES_{identifier}", "first": first}
+            entry |= {"size": result.size, "shape": list(result.shape)}
+            entry |= {"unit": result.unit, "meaning": result.meaning}
+            if result.name.startswith("members."):
+                entry["s"] = list(self.results.places[result.name.split(".")[1]])
+            results.append(entry)
+            first += result.size
+        return {
+            "name": self.name,
+            "title": self.scene.title,
+            "made_by": "sfetcas",
+            "language": "C99",
+            "dimension": self.model.dimension,
+            "elements": self.model.mesh.elements,
+            "element": self.model.element.name,
+            "unknowns": self.arguments.expressions.total,
+            **self.about,
+            "sizes": {
+                "arguments": len(self.arguments.defaults),
+                "results": self.results.size,
+                "state": self.states,
+                "memory_bytes": self._memory_bytes(),
+            },
+            "arguments": arguments,
+            "results": results,
+            "statuses": {key: {"value": value, "meaning": meaning} for key, value, meaning in self.statuses},
+        }
+
+    def _words(self, manifest: dict[str, Any]) -> dict[str, object]:
+        """Tables of the README and of the example."""
+        arguments, results = manifest["arguments"], manifest["results"]
+        example = arguments[0] if arguments else None
+        name = "" if example is None else example["name"] + ("" if example["size"] == 1 else ".0")
+        return {
+            "memory_kb": manifest["sizes"]["memory_bytes"] // 1000 + 1,
+            "first_argument": f"{name}=1.5" if example else "",
+            "first_result": results[0]["name"] if results else "message",
+            "argument_entries": "\n".join(map(_entry, arguments)),
+            "result_entries": "\n".join(map(_entry, results)),
+            "argument_rows": "\n".join(
+                f"| `{one['name']}` | {one['size']} | {one['unit']} | {_short(one['default'])} | {one['meaning']} |"
+                for one in arguments
+            ),
+            "result_rows": "\n".join(
+                f"| `{one['name']}` | {' x '.join(map(str, one['shape'])) or '1'} | {one['unit']} | {one['meaning']} |"
+                for one in results
+            ),
+            "status_rows": "\n".join(f"| {key} = {value} | {meaning} |" for key, value, meaning in self.statuses),
+        }
+
+    def units(self, results: Sequence[Array]) -> Array:
+        """What each result is compared by: the largest of its kind in all cases."""
+        largest: dict[str, float] = {}
+        kinds = [kind for one in self.results.results for kind in [_kind(one.name)] * one.size]
+        for values in results:
+            for kind, value in zip(kinds, values.tolist(), strict=True):
+                if np.isfinite(value):
+                    largest[kind] = max(largest.get(kind, 0.0), abs(value))
+        return np.array([largest.get(kind) or 1.0 for kind in kinds])
+
+
+def _kind(name: str) -> str:
+    """Results that have a size in common."""
+    return name if name.startswith(("stiffness", "compliance")) else name.rpartition(".")[2]
 
 
 def _in_words(names: Sequence[str]) -> str:
@@ -133,56 +321,12 @@ def _places(prefix: str, sizes: Sequence[tuple[str, int, str]]) -> str:
         count = "1 number" if size == 1 else f"{size} numbers"
         found.append((f"{prefix}_{identifier}", first, f"{name}: {count}, {unit}"))
         first += size
-    return f"enum {{\n{_enumerated(found)}\n}};\n"
+    return f"enum {{\n{enumerated(found)}\n}};\n"
 
 
-def _enumerated(values: Sequence[tuple[str, int, str]]) -> str:
-    """Constants of an enum with what they mean."""
-    last = len(values) - 1
-    ends = ["," if i < last else "" for i in range(len(values))]
-    return "\n".join(f"  {n} = {v}{end} /* {what} */" for (n, v, what), end in zip(values, ends, strict=True))
+def _entry(one: dict[str, Any]) -> str:
+    return f"  {{{json.dumps(one['name'])}, {one['first']}, {one['size']}, {json.dumps(one['unit'])}}},"
 
 
-def _lower(sparsity: ca.Sparsity) -> tuple[ca.Sparsity, list[int]]:
-    """Pattern of the factors without pivots, and the order of the unknowns."""
-    found, order = sparsity.ldl(True)
-    return found, list(order)
-
-
-def _tables(solver: EquilibriumSolver) -> list[str]:
-    program, method, rules = solver.arguments.program, solver.method, solver.rules
-    equations, total = program.equations, program.expressions.total
-    moments, loads = program.slice_of("moment"), program.slice_of_loads
-    constants: dict[str, object] = {
-        "TOTAL": total,
-        "UNKNOWNS": equations.unknowns,
-        "TURNING": equations.turning_unknowns,
-        "ENTRIES": program.sparsity.nnz(),
-        "STATE": program.states,
-        "MULTIPLIERS": program.states - program.expressions.layout.near - equations.rows,
-        "GIVEN": program.symbol.shape[0],
-        "LOADS": loads.start,
-        "MOMENT": moments.start,
-        "MOMENTS": moments.stop - moments.start,
-        "SYMMETRIC": int(solver.model.has_potential),
-        "MINIMISABLE": int(solver.model.minimisable),
-        "STARTED": int(solver.start is not None),
-        **{key.upper(): value for key, value in vars(rules).items()},
-    }
-    lines = [f"#define SF_{key} {value!r}" for key, value in constants.items()]
-    start = solver.start if solver.start is not None else np.zeros(0)
-    found = [
-        "\n".join(lines) + "\n",
-        table("sf_diagonal", method.diagonal, "int"),
-        table("sf_mass", method.mass),
-        table("sf_soft", method.soft),
-        table("sf_start", start),
-    ]
-    if solver.model.has_potential:
-        lower, order = _lower(program.sparsity)
-        found += [
-            sparsity_table("sf_pattern", program.sparsity),
-            sparsity_table("sf_lower", lower),
-            table("sf_order", np.array(order), "int"),
-        ]
-    return found
+def _short(value: float | list[float]) -> str:
+    return ", ".join(f"{x:.6g}" for x in value) if isinstance(value, list) else f"{value:.6g}"

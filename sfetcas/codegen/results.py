@@ -24,7 +24,7 @@ from ..mechanics.rotations import Turn
 from ..mechanics.singles import turned_vector
 from ..solvers.program import Program
 
-__all__ = ["Result", "Results", "default_results"]
+__all__ = ["Result", "Results", "default_motion_results", "default_results"]
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ FIELDS = {"position": "m", "force": "N", "moment": "N m"}
 """What is told along a member, beside its rotation."""
 
 
-def default_results(model: Model) -> list[str]:
-    """Positions and rotations of all nodes, reactions that are unique, positions and section forces, springs."""
+def default_results(model: Model, *, unique: bool = True) -> list[str]:
+    """Positions and rotations of all nodes, positions of members, springs; reactions and section forces if unique."""
     names = []
     rotation = "quaternion" if model.space else "angle"
     for name in model.nodes:
@@ -63,17 +63,27 @@ def default_results(model: Model) -> list[str]:
         if model.rotations.node_turn[name] is not None:
             names.append(f"nodes.{name}.{rotation}")
     for name, node in model.scene.nodes.items():
-        if node.support != "free":
+        if node.support != "free" and unique:
             names.append(f"reactions.{name}.force")
             if _moment_known(model, name):
                 names.append(f"reactions.{name}.moment")
     for name, member in model.scene.members.items():
         if member.type == "flexible":
-            names += [f"members.{name}.{field}" for field in ("position", rotation, "force", "moment")]
+            fields = ("position", rotation, "force", "moment") if unique else ("position", rotation)
+            names += [f"members.{name}.{field}" for field in fields]
     for name, spring in model.scene.springs.items():
         pair = ("angle", "moment") if spring.type == "rotational" else ("travel", "force")
         names += [f"springs.{name}.{field}" for field in pair]
     return [*names, "energy.elastic", "energy.potential"]
+
+
+def default_motion_results(model: Model) -> list[str]:
+    """Of a motion: positions, rotations and velocities of all nodes, positions along the members, springs."""
+    every = [name for name in default_results(model) if name.rpartition(".")[2] not in STATIC]
+    names = [name for name in every if name.startswith(("nodes.", "springs.")) or name.endswith(".position")]
+    nodes = [f"nodes.{name}.velocity" for name in model.nodes]
+    springs = [name for name in names if name.startswith("springs.")]
+    return [*(name for name in names if name not in springs), *nodes, *springs]
 
 
 def _moment_known(model: Model, node: str) -> bool:
@@ -85,6 +95,9 @@ def _moment_known(model: Model, node: str) -> bool:
     held = [n for n, turn in model.rotations.node_turn.items() if turn == number and nodes[n].turn not in FREE]
     return held in ([], [node])
 
+
+STATIC = ("moment", "force", "potential")
+"""What is told of equilibria only; springs are told by their travel."""
 
 FREE = ("free", "ball")
 """How a support may leave a node to turn."""
@@ -99,13 +112,26 @@ class Results:
     names : sequence of str
     places : mapping of str to sequence of float
         Of each member the fractions of its length at which it is told.
+    unique : bool
+        Whether reactions and section forces are: not where closings depend on each other.
+    motion : bool
+        Of a motion, where velocities are known, and forces of inertia are not in those of statics.
 
     Attributes
     ----------
     results : tuple of Result
     """
 
-    def __init__(self, model: Model, names: Sequence[str], places: Mapping[str, Sequence[float]]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        names: Sequence[str],
+        places: Mapping[str, Sequence[float]],
+        *,
+        motion: bool = False,
+        unique: bool = True,
+    ) -> None:
+        self._motion, self._unique = motion, unique
         self.model, self.places = model, {name: tuple(x) for name, x in places.items()}
         self.results = tuple(self._result(name) for name in names)
 
@@ -119,11 +145,22 @@ class Results:
     def _result(self, name: str) -> Result:
         kind, _, rest = name.partition(".")
         what, _, key = rest.rpartition(".")
+        if self._motion and (kind in ("reactions", "stiffness", "compliance") or key in STATIC):
+            accepted = (
+                "nodes.*.position, .angle or .quaternion, .velocity, members.*.position, springs.*, energy.elastic"
+            )
+            raise SceneError(f"found {name!r}, accepted of a step: {accepted}", ("results",))
+        if not self._unique and (kind == "reactions" or (kind == "members" and key in ("force", "moment"))):
+            message = f"found {name!r}, which is not unique as closings depend on each other, accepted: what is"
+            raise SceneError(message, ("results",))
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "springs": self._spring}
         if kind in tables and what:
             return tables[kind](name, what, key)
         if kind in ("stiffness", "compliance"):
             self._known(rest, self.model.nodes, name)
+            if kind == "stiffness" and self.model.scene.nodes[rest].support != "free":
+                message = f"found {name!r}, a node that the ground holds, accepted: a free one, or compliance.{rest}"
+                raise SceneError(message, ("results",))
             n = 6 if self.model.space else 3
             inverse = kind == "compliance"
             what = "displacement and rotation by force and moment" if inverse else "force and moment by displacement"
@@ -151,7 +188,9 @@ class Results:
 
     def _node(self, name: str, node: str, key: str) -> Result:
         self._known(node, self.model.nodes, name)
-        self._key(name, key, ("position", self._rotation))
+        self._key(name, key, ("position", self._rotation, *(["velocity"] if self._motion else [])))
+        if key == "velocity":
+            return Result(name, (3,), "m/s", f"velocity of the node {node}")
         if key == "position":
             return Result(name, (3,), "m", f"position of the node {node}")
         if self.model.rotations.node_turn[node] is None:
@@ -199,16 +238,17 @@ class Results:
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.places.items()]
         return np.concatenate([*nodes, *(part.ravel() for part in along)])
 
-    def expression(self, program: Program, rest: ca.MX) -> ca.MX:
-        """All results one after the other, rows before columns, in SI units."""
-        told = _Told(self, program, rest)
+    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None) -> ca.MX:
+        """All results one after the other, rows before columns, in SI units; ``speeds`` (axes, places) of a motion."""
+        told = _Told(self, program, rest, speeds)
         return ca.vertcat(*(ca.densify(ca.vec(told.value(result.name).T)) for result in self.results))
 
 
 class _Told:
     """The values of results."""
 
-    def __init__(self, results: Results, program: Program, rest: ca.MX) -> None:
+    def __init__(self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None = None) -> None:
+        self._speeds = speeds
         self._results, self._program = results, program
         self._model, self._expressions = program.model, program.expressions
         model, expressions = self._model, self._expressions
@@ -246,6 +286,9 @@ class _Told:
 
     def _node(self, node: str, key: str) -> ca.MX:
         number = self._model.nodes.index(node)
+        if key == "velocity":
+            assert self._speeds is not None
+            return self._three(self._speeds[:, number]).T
         if key == "position":
             moved = self._three(self._places[:, number]) * self._model.scales.length
             return (self._rest[:, number] + moved).T

@@ -50,7 +50,8 @@ TABLE = re.compile(r"^static const \w+ (\w+)\[")
 def _kept(line: str, reached: set[str]) -> bool:
     """Whether a definition of a name is of something that is there."""
     name = line.split()[1]
-    return name in reached or name in ("casadi_real", "casadi_int")
+    # What has arguments is a function of one line.
+    return "(" in name or name in reached or name in ("casadi_real", "casadi_int")
 
 
 def _chunks(text: str) -> tuple[str, dict[str, str]]:
@@ -58,24 +59,24 @@ def _chunks(text: str) -> tuple[str, dict[str, str]]:
     # Nothing here has a name outside: the frames of C++ are for what has.
     text = re.sub(r'#ifdef __cplusplus\n(extern "C" \{|\} /\* extern "C" \*/)\n#endif\n', "", text)
     head: list[str] = []
-    chunks: dict[str, str] = {}
+    chunks: dict[str, list[str]] = {}
     name = None
     for line in map(str.rstrip, text.splitlines()):
         match = DEFINITION.match(line) or TABLE.match(line)
         if name is None and match:
             name = match.group(1)
-            chunks[name] = line if line.startswith("static ") else f"static {line}"
+            chunks[name] = [line if line.startswith("static ") else f"static {line}"]
         elif name is not None:
-            chunks[name] += f"\n{line}"
+            chunks[name].append(line)
         elif not line.startswith("/*") or not chunks:
             head.append(line)
             continue
         else:
             continue
         if line.startswith("}") or line.endswith("};") or (match and line.endswith("}")):
-            chunks[name] += "\n"
+            chunks[name].append("")
             name = None
-    return "\n".join(head), chunks
+    return "\n".join(head), {name: "\n".join(lines) for name, lines in chunks.items()}
 
 
 def sizes_of(functions: Iterable[ca.Function]) -> dict[str, int]:
@@ -92,7 +93,7 @@ def sizes_of(functions: Iterable[ca.Function]) -> dict[str, int]:
 def table(name: str, values: Array, kind: str = "double") -> str:
     """A constant array; an empty one has one zero, which C asks for."""
     flat = np.asarray(values).ravel()
-    texts = [repr(float(x)) if kind == "double" else str(int(x)) for x in flat.tolist()] or ["0"]
+    texts = [_double(x) if kind == "double" else str(int(x)) for x in flat.tolist()] or ["0"]
     lines, line = [], ""
     for text in texts:
         if len(line) + len(text) > 110:
@@ -102,6 +103,10 @@ def table(name: str, values: Array, kind: str = "double") -> str:
     lines.append(line)
     inner = "\n".join(f"  {part.rstrip()}" for part in lines).rstrip(",")
     return f"static const {kind} {name}[{len(texts)}] = {{\n{inner}\n}};\n"
+
+
+def _double(x: float) -> str:
+    return repr(x) if np.isfinite(x) else "HUGE_VAL" if x > 0.0 else "-HUGE_VAL"
 
 
 def sparsity_table(name: str, sparsity: ca.Sparsity) -> str:

@@ -33,7 +33,7 @@ from .motion import Instant, Mover, Trajectory
 from .stages import StageEquations
 from .watching import Measure, Watch, finer
 
-__all__ = ["simulate"]
+__all__ = ["INTEGRATORS", "Simulation", "simulate"]
 
 USUAL = "radau-3"
 """Integrator where none is asked for: of all it needs the least time for an accuracy of 1e-2 or finer (measured)."""
@@ -80,7 +80,7 @@ def simulate(
     SolveError
         A step does not converge; ``reached`` is the motion up to there.
     """
-    return _Simulation(scene, settings, measure, progress).motion()
+    return Simulation(scene, settings, measure, progress).motion()
 
 
 @dataclass
@@ -97,7 +97,9 @@ class _Run:
     interrupted: bool = False
 
 
-class _Simulation:
+class Simulation:
+    """A motion: its runs on finer and finer meshes."""
+
     def __init__(
         self, scene: Scene, settings: Settings, measure: Measure, progress: Callable[[float], Any] | None
     ) -> None:
@@ -152,7 +154,7 @@ class _Simulation:
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
-        begun, notes = self._begun(system)
+        begun, notes = self.begun(system)
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
         watch = None if analysis.until is None else Watch(analysis.until, self.measure, mover)
@@ -188,8 +190,8 @@ class _Simulation:
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
-    def _begun(self, system: StageEquations) -> tuple[Begun, tuple[str, ...]]:
-        """Where the motion begins."""
+    def begun(self, system: StageEquations) -> tuple[Begun, tuple[str, ...]]:
+        """Where the motion begins, and what is to be said of it."""
         model = system.model
         state = at_rest(model)
         notes: tuple[str, ...] = ()

@@ -44,7 +44,7 @@ MEANINGS = {
     Code.ITERATIONS: "no equilibrium within the iterations allowed",
     Code.STALLED: "no equilibrium: no step led further",
     Code.NOT_FINITE: "no equilibrium: the numbers left what can be computed",
-    Code.BAD_ARGUMENT: "an argument or the start is not a finite number",
+    Code.BAD_ARGUMENT: "an argument or the start is not a finite number, or an argument outside of its range",
 }
 """What the codes say."""
 
@@ -199,7 +199,7 @@ class Globalised:
         matrix = self._target.copy()
         matrix[self.diagonal] += rules.soft * self.soft
         self._matrix = ca.DM(self.program.sparsity, matrix)
-        if not self._symmetric:
+        if not self._symmetric or not self._total:
             return 0
         try:
             self._solver.nfact(self._matrix)
@@ -208,6 +208,8 @@ class Globalised:
         return int(self._solver.neig(self._matrix)) - (self._total - self._unknowns)
 
     def _backward(self, b: Array) -> Array:
+        if not self._total:
+            return b
         if not self._symmetric:
             return np.array(self.program.linear(self._matrix.nz[:], b)).ravel()
         return np.array(self._solver.solve(self._matrix, b)).ravel()
@@ -275,6 +277,8 @@ class Globalised:
         if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
             followed = self._followed(given)
             found = followed if followed.code is Code.SOLVED else found
+        if found.code in (Code.SOLVED, Code.UNSTABLE) and not np.isfinite(found.state).all():
+            found = replace(found, code=Code.NOT_FINITE)
         return replace(found, iterations=rules.iterations - self._left)
 
     def _from(self, state: Array, given: Array) -> Outcome:

@@ -66,7 +66,8 @@ class Program:
         varying = varying if varying is not None else self._loaded()
         self.sizes = {name: part.numel() for name, part in parts.items() if varying.get(name)}
         self.symbol = ca.MX.sym("given", sum(self.sizes.values()))
-        self.given = self._given(parts)
+        self._all = parts
+        self.given = self.given_by(self.symbol)
 
     def _loaded(self) -> dict[str, bool]:
         expressions = self.expressions
@@ -81,11 +82,12 @@ class Program:
         parts |= {name: getattr(given, name) for name in LOADS}
         return parts | {f"loads_{i}": part for i, part in enumerate(given.loads)}
 
-    def _given(self, parts: Mapping[str, ca.MX]) -> Given:
+    def given_by(self, flat: ca.MX) -> Given:
+        """What is given, for the vector of what varies."""
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
-        cut = dict(zip(self.sizes, ca.vertsplit(self.symbol, bounds), strict=True)) if self.sizes else {}
+        cut = dict(zip(self.sizes, ca.vertsplit(flat, bounds), strict=True)) if self.sizes else {}
         found: dict[str, Any] = {}
-        for name, part in parts.items():
+        for name, part in self._all.items():
             value = ca.reshape(cut[name], *part.shape) if name in cut else part
             base, _, number = name.partition("_")
             if number:
@@ -183,9 +185,11 @@ class Program:
 
     # -- counted turns ------------------------------------------------------------------------------
 
-    def _angles(self, q: ca.MX, near: ca.MX) -> ca.MX:
+    def counted(self, q: ca.MX, near: ca.MX) -> ca.MX:
         """The angles that count turns, of all that look the same those nearest to ``near``."""
         winding = self.model.winding
+        if not winding.count:
+            return near
         sides = np.where(winding.sides == GROUND, self.expressions.layout.rotations, winding.sides)
         q = ca.horzcat(q, ca.DM([1.0, 0.0, 0.0, 0.0]))
         crossed = np.asarray(winding.across.any(axis=1), dtype=float)
@@ -205,7 +209,7 @@ class Program:
         )
         apart = phi_all[:, sides[:, 1].tolist()] - phi_all[:, sides[:, 0].tolist()]
         gained = ca.sum1(carried * apart).T
-        return self._angles(there, self._angles(q, near) + gained)
+        return self.counted(there, self.counted(q, near) + gained)
 
     def _prescribed(self) -> ca.MX:
         """Angles that motions prescribe, where rotations turn about one axis each, (near,)."""
@@ -246,6 +250,9 @@ class Program:
         """The state with held rotations moved to their prescribed values."""
         q, y, lam, near = self.parts
         near = self._held_near(near) if self.expressions.layout.near else near
+        if self.model.space:
+            # A start may come from anywhere.
+            q = q / ca.repmat(ca.sqrt(ca.sum1(q**2)), 4, 1)
         return ca.vertcat(ca.vec(self.expressions.held(ca.MX(q), self.given)), y, lam, near)
 
     def moving(self, total: int) -> ca.MX:
@@ -320,7 +327,7 @@ class Program:
         if not model.space:
             total -= ca.dot(given.moment, ca.vec(q))
         elif model.winding.about:
-            angles = self._angles(q, near)
+            angles = self.counted(q, near)
             for turn, angle in model.winding.about.items():
                 moment = given.moment[3 * turn : 3 * turn + 3]
                 total -= ca.dot(moment, ca.DM(model.winding.axis[angle])) * angles[angle]
@@ -336,7 +343,9 @@ class Program:
         """(state, given) -> residual, its size relative to what is added up, potential, gaps, entries of the matrix."""
         state, _ = self._symbols
         residual = ca.densify(self.stationarity.residual)
-        size = ca.norm_inf(residual / ca.fmax(self.scale, TINY)) if self.expressions.total else ca.MX(0)
+        # A maximum may lose what is not a number, a sum does not.
+        shares = residual / ca.fmax(self.scale, TINY)
+        size = ca.norm_inf(shares) + 0.0 * ca.sum1(residual) if self.expressions.total else ca.MX(0)
         results = {
             "residual": residual,
             "size": size,

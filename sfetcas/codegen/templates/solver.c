@@ -32,12 +32,20 @@ static int sf_all_finite(const double *x, int n) {
   return 1;
 }
 
+static int sf_accepted(const double *p) {
+  int i;
+  for (i = 0; i < @NAME@_ARGUMENTS; ++i)
+    if (!sf_finite(p[i]) || !(p[i] >= sf_low[i]) || !(p[i] <= sf_high[i])) return 0;
+  return 1;
+}
+
 static double sf_largest(const double *x, int n) {
   double found = 0.0;
   int i;
   for (i = 0; i < n; ++i) {
     double a = fabs(x[i]);
-    if (!(a <= found)) found = a;
+    if (a != a) return a;
+    if (a > found) found = a;
   }
   return found;
 }
@@ -56,12 +64,12 @@ static double sf_dot(const double *a, const double *b, int n) {
 }
 #endif
 
-static void sf_call(@name@_memory *m, @name@_function f, const double *a, const double *b, const double *c, double *r) {
+static int sf_call(@name@_memory *m, @name@_function f, const double *a, const double *b, const double *c, double *r) {
   m->arg[0] = a;
   m->arg[1] = b;
   m->arg[2] = c;
   m->res[0] = r;
-  f(m->arg, m->res, m->iw, m->w, 0);
+  return f(m->arg, m->res, m->iw, m->w, 0);
 }
 
 static void sf_at(sf_run *run, sf_here *here) {
@@ -386,7 +394,7 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   here.size = HUGE_VAL;
   if (results) sf_none(results, @NAME@_RESULTS);
   sf_call(m, @name@_prepare, arguments, 0, 0, m->given);
-  if (!sf_all_finite(arguments, @NAME@_ARGUMENTS) || !sf_all_finite(m->given, SF_GIVEN) ||
+  if (!sf_accepted(arguments) || !sf_all_finite(m->given, SF_GIVEN) ||
       (warm && !sf_all_finite(state, SF_STATE))) {
     status = @NAME@_BAD_ARGUMENT;
   } else {
@@ -411,6 +419,8 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
       }
     }
   }
+  if ((status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) && !sf_all_finite(here.state, SF_STATE))
+    status = @NAME@_NOT_FINITE;
   if (report) {
     report->status = status;
     report->iterations = SF_ITERATIONS - run.left;
@@ -419,9 +429,9 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   }
   if (status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) {
     sf_copy(state, here.state, SF_STATE);
-    if (results) {
-      sf_call(m, @name@_results, arguments, state, m->given, results);
-    }
+    if (results && sf_call(m, @name@_results, arguments, state, m->given, results))
+      /* A stiffness of what is singular. */
+      sf_none(results, @NAME@_RESULTS);
   }
   return status;
 }

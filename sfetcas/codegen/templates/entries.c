@@ -1,0 +1,14 @@
+typedef struct {
+  const char *name;
+  int first, size;
+  const char *unit;
+} entry;
+
+static const entry arguments[] = {
+@argument_entries@
+  {0, 0, 0, 0}};
+
+static const entry results[] = {
+@result_entries@
+  {0, 0, 0, 0}};
+

@@ -1,0 +1,66 @@
+
+static int sf_all_finite(const double *x, int n) {
+  int i;
+  for (i = 0; i < n; ++i)
+    if (x[i] - x[i] != 0.0) return 0;
+  return 1;
+}
+
+static void sf_copy(double *to, const double *from, int n) {
+  int i;
+  for (i = 0; i < n; ++i) to[i] = from[i];
+}
+
+void @name@_begin(double *state) { sf_copy(state, sf_begin, @NAME@_STATE); }
+
+void @name@_refresh(double *state) { state[@NAME@_STATE - 1] = 0.0; }
+
+void @name@_times(double *shares) { sf_copy(shares, sf_times, @NAME@_TIMES); }
+
+void @name@_tell(@name@_memory *m, const double *arguments, const double *state, double *results) {
+  m->arg[0] = state;
+  m->arg[1] = arguments;
+  m->res[0] = results;
+  @name@_results(m->arg, m->res, m->iw, m->w, 0);
+}
+
+int @name@_step_through(@name@_memory *m, double h, const double *arguments, double *state, double *results,
+@indent_through@@name@_report *report) {
+  int status = @NAME@_DONE, i;
+  if (results)
+    for (i = 0; i < @NAME@_RESULTS; ++i) results[i] = NAN;
+  if (!(h > 0.0) || h - h != 0.0 || !sf_all_finite(arguments, @NAME@_ARGUMENTS * @NAME@_TIMES) ||
+      !sf_all_finite(state, @NAME@_STATE)) {
+    status = @NAME@_BAD_ARGUMENT;
+    m->iterations = 0.0;
+    m->gap = NAN;
+  } else {
+    m->arg[0] = state;
+    m->arg[1] = &h;
+    m->arg[2] = arguments;
+    m->res[0] = m->after;
+    m->res[1] = &m->size;
+    m->res[2] = &m->iterations;
+    m->res[3] = &m->gap;
+    if (@name@_advance(m->arg, m->res, m->iw, m->w, 0) || !(m->size <= SF_CONVERGED) ||
+        !sf_all_finite(m->after, @NAME@_STATE))
+      status = @NAME@_NOT_CONVERGED;
+  }
+  if (report) {
+    report->status = status;
+    report->iterations = m->iterations - m->iterations == 0.0 ? (int)m->iterations : 0;
+    report->gap = m->gap;
+  }
+  if (status == @NAME@_DONE) {
+    sf_copy(state, m->after, @NAME@_STATE);
+    if (results) @name@_tell(m, arguments + (@NAME@_TIMES - 1) * @NAME@_ARGUMENTS, state, results);
+  }
+  return status;
+}
+
+int @name@_step(@name@_memory *m, double h, const double *arguments, double *state, double *results,
+@indent@@name@_report *report) {
+  int i;
+  for (i = 0; i < @NAME@_TIMES; ++i) sf_copy(m->arguments + i * @NAME@_ARGUMENTS, arguments, @NAME@_ARGUMENTS);
+  return @name@_step_through(m, h, m->arguments, state, results, report);
+}

@@ -1,0 +1,235 @@
+"""A time step of a motion ready to be written as C: one function of a flat state, loads and the length of the step."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.scene import Scene
+from ..dynamics.integrating import Memory, Stepper
+from ..dynamics.methods import Method
+from ..dynamics.simulation import INTEGRATORS, Simulation
+from ..dynamics.stages import StageEquations
+from ..dynamics.steps import CONVERGED, step_function
+from ..equilibria.settings import Settings
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations
+from ..mechanics.expressions import Given
+from ..mechanics.masses import Masses, masses_of
+from ..mechanics.model import Model, assemble
+from .arguments import Arguments, argument, default_arguments
+from .equilibrium import Place, chosen_places, refuse_search
+from .results import Results, default_motion_results
+
+__all__ = ["TimeStep", "time_step"]
+
+
+class _Argued(StageEquations):
+    """The equations of motion with numbers of the scene in the place of the factors of its loads."""
+
+    def __init__(self, arguments: Arguments, masses: Masses) -> None:
+        super().__init__(arguments.expressions.equations, masses, "interpreted")
+        self._arguments = arguments
+        self.layout = replace(self.layout, factors=len(arguments.defaults))
+
+    def given(self, factors: ca.MX) -> Given:
+        """What is given for the numbers."""
+        return self._arguments.program.given_by(self._arguments.given(factors))
+
+
+@dataclass(frozen=True, eq=False)
+class TimeStep:
+    """A step of one scene on one mesh by one method; every function of it is CasADi's, in process as in C.
+
+    Attributes
+    ----------
+    name : str
+        Beginning of all names in C.
+    scene : Scene
+    arguments : Arguments
+    results : Results
+    method : Method
+    time : float
+        Unit of time, s.
+    begin : ndarray
+        State in which the motion begins.
+    """
+
+    name: str
+    scene: Scene
+    arguments: Arguments
+    results: Results
+    system: StageEquations
+    method: Method
+    time: float
+    begin: Array
+
+    @property
+    def model(self) -> Model:
+        """The model, at values of the arguments where nothing vanishes by chance."""
+        return self.arguments.model
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Numbers of the parts of a state: the motion, the last step, and its length (0 for a fresh start)."""
+        n, stages = self.system.layout, self.method.stages
+        return {
+            "q": n.components * n.rotations,
+            "y": n.y,
+            "lam": n.lam,
+            "turns": self.system.turns * n.rotations * stages,
+            "shifts": n.y * stages,
+            "x": n.x,
+            "rates": n.x * self.method.kept,
+            "near": n.near,
+            "last": 1,
+        }
+
+    @functools.cached_property
+    def advance(self) -> ca.Function:
+        """(state, h, arguments) -> state after a step of h seconds, last change, iterations, what closings miss.
+
+        Arguments are (numbers, times): a column for each of :attr:`times` of the step.
+        """
+        n, program = self.system.layout, self.arguments.program
+        step = step_function(self.system, self.method)
+        state, h = ca.MX.sym("state", len(self.begin)), ca.MX.sym("h")
+        p = ca.MX.sym("arguments", n.factors, len(self.times))
+        parts = dict(zip(self.sizes, ca.vertsplit(state, np.cumsum([0, *self.sizes.values()]).tolist()), strict=True))
+        span = h / self.time
+        # A fresh start has no step before it.
+        ratio = ca.if_else(parts["last"] > 0.0, span / ca.fmax(parts["last"], 1e-300), 0.0)
+        shaped = [ca.reshape(parts[name], *step.size_in(i)) for i, name in enumerate(list(parts)[:7])]
+        found = dict(zip(step.name_out(), step(*shaped, ratio, span, p, parts["near"]), strict=True))
+        q = found["q_next"]
+        lam = ca.reshape(found["lam_stages"], n.lam, self.method.stages)[:, -1]
+        x = ca.reshape(found["x_stages"], n.x, self.method.stages)[:, -1]
+        rest = [found["turns_stages"], found["shifts_stages"], x, found["rates_next"]]
+        near = program.counted(q, parts["near"])
+        after = ca.vertcat(ca.vec(q), found["y_next"], lam, *[ca.vec(part) for part in rest], near, span)
+        results = [ca.densify(after), found["size"], found["iterations"], found["gap"]]
+        names = ["after", "size", "iterations", "gap"]
+        return ca.Function(f"{self.name}_advance", [state, h, p], results, ["state", "h", "arguments"], names)
+
+    @functools.cached_property
+    def tell(self) -> ca.Function:
+        """(state, arguments) -> results."""
+        program, layout = self.arguments.program, self.system.layout
+        state, p = ca.MX.sym("state", len(self.begin)), ca.MX.sym("arguments", layout.factors)
+        bounds = np.cumsum([0, *self.sizes.values()]).tolist()
+        parts = dict(zip(self.sizes, ca.vertsplit(state, bounds), strict=True))
+        velocity = ca.reshape(parts["rates"], layout.x, self.method.kept)[:, 0]
+        places = ca.reshape(velocity[: self.system.axes * self.system.places], self.system.axes, self.system.places)
+        speeds = places * (self.arguments.model.scales.length / self.time)
+        told = self.results.expression(program, self.arguments.undeformed(p), speeds)
+        still = ca.vertcat(parts["q"], parts["y"], parts["lam"], parts["near"])
+        as_given = ca.substitute([told], [program.state_symbol, program.symbol], [still, self.arguments.given(p)])[0]
+        return ca.Function(
+            f"{self.name}_results", [state, p], [ca.densify(as_given)], ["state", "arguments"], ["results"]
+        )
+
+    @property
+    def times(self) -> Array:
+        """Shares of a step at which it asks for the arguments."""
+        return np.asarray(self.method.loaded)
+
+    def step(self, state: Array, h: float, arguments: Array | None = None) -> Array:
+        """The state after a step of h seconds, not a number where Newton's method did not converge.
+
+        Parameters
+        ----------
+        arguments : (numbers,) throughout the step, or (times, numbers); the defaults without
+        """
+        p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
+        p = np.broadcast_to(p, (len(self.times), self.arguments.defaults.size))
+        after, size, _, _ = (np.array(part).ravel() for part in self.advance(state, h, p.T))
+        good = size[0] <= CONVERGED and np.isfinite(after).all()
+        return after if good else np.full(len(state), np.nan)
+
+    def told(self, state: Array, arguments: Array | None = None) -> Array:
+        """The results at a state."""
+        p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
+        return np.array(self.tell(state, p)).ravel()
+
+
+def time_step(
+    scene: Scene,
+    name: str,
+    *,
+    arguments: Sequence[str] | Mapping[str, tuple[float, float] | None] | None = None,
+    results: Sequence[str] | None = None,
+    places: Place | None = None,
+    settings: Settings | None = None,
+) -> TimeStep:
+    """The step of a scene whose analysis is dynamic.
+
+    Parameters
+    ----------
+    scene, name, arguments, results, places, settings
+        As of :func:`~sfetcas.codegen.equilibrium.equilibrium_solver`.
+
+    Raises
+    ------
+    SceneError
+        A scene that cannot be exported, a number or a result that it does not have.
+    """
+    refuse_search(scene)
+    settings = settings or Settings()
+    simulation = Simulation(scene, settings, _nothing, None)
+    method = _method(simulation)
+    scene = simulation.scene
+    mesh = simulation.mesh if simulation.prescribed else simulation.mesh.refined()
+    base = assemble(scene, mesh, assembly="nodal")
+    members = [n for n, member in scene.members.items() if member.type == "flexible"]
+    told = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
+    chosen = arguments if arguments is not None else default_arguments(scene)
+    spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
+    known = Arguments(scene, base, [argument(scene, n, span) for n, span in spans.items()], told.rest, f"{name}_")
+    own = StageEquations(Equations(base), masses_of(base), "interpreted")
+    masses = masses_of(known.model)
+    if not _same(own.masses, masses):
+        raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
+    begun, _ = simulation.begun(own)
+    system = _Argued(known, masses)
+    rates = np.zeros((method.kept, len(begun.x)))
+    rates[0] = begun.v
+    state = begun.state
+    memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.wound)
+    if method.kept > 1:
+        step = scene.analysis.step or scene.analysis.duration / 1000.0
+        memory = Stepper(own, method).refreshed(memory, step / masses.time)
+    stages, layout = method.stages, system.layout
+    still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
+    moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.near]
+    return TimeStep(name, scene, known, told, system, method, masses.time, np.concatenate([*moved, np.zeros(1)]))
+
+
+def _nothing(*_: Any) -> float:
+    """Conditions that end a motion are not looked for."""
+    return 0.0
+
+
+def _method(simulation: Simulation) -> Method:
+    """The method that a scene asks for."""
+    made: Any = INTEGRATORS[simulation.name]
+    method = getattr(made, "keywords", {}).get("method")
+    if method is None:
+        accepted = ", ".join(n for n, one in INTEGRATORS.items() if hasattr(one, "keywords"))
+        message = f"found {simulation.name!r}, whose steps are a library's own, accepted for C: {accepted}"
+        raise SceneError(message, ("analysis", "integrator"))
+    return method
+
+
+def _same(one: Masses, other: Masses) -> bool:
+    """Whether two models have the same masses."""
+    pairs = [(one.inner, other.inner), (one.inner_drag, other.inner_drag), (one.place_drag, other.place_drag)]
+    pairs += [(one.places.value, other.places.value)]
+    pairs += [(a.mass, b.mass) for a, b in zip(one.observables, other.observables, strict=True)]
+    pairs += [(a.damping, b.damping) for a, b in zip(one.observables, other.observables, strict=True)]
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=0.0) for a, b in pairs)

@@ -1,0 +1,170 @@
+"""An equilibrium solver as C: its functions, the tables of the driver, and the cases of the check."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.records import counted
+from ..solvers.globalised import MEANINGS, Code
+from .equilibrium import EquilibriumSolver
+from .rendering import Status, Writer, filled, row, rows, template
+from .source import sparsity_table, table
+
+__all__ = ["EquilibriumWriter"]
+
+PIVOTS = "with_pivots_as_they_come"
+
+
+class EquilibriumWriter(Writer):
+    """Files of an equilibrium solver, with the derivatives of results by arguments if so wanted."""
+
+    header, example, check = "solver.h", "main.c", "check.c"
+    loader, readme = "loader.py.in", "README.md"
+
+    def __init__(self, solver: EquilibriumSolver, *, sensitivities: bool = False) -> None:
+        super().__init__(solver.name, solver.scene, solver.arguments, solver.results)
+        self.solver, self._sensitivities = solver, sensitivities
+        self.bodies = ("solver.c", "sensitivities.c") if sensitivities else ("solver.c",)
+
+    @property
+    def functions(self) -> list[ca.Function]:
+        """Those of the program, and what tells the results."""
+        solver, program = self.solver, self.arguments.program
+        found = [solver.prepare, solver.tell, program.begin, program.hold, program.move, program.at, program.left]
+        if self.model.minimisable:
+            found += [program.merit, program.convex]
+        found.append(_pivots() if self.model.has_potential else program.linear)
+        return [*found, solver.sensitivities] if self._sensitivities else found
+
+    @property
+    def roots(self) -> set[str]:
+        """Factors are made and used one by one, by functions of CasADi's own."""
+        return super().roots - {PIVOTS} | {"casadi_ldl", "casadi_ldl_solve"}
+
+    @property
+    def statuses(self) -> list[Status]:
+        """Those of the method."""
+        return [(code.name, int(code), MEANINGS[code]) for code in Code]
+
+    @property
+    def states(self) -> int:
+        """Those of the program."""
+        return self.arguments.program.states
+
+    @property
+    def _sizes(self) -> dict[str, int]:
+        program = self.arguments.program
+        lower = self._lower[0].nnz() if self.model.has_potential else 0
+        return {
+            "sz_given": max(1, program.symbol.shape[0]),
+            "sz_total": max(1, program.expressions.total),
+            "sz_entries": max(1, program.sparsity.nnz()),
+            "sz_lower": max(1, lower),
+        }
+
+    @property
+    def memory(self) -> int:
+        """States, residuals, matrices and factors."""
+        given, total, entries, lower = self._sizes.values()
+        return 2 * given + 4 * max(1, self.states) + 8 * total + 5 * entries + lower
+
+    @property
+    def own(self) -> dict[str, object]:
+        """Sizes of the memory, and what is there of derivatives."""
+        names: dict[str, object] = {"name": self.name, "NAME": self.name.upper()}
+        flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
+        unknowns = counted(self.arguments.expressions.total, "unknown")
+        started = self.solver.start is not None
+        return {
+            **self._sizes,
+            "indent": " " * len(f"int {self.name}_solve("),
+            "sensitivities_declared": filled(template("sensitivities.h"), names) if self._sensitivities else "",
+            "model_in_words": f"In {self.where}: {flexible}, {unknowns}.",
+            "error_in_words": f"{self.solver.answer.certificate.error_estimate or 0.0:.1g}",
+            "start_in_words": "a bent state near that of the scene" if started else "the undeformed structure",
+        }
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Functions, and the error for the defaults."""
+        functions = ["solve", "defaults", "message", *(["sensitivities"] if self._sensitivities else [])]
+        return {"functions": functions, "error_estimate": self.solver.answer.certificate.error_estimate}
+
+    @property
+    def _lower(self) -> tuple[ca.Sparsity, list[int]]:
+        """Pattern of the factors without pivots, and the order of the unknowns."""
+        found, order = self.arguments.program.sparsity.ldl(True)
+        return found, list(order)
+
+    @property
+    def _limits(self) -> list[tuple[float, float]]:
+        return [one.limits for one in self.arguments.arguments for _ in one.default]
+
+    @property
+    def tables(self) -> list[str]:
+        """Sizes, rules and patterns."""
+        solver, program = self.solver, self.arguments.program
+        equations = program.equations
+        moments, loads = program.slice_of("moment"), program.slice_of_loads
+        constants: dict[str, object] = {
+            "TOTAL": program.expressions.total,
+            "UNKNOWNS": equations.unknowns,
+            "TURNING": equations.turning_unknowns,
+            "ENTRIES": program.sparsity.nnz(),
+            "STATE": program.states,
+            "MULTIPLIERS": program.states - program.expressions.layout.near - equations.rows,
+            "GIVEN": program.symbol.shape[0],
+            "LOADS": loads.start,
+            "MOMENT": moments.start,
+            "MOMENTS": moments.stop - moments.start,
+            "SYMMETRIC": int(self.model.has_potential),
+            "MINIMISABLE": int(self.model.minimisable),
+            "STARTED": int(solver.start is not None),
+            **{key.upper(): value for key, value in vars(solver.rules).items()},
+        }
+        found = [
+            "\n".join(f"#define SF_{key} {value!r}" for key, value in constants.items()) + "\n",
+            table("sf_low", np.array([low for low, _ in self._limits])),
+            table("sf_high", np.array([high for _, high in self._limits])),
+            table("sf_diagonal", solver.method.diagonal, "int"),
+            table("sf_mass", solver.method.mass),
+            table("sf_soft", solver.method.soft),
+            table("sf_start", solver.start if solver.start is not None else np.zeros(0)),
+        ]
+        if self.model.has_potential:
+            lower, order = self._lower
+            found += [
+                sparsity_table("sf_pattern", program.sparsity),
+                sparsity_table("sf_lower", lower),
+                table("sf_order", np.array(order), "int"),
+            ]
+        return found
+
+    @property
+    def cases(self) -> dict[str, object]:
+        """The scene, its steps, and neighbours of it."""
+        solver, base = self.solver, self.arguments.defaults
+        names = [name for one in self.arguments.arguments for name in one.names]
+        chosen = [base]
+        for step in self.scene.analysis.steps[:-1][:4]:
+            chosen.append(np.array([step if n == "factor" else x for n, x in zip(names, base, strict=True)]))
+        low, high = np.array(self._limits).reshape(-1, 2).T
+        chosen += [np.clip(base * (1.0 + shift), low, high) for shift in (0.03, -0.07)]
+        solved = [solver.solve(case) for case in chosen]
+        results = [result for _, result in solved]
+        return {
+            "n_cases": len(chosen),
+            "case_statuses": ", ".join(str(int(outcome.code)) for outcome, _ in solved),
+            "case_arguments": rows(chosen),
+            "case_results": rows(results),
+            "units": row(self.units(results)),
+        }
+
+
+def _pivots() -> ca.Function:
+    """Any function that solves without pivots: the driver makes and uses factors itself, with what this one calls."""
+    matrix, b = ca.MX.sym("matrix", 2, 2), ca.MX.sym("b", 2)
+    return ca.Function(PIVOTS, [matrix, b], [ca.solve(matrix, b, "ldl")])

@@ -1,0 +1,116 @@
+"""Time steps as C: their function, where the motion begins, and the steps of the check."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from ..description.records import counted
+from ..dynamics.steps import CONVERGED
+from .rendering import Status, Writer, row, rows
+from .source import table
+from .timestep import TimeStep
+
+__all__ = ["StepWriter"]
+
+DONE = (
+    ("DONE", 0, "the step was taken"),
+    ("NOT_CONVERGED", 1, "no step: Newton's method did not converge, try a shorter one"),
+    (
+        "BAD_ARGUMENT",
+        2,
+        "no step: its length is not positive, or an argument or the state not a finite number",
+    ),
+)
+"""How a step may end."""
+
+CHECKED = 10
+"""Steps of the check."""
+
+
+class StepWriter(Writer):
+    """Files of a time step."""
+
+    header, example, check = "step.h", "step_main.c", "step_check.c"
+    loader, readme, bodies = "step_loader.py.in", "step_README.md", ("step.c",)
+
+    def __init__(self, step: TimeStep) -> None:
+        super().__init__(step.name, step.scene, step.arguments, step.results)
+        self.step = step
+
+    @property
+    def functions(self) -> list[ca.Function]:
+        """The step, and what tells the results."""
+        return [self.step.advance, self.step.tell]
+
+    @property
+    def statuses(self) -> list[Status]:
+        """Those of a step."""
+        return list(DONE)
+
+    @property
+    def states(self) -> int:
+        """The motion and the last step."""
+        return len(self.step.begin)
+
+    @property
+    def memory(self) -> int:
+        """The state after a step, its arguments, and what it says."""
+        return max(1, self.states) + self._columns + 3
+
+    @property
+    def _columns(self) -> int:
+        return max(1, len(self.arguments.defaults) * len(self.step.times))
+
+    @property
+    def own(self) -> dict[str, object]:
+        """Stages and spans."""
+        flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
+        unknowns = counted(self.arguments.expressions.total, "unknown")
+        return {
+            "method": self.step.method.name,
+            "n_times": len(self.step.times),
+            "sz_p": self._columns,
+            "sz_one": max(1, len(self.arguments.defaults)),
+            "indent": " " * len(f"int {self.name}_step("),
+            "indent_through": " " * len(f"int {self.name}_step_through("),
+            "usual_step": repr(self.usual),
+            "model_in_words": f"In {self.where}: {flexible}, {unknowns} at each stage.",
+        }
+
+    @property
+    def usual(self) -> float:
+        """Length of the steps of the check, s."""
+        analysis = self.scene.analysis
+        return float(analysis.step or analysis.duration / 1000.0)
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Functions and method."""
+        names = ["step", "step_through", "begin", "refresh", "times", "tell", "defaults", "message"]
+        return {"functions": names, "integrator": self.step.method.name, "times": self.step.times.tolist()}
+
+    @property
+    def tables(self) -> list[str]:
+        """Where the motion begins, and when a step asks for arguments."""
+        converged = f"#define SF_CONVERGED {CONVERGED!r}\n"
+        return [converged, table("sf_begin", self.step.begin), table("sf_times", self.step.times)]
+
+    @property
+    def cases(self) -> dict[str, object]:
+        """The first steps, with arguments that change a little from stage to stage."""
+        step, state = self.step, self.step.begin
+        arguments, results = [], []
+        for number in range(CHECKED):
+            shares = 1.0 + 0.01 * (number + step.times)
+            p = shares[:, None] * self.arguments.defaults
+            state = step.step(state, self.usual, p)
+            arguments.append(p.ravel())
+            results.append(step.told(state, p[-1]))
+        return {
+            "n_cases": CHECKED,
+            "case_arguments": rows(arguments),
+            "case_results": rows(results),
+            "units": row(self.units(results)),
+        }
