@@ -362,6 +362,139 @@ def test_no_solution_is_a_status_and_no_numbers(tmp_path):
     assert said(built(tmp_path / "c", "c", source="huge.c")) == "1 1"
 
 
+# -- what an attack found -------------------------------------------------------------------------
+
+
+def two_strips(stiff):
+    """A soft cantilever beside a stiff one, from one clamp."""
+    table = cantilever(value=[0.0, 1.0])
+    table["sections"]["stiff"] = {"EI3": stiff}
+    table["nodes"]["C"] = {"position": [-1, 0]}
+    table["members"]["other"] = {"nodes": ["A", "C"], "section": "stiff"}
+    return table
+
+
+@pytest.mark.parametrize("stiff", [1.0, 1e12])
+def test_soft_parts_beside_stiff_ones_are_arguments_too(stiff):
+    solver = equilibrium_solver(Scene.from_dict(two_strips(stiff)), "c", arguments=["sections.s.EI3"])
+    table = cantilever(value=[0.0, 1.0])
+    for value in (1.0, 2.0):
+        table["sections"]["s"]["EI3"] = value
+        wanted = solve(Scene.from_dict(table), accuracy=1e-8).last.position("B")
+        found = solver.by_name(solver.solve([value])[1])["nodes.B.position"]
+        assert found == pytest.approx(wanted, abs=1e-5)
+
+
+def test_arguments_have_limits():
+    names = {"nodes.B.position.1": (-0.2, 0.2), "sections.s.EI3": None}
+    solver = equilibrium_solver(beam(), "c", arguments=names)
+    assert solver.solve([0.1, 1.0])[0].code is Code.SOLVED
+    for numbers in ([0.3, 1.0], [-0.3, 1.0], [0.0, 0.0], [0.0, -1.0], [np.inf, 1.0]):
+        outcome, results = solver.solve(numbers)
+        assert outcome.code is Code.BAD_ARGUMENT
+        assert np.isnan(results).all()
+
+
+@needs_compiler
+def test_c_has_the_limits_and_refuses_states_that_are_none(tmp_path):
+    scene = Scene.from_dict(systems.linked_space())
+    export(scene, tmp_path / "c", name="c", arguments={"sections.s.GJ": None, "factor": (0.5, 2.0)})
+    text = '#include "c.h"\n#include <stdio.h>\n#include <math.h>\nstatic c_memory m; static double x[C_STATE];\n'
+    text += "static double z[C_STATE];\n"
+    text += "int main(void){double p[2], r[C_RESULTS], q[C_RESULTS]; int a = 1, b, c, k; c_defaults(p);\n"
+    # A state of zeros has no rotations: there the loads are followed from zero.
+    text += "c_solve(&m, p, z, 0, q, 0); c_solve(&m, p, x, 1, r, 0);\n"
+    text += "for (k = 0; k < C_RESULTS; ++k) a &= fabs(q[k] - r[k]) <= 1e-8 * (1.0 + fabs(q[k]));\n"
+    text += "p[1] = 2.5; b = c_solve(&m, p, x, 0, r, 0) == C_BAD_ARGUMENT; p[1] = 1.0;\n"
+    text += "p[0] = 0.0; c = c_solve(&m, p, x, 0, r, 0) == C_BAD_ARGUMENT;\n"
+    text += 'printf("%d %d %d", a, b, c); return 0;}\n'
+    (tmp_path / "c" / "limits.c").write_text(text)
+    assert said(built(tmp_path / "c", "c", source="limits.c")) == "1 1 1"
+
+
+def test_scenes_without_unknowns_are_exported(tmp_path):
+    table = cantilever(value=[0.0, 1.0])
+    table["members"]["m"] = {"nodes": ["A", "B"], "type": "rigid"}
+    solver = export(Scene.from_dict(table), tmp_path / "c", sensitivities=True)
+    found = solver.by_name(solver.solve()[1])
+    assert found["nodes.B.position"] == pytest.approx([1, 0, 0], abs=1e-15)
+    assert found["reactions.A.moment"] == pytest.approx([0, 0, -1], abs=1e-15)
+    if shutil.which("gcc"):
+        assert "agree" in said(built(tmp_path / "c", "structure"))
+
+
+def test_what_is_not_unique_is_not_told():
+    table = cantilever(value=[0.0, 1.0])
+    table |= {"dimension": "space"}
+    table["members"] = {n: {"nodes": ["A", "B"], "section": "s"} for n in ("one", "two")}
+    table["nodes"]["A"] = {"position": [0, 0], "support": "clamped"}
+    scene = Scene.from_dict(table)
+    solver = equilibrium_solver(scene, "c")
+    unique = not any("not unique" in note for note in solver.answer.notes)
+    names = [one.name for one in solver.results.results]
+    assert unique == any(name.startswith("reactions.") for name in names)
+    if not unique:
+        with pytest.raises(SceneError, match="not unique as closings depend on each other"):
+            equilibrium_solver(scene, "c", results=["reactions.A.force"])
+
+
+@pytest.mark.parametrize("title", ['a """ b \\N', "a /* b */ c", "load @50@ N", "\u00e9 %s"])
+def test_titles_stand_in_comments(title, tmp_path):
+    export(beam(title=title), tmp_path / "c", name="c", results=["nodes.B.position"])
+    compile((tmp_path / "c" / "c.py").read_text(), "c.py", "exec")
+    if shutil.which("gcc"):
+        assert "agree" in said(built(tmp_path / "c", "c"))
+
+
+@pytest.mark.parametrize("name", ["sf", "math", "m", "json", "main", "while"])
+def test_names_that_mean_something_else(name, tmp_path):
+    with pytest.raises(SceneError, match="accepted: a name of letters"):
+        export(beam(), tmp_path / "c", name=name)
+
+
+def test_foreign_folders_are_not_overwritten(tmp_path):
+    place = tmp_path / "web"
+    place.mkdir()
+    (place / "manifest.json").write_text("{}")
+    with pytest.raises(SceneError, match="holds other things"):
+        export(beam(), place, overwrite=True)
+    (place / "manifest.json").unlink()
+    export(beam(), place)
+    (place / "thesis.txt").write_text("x")
+    with pytest.raises(SceneError, match="holds other things"):
+        export(beam(), place, overwrite=True)
+    assert (place / "thesis.txt").read_text() == "x"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["analysis.accuracy"], "a number on which nothing depends"),
+        (["loads.tip.value", "loads.tip.value.1"], "more than once"),
+    ],
+)
+def test_arguments_without_effect(arguments, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        equilibrium_solver(beam(), "c", arguments=arguments)
+
+
+def test_stiffness_of_what_the_ground_holds():
+    with pytest.raises(SceneError, match=r"a node that the ground holds, accepted: a free one, or compliance\.A"):
+        equilibrium_solver(beam(), "c", results=["stiffness.A"])
+
+
+def test_a_cold_solve_leads_where_statics_does():
+    # Far beyond buckling whole loads carry a column elsewhere than growing ones do.
+    scene = load(PROBLEMS / "cantilever_inclined_force_near_compression_other_side.toml")
+    solver = equilibrium_solver(scene, "c")
+    outcome, flat = solver.solve()
+    assert outcome.code is Code.SOLVED
+    found = solver.by_name(flat)
+    for node in scene.nodes:
+        size = 10.0 * scene.size * scene.analysis.accuracy
+        assert found[f"nodes.{node}.position"] == pytest.approx(solver.answer.position(node), abs=size)
+
+
 # -- in process -----------------------------------------------------------------------------------
 
 

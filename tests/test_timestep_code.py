@@ -1,0 +1,135 @@
+"""Time steps as generated C: the steps of the integrator, to the last bit."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_codegen import built, needs_compiler, said
+
+from sfetcas import Scene, SceneError, export, load, solve
+from sfetcas.codegen.timestep import time_step
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+MOVING = [
+    "cantilever_force_pulse",
+    "slider_crank_motion",
+    "pendulum_flexible_smooth",
+    "pendulums_rigid",
+    "elbow_force_pulse",
+]
+MOVING += ["pendulum_in_space", "flying_rod_in_space", "spin_up"]
+INTEGRATORS = ["radau-3", "radau-2", "generalised-alpha", "conserving"]
+
+
+def rod(**analysis):
+    """A cantilever that a tip force bends suddenly."""
+    return Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s", "element": "SFET5", "elements": 2}},
+            "loads": {"tip": {"type": "force", "node": "B", "value": [0, 2]}},
+            "analysis": {"type": "dynamic", "end": 0.5, **analysis},
+        }
+    )
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", MOVING)
+def test_c_takes_the_steps_of_the_integrator(name, tmp_path):
+    export(load(PROBLEMS / f"{name}.toml"), tmp_path / "c", name="motion")
+    words = re.fullmatch(r"(\d+) of (\d+) steps agree, (\d+) of them to the last bit.*\n",
+                         said(built(tmp_path / "c", "motion")))  # fmt: skip
+    assert words
+    assert words[1] == words[2] == words[3] == "10"
+
+
+@needs_compiler
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_every_integrator_in_c(integrator, tmp_path):
+    export(rod(integrator=integrator, step=0.01), tmp_path / "c", name="motion")
+    assert "10 of 10 steps agree, 10 of them to the last bit" in said(built(tmp_path / "c", "motion"))
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_steps_are_those_of_the_simulation(integrator):
+    scene = rod(integrator=integrator, step=0.01, output=0.5)
+    made = time_step(scene, "motion")
+    state = made.begin
+    for _ in range(50):
+        state = made.step(state, 0.01)
+    found = dict(zip([r.name for r in made.results.results], np.split(made.told(state), splits(made)), strict=True))
+    last = solve(scene).last
+    # Elements are given: both have the same mesh; the prediction of a step does not change where Newton's method ends.
+    assert found["nodes.B.position"] == pytest.approx(last.position("B"), abs=1e-9)
+    # Velocities of answers come of polynomials through several steps: those of a step are of its order only.
+    assert found["nodes.B.velocity"] == pytest.approx(last.velocity("B"), abs=0.1)
+
+
+def splits(made):
+    return np.cumsum([result.size for result in made.results.results])[:-1]
+
+
+def test_loads_in_the_step_are_arguments():
+    made = time_step(rod(), "motion", arguments=["loads.tip.value.1", "sections.s.EI3"])
+    assert list(made.arguments.defaults) == [2.0, 1.0]
+    state = made.begin
+    for _ in range(20):
+        state = made.step(state, 0.005, [0.0, 1.0])
+    # Without load it stays where it is.
+    assert made.told(state, [0.0, 1.0])[:4] == pytest.approx(made.told(made.begin, [0.0, 1.0])[:4], abs=1e-14)
+    soft, stiff = made.begin, made.begin
+    for _ in range(60):
+        soft, stiff = made.step(soft, 0.005, [2.0, 0.5]), made.step(stiff, 0.005, [2.0, 4.0])
+    y = [made.told(one)[5] for one in (soft, stiff)]
+    assert y[0] > 1.5 * y[1] > 0.0
+
+
+def test_a_step_that_fails_is_no_number():
+    made = time_step(rod(), "motion")
+    assert np.isnan(made.step(made.begin, 1e9, 1e9 * np.ones(3))).all()
+
+
+@needs_compiler
+def test_loader_of_steps(tmp_path):
+    export(rod(step=0.01), tmp_path / "c", name="motion")
+    subprocess.run(["make", "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
+    text = "import motion\nm = motion.Motion()\nfor _ in range(50): a = m.step(0.01)\n"
+    text += "bad = m.step(float('nan'))\nprint(a['status'], bad['status'], bad['nodes.B.position'], m.time, *a['nodes.B.position'])"
+    run = subprocess.run([sys.executable, "-c", text], cwd=tmp_path / "c", capture_output=True, text=True, check=True)
+    status, bad, nothing, time, *position = run.stdout.split()
+    assert (status, bad, nothing) == ("0", "2", "None")
+    assert float(time) == pytest.approx(0.5)
+    wanted = solve(rod(step=0.01, output=0.5)).last.position("B")
+    assert [float(x) for x in position] == pytest.approx(wanted, abs=1e-9)
+
+
+@needs_compiler
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs a C++ compiler")
+def test_steps_are_cpp_and_pass_sanitizers(tmp_path):
+    export(rod(step=0.01), tmp_path / "c", name="motion")
+    flags = ["-x", "c++", "-O1", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
+    assert "10 of 10" in said(built(tmp_path / "c", "motion", flags=flags, compiler="g++"))
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"results": ["reactions.A.force"]}, "found 'reactions.A.force', accepted of a step"),
+        ({"results": ["members.m.moment"]}, "found 'members.m.moment', accepted of a step"),
+        ({"arguments": ["sections.s.rhoA"]}, "accepted"),
+        ({"sensitivities": True}, "found a motion, accepted: sensitivities of equilibria"),
+    ],
+)
+def test_what_a_step_cannot_tell(options, sentence, tmp_path):
+    with pytest.raises(SceneError, match=re.escape(sentence)):
+        export(rod(), tmp_path / "c", **options)
+
+
+def test_steps_of_a_library_are_not_exported(tmp_path):
+    with pytest.raises(SceneError, match="found 'idas', whose steps are a library's own, accepted for C: radau-3"):
+        export(rod(integrator="idas"), tmp_path / "c")
