@@ -18,8 +18,10 @@ large motion, Part 1.
 
 from .analyses import solve
 from .checks import check
+from .codegen.derivatives import Derivatives
 from .codegen.equilibrium import EquilibriumSolver
 from .codegen.folder import export
+from .codegen.timestep import TimeStep
 from .description.contacts import Contact
 from .description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene, Until
 from .description.scenefile import dump, load
@@ -50,6 +52,7 @@ __all__ = [
     "Contact",
     "CrossSection",
     "Curvature",
+    "Derivatives",
     "Equilibrium",
     "EquilibriumSolver",
     "Expect",
@@ -82,6 +85,7 @@ __all__ = [
     "Status",
     "Straight",
     "Table",
+    "TimeStep",
     "Trajectory",
     "Until",
     "assemble",

@@ -109,6 +109,9 @@ def _parser() -> argparse.ArgumentParser:
         "--places", action="append", metavar="MEMBER=X,X,...", help="fractions of a member where it is told of"
     )
     code.add_argument("--sensitivities", action="store_true", help="derivatives of results by arguments, too")
+    code.add_argument(
+        "--derivatives", action="store_true", help="no solver, but energy, constraints and their derivatives"
+    )
     code.add_argument("--overwrite", action="store_true", help="replace an earlier export")
     _add_overrides(code)
     code.set_defaults(command=_export)
@@ -255,6 +258,7 @@ def _export(options: argparse.Namespace) -> int:
             results=options.result,
             places=places,
             sensitivities=options.sensitivities,
+            derivatives=options.derivatives,
             settings=_settings(options),
             overwrite=options.overwrite,
         ),
@@ -263,7 +267,8 @@ def _export(options: argparse.Namespace) -> int:
     print(f"  {flexible(solver.model)}, {counted(solver.arguments.expressions.total, 'unknown')}")
     for one in solver.arguments.arguments:
         print(f"  argument {one.name} [{one.unit}]: {', '.join(f'{x:.6g}' for x in one.default)}")
-    print(f"  {counted(solver.results.size, 'number')} in {counted(len(solver.results.results), 'result')}")
+    if solver.results.results:
+        print(f"  {counted(solver.results.size, 'number')} in {counted(len(solver.results.results), 'result')}")
     return SOLVED
 
 

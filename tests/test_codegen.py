@@ -7,13 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 import systems
 from scenes import cantilever, helix
 
-from sfetcas import Scene, SceneError, Settings, assemble, export, load, solve, solve_model
+from sfetcas import Prepared, Scene, SceneError, Settings, assemble, export, load, solve, solve_model
 from sfetcas.codegen.arguments import argument, default_arguments
+from sfetcas.codegen.derivatives import derivatives
 from sfetcas.codegen.equilibrium import equilibrium_solver
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
@@ -572,3 +574,91 @@ def test_folders_are_not_lost(tmp_path):
     export(beam(), tmp_path / "c", overwrite=True)
     assert "factor" in (tmp_path / "c" / "manifest.json").read_text()
     assert [file.name for file in (tmp_path / "full").iterdir()] == ["mine.txt"]
+
+
+# -- energy, constraints and their derivatives ----------------------------------------------------
+
+PROGRAMS = ["cantilever_tip_force", "slider_crank", "three_members_spring_and_guide", "spatial_fourbar"]
+PROGRAMS += ["bend_45_degrees", "mechanism_two_loops_small"]
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_derivatives_in_c(name, tmp_path):
+    export(load(PROBLEMS / f"{name}.toml"), tmp_path / "c", name="c", derivatives=True)
+    assert "3 of 3 cases agree, 3 of them to the last bit" in said(built(tmp_path / "c", "c"))
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_derivatives_are_those_of_the_energy(name):
+    program = derivatives(load(PROBLEMS / f"{name}.toml"), "c")
+    base, x, functions = program.arguments.defaults, program.guess, program.functions
+    random = np.random.default_rng(1)
+    way, count = random.standard_normal(len(x)), program.nlp.g.numel()
+    x = x + 0.05 * random.standard_normal(len(x))
+    multipliers = random.standard_normal(count)
+
+    def at(what, place, *more):
+        return np.array(functions[what](base, place, *more)).ravel()
+
+    def matrix(what, *more):
+        return np.array(ca.DM(program.patterns[what], at(what, x, *more)))
+
+    def slope(what, step=1e-5):
+        return (at(what, x + step * way) - at(what, x - step * way)) / (2.0 * step)
+
+    size = max(1.0, np.abs(at("gradient", x)).max())
+    # Differences over 1e-5 know eleven digits less those of the third derivative.
+    assert slope("energy") == pytest.approx(at("gradient", x) @ way, abs=1e-6 * size)
+    second = matrix("hessian", 1.0, np.zeros(count))
+    assert slope("gradient") == pytest.approx(second @ way, abs=1e-6 * max(size, np.abs(second).max()))
+    assert second == pytest.approx(second.T, abs=1e-12 * np.abs(second).max())
+    if count:
+        first = matrix("jacobian")
+        assert slope("constraints") == pytest.approx(first @ way, abs=1e-6)
+        bent = matrix("hessian", 0.0, multipliers)
+        change = [multipliers @ np.array(ca.DM(program.patterns["jacobian"], at("jacobian", x + s * way)))
+                  for s in (1e-5, -1e-5)]  # fmt: skip
+        assert (change[0] - change[1]) / 2e-5 == pytest.approx(bent @ way, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_the_answer_is_stationary(name):
+    program = derivatives(load(PROBLEMS / f"{name}.toml"), "c")
+    base, x = program.arguments.defaults, program.guess
+    gradient = np.array(program.functions["gradient"](base, x)).ravel()
+    left = gradient
+    if program.nlp.g.numel():
+        assert np.array(program.functions["constraints"](base, x)).ravel() == pytest.approx(0.0, abs=1e-9)
+        entries = np.array(program.functions["jacobian"](base, x)).ravel()
+        first = np.array(ca.DM(program.patterns["jacobian"], entries))
+        left = gradient + first.T @ np.linalg.lstsq(first.T, -gradient, rcond=None)[0]
+    assert np.abs(left).max() <= 1e-9 * max(1.0, np.abs(gradient).max())
+
+
+def test_programs_follow_their_arguments():
+    program = derivatives(beam(), "c", arguments=["loads.tip.value", "factor"])
+    numbers = np.array([1.0, -2.0, 0.7])
+    table = cantilever(value=[1.0, -2.0])
+    model = assemble(Scene.from_dict(table), program.model.mesh, assembly=program.model.assembly)
+    problem = Prepared(model)._problem
+    x = program.guess
+    value = problem.parameters(model.loading(0.7))
+    wanted = ca.Function("f", [problem.nlp.x, problem.nlp.p], [problem.nlp.f])(x, value)
+    assert float(program.functions["energy"](numbers, x)) == pytest.approx(float(wanted), rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "sentence"),
+    [
+        ("cantilever_follower_force", {}, "loads without potential, and moments in space, have no energy"),
+        ("cantilever_tip_force", {"arguments": ["sections.beam.EI3"]}, "accepted of a program: loads and motions"),
+        ("cantilever_tip_force", {"results": ["nodes.tip.position"]}, "accepted: none, as a program has unknowns"),
+    ],
+)
+def test_programs_that_are_none(name, options, sentence, tmp_path):
+    scene = load(PROBLEMS / f"{name}.toml")
+    if "arguments" in options:
+        options = {"arguments": [f"sections.{next(iter(scene.sections))}.EI3"]}
+    with pytest.raises(SceneError, match=sentence):
+        export(scene, tmp_path / "c", derivatives=True, **options)

@@ -14,14 +14,8 @@ from sfetcas import Scene, SceneError, export, load, solve
 from sfetcas.codegen.timestep import time_step
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
-MOVING = [
-    "cantilever_force_pulse",
-    "slider_crank_motion",
-    "pendulum_flexible_smooth",
-    "pendulums_rigid",
-    "elbow_force_pulse",
-]
-MOVING += ["pendulum_in_space", "flying_rod_in_space", "spin_up"]
+MOVING = ["cantilever_force_pulse", "slider_crank_motion", "pendulum_flexible_smooth", "pendulums_rigid"]
+MOVING += ["elbow_force_pulse", "pendulum_in_space", "flying_rod_in_space", "spin_up"]
 INTEGRATORS = ["radau-3", "radau-2", "generalised-alpha", "conserving"]
 
 
@@ -84,7 +78,7 @@ def test_loads_in_the_step_are_arguments():
     assert made.told(state, [0.0, 1.0])[:4] == pytest.approx(made.told(made.begin, [0.0, 1.0])[:4], abs=1e-14)
     soft, stiff = made.begin, made.begin
     for _ in range(60):
-        soft, stiff = made.step(soft, 0.005, [2.0, 0.5]), made.step(stiff, 0.005, [2.0, 4.0])
+        soft, stiff = made.step(soft, 0.005, [2.0, 0.5]), made.step(stiff, 0.005, [2.0, 40.0])
     y = [made.told(one)[5] for one in (soft, stiff)]
     assert y[0] > 1.5 * y[1] > 0.0
 
@@ -99,7 +93,9 @@ def test_loader_of_steps(tmp_path):
     export(rod(step=0.01), tmp_path / "c", name="motion")
     subprocess.run(["make", "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
     text = "import motion\nm = motion.Motion()\nfor _ in range(50): a = m.step(0.01)\n"
-    text += "bad = m.step(float('nan'))\nprint(a['status'], bad['status'], bad['nodes.B.position'], m.time, *a['nodes.B.position'])"
+    text += (
+        "bad = m.step(float('nan'))\nn = 'nodes.B.position'\nprint(a['status'], bad['status'], bad[n], m.time, *a[n])"
+    )
     run = subprocess.run([sys.executable, "-c", text], cwd=tmp_path / "c", capture_output=True, text=True, check=True)
     status, bad, nothing, time, *position = run.stdout.split()
     assert (status, bad, nothing) == ("0", "2", "None")
@@ -122,7 +118,7 @@ def test_steps_are_cpp_and_pass_sanitizers(tmp_path):
         ({"results": ["reactions.A.force"]}, "found 'reactions.A.force', accepted of a step"),
         ({"results": ["members.m.moment"]}, "found 'members.m.moment', accepted of a step"),
         ({"arguments": ["sections.s.rhoA"]}, "accepted"),
-        ({"sensitivities": True}, "found a motion, accepted: sensitivities of equilibria"),
+        ({"sensitivities": True}, "found a motion, accepted of an equilibrium only"),
     ],
 )
 def test_what_a_step_cannot_tell(options, sentence, tmp_path):

@@ -7,13 +7,18 @@ import keyword
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..files import write_folder
+from .derivatives import Derivatives
+from .derivatives import derivatives as program_of
 from .equilibrium import EquilibriumSolver, Place, equilibrium_solver
+from .rendering import Writer
 from .timestep import TimeStep, time_step
+from .writing_derivatives import DerivativesWriter
 from .writing_equilibria import EquilibriumWriter
 from .writing_steps import StepWriter
 
@@ -37,9 +42,10 @@ def export(
     results: Sequence[str] | None = None,
     places: Place | None = None,
     sensitivities: bool = False,
+    derivatives: bool = False,
     settings: Settings | None = None,
     overwrite: bool = False,
-) -> EquilibriumSolver | TimeStep:
+) -> EquilibriumSolver | TimeStep | Derivatives:
     """Write an equilibrium solver of a scene, or the time step of a motion, as C99 without dependencies.
 
     Parameters
@@ -60,6 +66,8 @@ def export(
         Where they are told of.
     sensitivities : bool
         Derivatives of all results by all arguments, too.
+    derivatives : bool
+        Instead of a solver energy, constraints and their derivatives: the nonlinear program of the equilibrium.
     settings : Settings, optional
         Accuracy, elements.
     overwrite : bool
@@ -67,7 +75,7 @@ def export(
 
     Returns
     -------
-    EquilibriumSolver or TimeStep
+    EquilibriumSolver, TimeStep or Derivatives
         The same in process.
 
     Raises
@@ -82,14 +90,24 @@ def export(
     path = Path(folder)
     check_name(name)
     check_folder(path, overwrite=overwrite)
-    kind = time_step if scene.analysis.type == "dynamic" else equilibrium_solver
-    made = kind(scene, name, arguments=arguments, results=results, places=places, settings=settings)
-    if isinstance(made, EquilibriumSolver):
-        files = EquilibriumWriter(made, sensitivities=sensitivities).files()
-    elif sensitivities:
-        raise SceneError("found a motion, accepted: sensitivities of equilibria", ("sensitivities",))
+    made: EquilibriumSolver | TimeStep | Derivatives
+    given: dict[str, Any] = {"arguments": arguments, "settings": settings}
+    writer: Writer
+    moving = scene.analysis.type == "dynamic"
+    if (sensitivities or derivatives) and moving:
+        raise SceneError("found a motion, accepted of an equilibrium only", ("sensitivities or derivatives",))
+    if derivatives:
+        if results or places or sensitivities:
+            raise SceneError("found results, accepted: none, as a program has unknowns", ("derivatives",))
+        made = program_of(scene, name, **given)
+        writer = DerivativesWriter(made)
+    elif moving:
+        made = time_step(scene, name, results=results, places=places, **given)
+        writer = StepWriter(made)
     else:
-        files = StepWriter(made).files()
+        made = equilibrium_solver(scene, name, results=results, places=places, **given)
+        writer = EquilibriumWriter(made, sensitivities=sensitivities)
+    files = writer.files()
 
     def write(place: Path) -> None:
         place.mkdir()

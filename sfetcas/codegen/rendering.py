@@ -96,10 +96,12 @@ class Writer(abc.ABC):
     """Templates of the header, of the example, of the check, of the loader and of the README."""
     example: str
     check: str
-    loader: str
+    loader: str | None
     readme: str
     bodies: tuple[str, ...]
     """Templates of the driver."""
+    last: tuple[str, ...] = ("defaults.c",)
+    """Those at its end."""
 
     def __init__(self, name: str, scene: Scene, arguments: Arguments, results: Results) -> None:
         self.name, self.scene, self.arguments, self.results = name, scene, arguments, results
@@ -174,7 +176,7 @@ class Writer(abc.ABC):
             functions_in_c(self.functions, self.name, self.roots),
             "/* ---- tables ---- */\n",
             *self.tables,
-            *(template(body) for body in (*self.bodies, "defaults.c")),
+            *(template(body) for body in (*self.bodies, *self.last)),
         ]
         source = filled("\n".join(parts), values)
         manifest = self._manifest()
@@ -186,7 +188,7 @@ class Writer(abc.ABC):
             "manifest.json": json.dumps(manifest, indent=1) + "\n",
             "main.c": filled(template(self.example), values),
             "check.c": filled(template(self.check), values),
-            f"{self.name}.py": filled(template(self.loader), values),
+            **({f"{self.name}.py": filled(template(self.loader), values)} if self.loader else {}),
             "Makefile": filled(template("Makefile"), values),
             "CMakeLists.txt": filled(template("CMakeLists.txt"), values),
             "README.md": filled(template(self.readme), values),

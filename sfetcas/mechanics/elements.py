@@ -173,6 +173,8 @@ class Element(Components):
     @functools.cached_property
     def gradient(self) -> ca.Function:
         """(q, stiffness, tangent, pull) -> energy and its gradient by ``vec(q)``."""
+        if self.space:
+            return self._gradient_in_space()
         q, *data = self._symbols()
         energy = self._energy(q, *data)[0]
         gradient = ca.vec(ca.gradient(energy, q))
@@ -181,6 +183,8 @@ class Element(Components):
     @functools.cached_property
     def hessian(self) -> ca.Function:
         """(q, stiffness, tangent, pull) -> dense Hessian of the energy by ``vec(q)``."""
+        if self.space:
+            return self._hessian_in_space()
         q, *data = self._symbols()
         hessian = ca.densify(ca.hessian(self._energy(q, *data)[0], q)[0])
         return self._function("hessian", [q, *data], {"hessian": hessian})
@@ -299,6 +303,26 @@ class Element(Components):
         block = ca.Function("spin", [one], [ca.densify(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))])
         blocks = block.map(self.order + 1)(q)
         return ca.diagcat(*ca.horzsplit(blocks, 3))
+
+    def _gradient_in_space(self) -> ca.Function:
+        q, *data = self._large_symbols()
+        energy, gradient = self._of_point("gradient").map(self.order + 1)(*self._at(q), *data)
+        results = {"energy": ca.sum2(energy), "gradient": ca.densify(ca.vec(self._on_nodes(gradient)))}
+        return self._function("gradient", [q, *data], results)
+
+    def _hessian_in_space(self) -> ca.Function:
+        q, *data = self._large_symbols()
+        hessian = self._of_point("hessian").map(self.order + 1)(*self._at(q), *data)
+        return self._function("hessian", [q, *data], {"hessian": self._between_nodes(hessian)})
+
+    def _of_point(self, what: str) -> ca.Function:
+        """(rotation, slope, stiffness, tangent, pull) of a point -> its energy and gradient (8,), or Hessian (8, 8)."""
+        here, slope, *data = self._point_symbols()
+        energy = self._strain_energy(here, slope, data[0]) + ca.dot(data[2], self._tangent(here, data[1]))
+        hessian, gradient = ca.hessian(energy, ca.vertcat(here, slope))
+        results = [energy, gradient] if what == "gradient" else [hessian]
+        name = f"point_{what}_{self._tag}"
+        return ca.Function(name, [here, slope, *data], [ca.densify(one) for one in results], {"cse": True})
 
     @functools.cached_property
     def _point(self) -> ca.Function:

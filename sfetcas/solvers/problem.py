@@ -17,6 +17,7 @@ import numpy as np
 
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array
+from ..mathematics.constants import constant, times
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseMap
 from ..mathematics.nlp import NLP
@@ -27,6 +28,7 @@ from ..mechanics.joints import by_components
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
+from .program import Program
 
 __all__ = ["EquilibriumProblem"]
 
@@ -470,6 +472,37 @@ class EquilibriumProblem:
         loads = [load.ravel() for load in loading.loads]
         wound = self._wound if near is None else near.wound
         return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift, wound, *loads])
+
+    def parameters_by(self, program: Program, near: Array) -> ca.MX:
+        """The same as an expression of what is given; data are those of the model."""
+        model, positions, given = self.model, self.model.positions, program.given
+        still = ca.MX(model.element.components, len(model.rotations.kind))
+        held = program.expressions.held(ca.densify(still), given)
+        moments = [ca.MX(0)] * self.x.numel()
+        if not model.space:
+            for i in np.flatnonzero(model.widths).tolist():
+                moments[self._reduction.first[i]] = given.moment[i]
+        force = ca.vertcat(ca.MX(0, 1), *moments)
+        kept = times(constant(positions.Y).T, given.force)
+        force += ca.vertcat(ca.MX.zeros(self._reduction.unknowns), kept)
+        offset = times(constant(positions.BZ), given.shift) - ca.DM(positions.Z @ self._rest)
+        whole = [ca.vec(self._only_held(held)), offset, force, given.shift, ca.MX(ca.DM(near))]
+        return ca.vertcat(given.pull, *whole, *given.loads)
+
+    def _only_held(self, q: ca.MX) -> ca.MX:
+        """Rotations that are held; all others zero."""
+        model = self.model
+        flags = np.repeat((model.rotations.kind == Turn.HELD)[None, :], model.element.components, axis=0)
+        rest = np.zeros(flags.shape)
+        if model.space:
+            # What no motion turns stands as it stood.
+            rest[0] = (model.rotations.kind == Turn.HELD) & ~self._driven
+        return q * ca.DM(flags.astype(float)) + ca.DM(rest)
+
+    @property
+    def _driven(self) -> Array:
+        """Which rotations motions prescribe."""
+        return np.any([group.turn.any(axis=1) for group in self.model.groups.values()], axis=0)
 
     def unknowns(self, state: State) -> Array:
         """The unknowns of the program at a state."""

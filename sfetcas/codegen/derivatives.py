@@ -1,0 +1,132 @@
+"""Energy, constraints and their derivatives as functions for C: the nonlinear program of an equilibrium."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..description.scene import Scene
+from ..equilibria.settings import Settings
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mathematics.nlp import NLP
+from ..mechanics.model import Model
+from ..solvers.prepared import Prepared
+from ..solvers.problem import EquilibriumProblem
+from ..solvers.program import is_data
+from .arguments import Arguments
+from .equilibrium import equilibrium_solver
+from .results import Results
+
+__all__ = ["Derivatives", "derivatives"]
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """The program of one scene on one mesh; every function of it is CasADi's, in process as in C.
+
+    Attributes
+    ----------
+    name : str
+        Beginning of all names in C.
+    scene : Scene
+    arguments : Arguments
+    results : Results
+        None of them: a program has unknowns.
+    nlp : NLP
+    parameters : MX
+        Of the program, as an expression of what is given.
+    guess : ndarray (unknowns,)
+        The answer of statics for the defaults.
+    """
+
+    name: str
+    scene: Scene
+    arguments: Arguments
+    results: Results
+    nlp: NLP
+    parameters: ca.MX
+    guess: Array
+
+    @property
+    def model(self) -> Model:
+        """The model, at values of the arguments where nothing vanishes by chance."""
+        return self.arguments.model
+
+    @functools.cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """(arguments, x) -> energy, gradient, constraints, jacobian; (arguments, x, weight, multipliers) -> hessian.
+
+        The Hessian is that of ``weight energy + multipliers.constraints``, full; matrices are the entries of their
+        patterns.
+        """
+        nlp, program = self.nlp, self.arguments.program
+        p = ca.MX.sym("arguments", len(self.arguments.defaults))
+        weight, multipliers = ca.MX.sym("weight"), ca.MX.sym("multipliers", nlp.g.numel())
+        found = {
+            "energy": nlp.f,
+            "gradient": ca.densify(nlp.gradient),
+            "constraints": ca.densify(nlp.g),
+            "jacobian": nlp.jacobian.nz[:],
+            "hessian": nlp.hessian(weight, multipliers).nz[:],
+        }
+        given = ca.substitute([self.parameters], [program.symbol], [self.arguments.given(p)])[0]
+        made = {}
+        for what, expression in found.items():
+            whole = ca.substitute([expression], [nlp.p], [given])[0]
+            more = [weight, multipliers] if what == "hessian" else []
+            names = ["arguments", "x", *(["weight", "multipliers"] if more else [])]
+            made[what] = ca.Function(f"{self.name}_of_{what}", [p, nlp.x, *more], [whole], names, [what])
+        return made
+
+    @property
+    def patterns(self) -> dict[str, ca.Sparsity]:
+        """Of the matrices."""
+        hessian = self.nlp.hessian(ca.MX(1), ca.MX.ones(self.nlp.g.numel()))
+        return {"jacobian": self.nlp.jacobian.sparsity(), "hessian": hessian.sparsity()}
+
+
+def derivatives(
+    scene: Scene,
+    name: str,
+    *,
+    arguments: Sequence[str] | Mapping[str, tuple[float, float] | None] | None = None,
+    settings: Settings | None = None,
+) -> Derivatives:
+    """The program of a scene, on the mesh that its accuracy asks for.
+
+    Parameters
+    ----------
+    scene, name, arguments, settings
+        As of :func:`~sfetcas.codegen.equilibrium.equilibrium_solver`; arguments are loads and motions.
+
+    Raises
+    ------
+    SceneError
+        Loads without potential, or numbers that are no loads.
+    """
+    solver = equilibrium_solver(scene, name, arguments=arguments, settings=settings)
+    model, program = solver.model, solver.arguments.program
+    if not model.minimisable:
+        message = "loads without potential, and moments in space, have no energy, accepted: the equilibrium solver"
+        raise SceneError(message, ("loads",))
+    changing = [part for part in program.sizes if is_data(part)]
+    if changing:
+        message = f"found numbers that change the {changing[0]}, accepted of a program: loads and motions"
+        raise SceneError(message, ("arguments",))
+    outcome, _ = solver.solve()
+    state = program.state(outcome.state)
+    loading = model.loading(scene.analysis.steps[-1])
+    prepared = Prepared(model)
+    near = prepared.equations.start(loading)
+    problem = EquilibriumProblem(model, loading, near, kernels="interpreted")
+    parameters = problem.parameters_by(program, near.wound)
+    none = Results(model, [], {})
+    guess = problem.unknowns(state)
+    if not np.isfinite(guess).all():
+        guess = problem.unknowns(near)
+    return Derivatives(name, scene, solver.arguments, none, problem.nlp, parameters, guess)
