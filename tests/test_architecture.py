@@ -168,6 +168,7 @@ ORDER = [
     "checks",
     "analyses",
     "benchmark_motion",
+    "benchmark_code",
     "benchmark",
     "reports",
     "outputs",
@@ -177,7 +178,7 @@ ORDER = [
 ]
 """A module imports only from names to its left."""
 
-PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion")
+PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion", "benchmark_code")
 """What is run and not imported: only these print."""
 
 PICTURES = (

@@ -12,6 +12,9 @@ from ..mathematics.arrays import Array
 
 __all__ = ["functions_in_c", "sizes_of", "sparsity_table", "table"]
 
+OPTIONS = {"with_header": False, "with_export": False, "casadi_int": "int", "verbose": False}
+"""What CasADi shall write: without its remarks, which list every entry of every matrix."""
+
 DEFINITION = re.compile(r"^(?:static )?(?:int|void|double|casadi_real|casadi_int|const \w+\*) (\w+)\(")
 """First line of a function in generated code."""
 
@@ -25,7 +28,7 @@ def functions_in_c(functions: Sequence[ca.Function], prefix: str, roots: Iterabl
     prefix : of all names that CasADi gives
     roots : names of what is called from outside; of CasADi's own as in ``casadi_ldl``
     """
-    generator = ca.CodeGenerator(f"{prefix}.c", {"with_header": False, "casadi_int": "int", "with_export": False})
+    generator = ca.CodeGenerator(f"{prefix}.c", OPTIONS)
     for function in functions:
         generator.add(function)
     head, chunks = _chunks(generator.dump())
