@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,7 +13,7 @@ from ..mathematics.arrays import Array
 
 __all__ = ["functions_in_c", "sizes_of", "sparsity_table", "table"]
 
-OPTIONS = {"with_header": False, "with_export": False, "casadi_int": "int", "verbose": False}
+OPTIONS: dict[str, Any] = {"with_header": False, "with_export": False, "casadi_int": "int", "verbose": False}
 """What CasADi shall write: without its remarks, which list every entry of every matrix."""
 
 DEFINITION = re.compile(r"^(?:static )?(?:int|void|double|casadi_real|casadi_int|const \w+\*) (\w+)\(")

@@ -156,12 +156,16 @@ class Outcome:
 class _Here:
     """A state and the equations there."""
 
-    state: Array
+    state: ca.DM
     residual: Array
     size: float
     potential: float
     gaps: float
-    entries: Array
+    entries: ca.DM
+
+
+def _flat(values: ca.DM) -> Array:
+    return np.array(values).ravel()
 
 
 class Globalised:
@@ -183,6 +187,8 @@ class Globalised:
         self.soft = np.repeat([0.0, 1.0, -1.0], [self._turning, self._unknowns - self._turning, equations.rows])
         row, column = (np.array(part) for part in program.sparsity.get_triplet())
         self.diagonal = np.flatnonzero(row == column)
+        # What is large stays with CasADi from function to function: to change hands costs more than most of these.
+        self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
         if self._symmetric and self._total:
             self._solver = ca.Linsol("globalised", "ldl", program.sparsity)
@@ -191,14 +197,19 @@ class Globalised:
 
     # -- linear algebra -----------------------------------------------------------------------------
 
-    def _factor(self, entries: Array, firm: float) -> int:
+    def _firmness(self) -> ca.Function:
+        """(entries, firm) -> entries made firmer, and the matrix of these made soft."""
+        entries, firm = ca.MX.sym("entries", self.program.sparsity.nnz()), ca.MX.sym("firm")
+        diagonal = self.diagonal.tolist()
+        target = ca.MX(entries)
+        target[diagonal] = target[diagonal] + (self.rules.proximal + firm) * ca.DM(self.mass)
+        soft = ca.MX(target)
+        soft[diagonal] = soft[diagonal] + self.rules.soft * ca.DM(self.soft)
+        return ca.Function("firmness", [entries, firm], [target, ca.MX(self.program.sparsity, soft)])
+
+    def _factor(self, entries: ca.DM, firm: float) -> int:
         """Factorise a matrix made firmer; its negative pivots, less those of the closings."""
-        rules = self.rules
-        self._target = entries.copy()
-        self._target[self.diagonal] += (rules.proximal + firm) * self.mass
-        matrix = self._target.copy()
-        matrix[self.diagonal] += rules.soft * self.soft
-        self._matrix = ca.DM(self.program.sparsity, matrix)
+        self._target, self._matrix = self._made_firm(entries, firm)
         if not self._symmetric or not self._total:
             return 0
         try:
@@ -211,8 +222,8 @@ class Globalised:
         if not self._total:
             return b
         if not self._symmetric:
-            return np.array(self.program.linear(self._matrix.nz[:], b)).ravel()
-        return np.array(self._solver.solve(self._matrix, b)).ravel()
+            return _flat(self.program.linear(self._matrix.nz[:], b))
+        return _flat(self._solver.solve(self._matrix, b))
 
     def _solved(self, b: Array) -> Array | None:
         """Solution for the matrix factorised last, the softness taken back by refinement; None where that fails."""
@@ -220,7 +231,7 @@ class Globalised:
         largest = float(np.abs(b).max(initial=0.0))
         for _ in range(self.rules.rounds):
             x = x + self._backward(left)
-            left = np.array(self.program.left(self._target, x, b)).ravel()
+            left = _flat(self.program.left(self._target, x, b))
             size = float(np.abs(left).max(initial=0.0))
             if not size < last:
                 break
@@ -234,9 +245,9 @@ class Globalised:
         negative = self._factor(here.entries, 0.0)
         return (None if negative == FAILED else self._solved(-here.residual)), negative
 
-    def _downwards(self, here: _Here, given: Array) -> Array | None:
+    def _downwards(self, here: _Here, given: ca.DM) -> Array | None:
         """A step downhill by a positive matrix, as firm as it takes."""
-        entries = np.array(self.program.convex(here.state, given)).ravel()
+        entries = self.program.convex(here.state, given)
         firm = 0.0
         while firm < FIRMEST:
             if self._factor(entries, firm) == 0:
@@ -248,19 +259,19 @@ class Globalised:
 
     # -- states ---------------------------------------------------------------------------------------
 
-    def _at(self, state: Array, given: Array) -> _Here:
-        residual, size, potential, gaps, entries = (np.array(a).ravel() for a in self.program.at(state, given))
-        return _Here(state, residual, float(size[0]), float(potential[0]), float(gaps[0]), entries)
+    def _at(self, state: ca.DM, given: ca.DM) -> _Here:
+        residual, size, potential, gaps, entries = self.program.at(state, given)
+        return _Here(state, _flat(residual), float(size), float(potential), float(gaps), entries)
 
-    def _moved(self, state: Array, step: Array, share: float) -> Array:
-        return np.array(self.program.move(state, step, share)).ravel()
+    def _moved(self, state: ca.DM, step: Array, share: float) -> ca.DM:
+        return self.program.move(state, step, share)
 
     def _length(self, step: Array) -> float:
         return float(np.abs(step[: self._turning]).max(initial=0.0))
 
-    def _multipliers(self, state: Array) -> Array:
-        end = len(state) - self.program.expressions.layout.near
-        return state[end - (self._total - self._unknowns) : end]
+    def _multipliers(self, state: ca.DM) -> Array:
+        end = self.program.states - self.program.expressions.layout.near
+        return _flat(state[end - (self._total - self._unknowns) : end])
 
     # -- the method -----------------------------------------------------------------------------------
 
@@ -272,8 +283,9 @@ class Globalised:
         if not np.isfinite(given).all() or (start is not None and not np.isfinite(start).all()):
             return Outcome(Code.BAD_ARGUMENT, np.full(program.states, np.nan), np.inf, NOT_DEFINED, 0)
         self._left = rules.iterations
-        state = np.array(program.begin(given) if start is None else program.hold(start, given)).ravel()
-        found = self._from(state, given)
+        self._free = not given[program.slice_of("moment")].any()
+        whole = ca.DM(given)
+        found = self._from(program.begin(whole) if start is None else program.hold(start, whole), whole)
         if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:
             followed = self._followed(given)
             found = followed if followed.code is Code.SOLVED else found
@@ -281,7 +293,7 @@ class Globalised:
             found = replace(found, code=Code.NOT_FINITE)
         return replace(found, iterations=rules.iterations - self._left)
 
-    def _from(self, state: Array, given: Array) -> Outcome:
+    def _from(self, state: ca.DM, given: ca.DM) -> Outcome:
         """Downhill from a state, and out of what is unstable."""
         if not self.program.model.minimisable:
             return self._corrected(self._at(state, given), given, self._left)
@@ -289,13 +301,13 @@ class Globalised:
             found = self._descended(self._at(state, given), given)
             if found.code is not Code.SOLVED or found.negative <= 0:
                 return found
-            state = self._nudged(found.state, given)
+            state = self._nudged(ca.DM(found.state), given)
         return replace(found, code=Code.UNSTABLE)
 
     def _ended(self, code: Code, here: _Here, negative: int = NOT_DEFINED) -> Outcome:
-        return Outcome(code, here.state, here.size, negative, 0)
+        return Outcome(code, _flat(here.state), here.size, negative, 0)
 
-    def _descended(self, here: _Here, given: Array) -> Outcome:
+    def _descended(self, here: _Here, given: ca.DM) -> Outcome:
         """Downhill to an equilibrium, stable or not."""
         rules, scale, first = self.rules, 1.0, True
         while self._left:
@@ -319,7 +331,8 @@ class Globalised:
                 step = self._downwards(here, given)
             if step is None or not np.isfinite(self._length(step)):
                 return self._ended(Code.STALLED, here)
-            most = np.inf if given[self.program.slice_of("moment")].any() else rules.turn
+            # Forces turn no node far in a step, so that they do not wind a beam up; a moment may roll it up at once.
+            most = rules.turn if self._free else np.inf
             scale = min(1.0, 4.0 * scale, most / max(self._length(step), TINY))
             found = self._shortened(here, step, scale, given)
             if found is None:
@@ -327,7 +340,7 @@ class Globalised:
             here, scale = found
         return self._ended(Code.ITERATIONS, here)
 
-    def _shortened(self, here: _Here, step: Array, scale: float, given: Array) -> tuple[_Here, float] | None:
+    def _shortened(self, here: _Here, step: Array, scale: float, given: ca.DM) -> tuple[_Here, float] | None:
         """Where a step leads, shortened until potential and gaps fall, and its share; None where they never do."""
         rules, n = self.rules, self._unknowns
         lam = self._multipliers(here.state)
@@ -350,7 +363,7 @@ class Globalised:
 
     # -- out of what is unstable ----------------------------------------------------------------------
 
-    def _nudged(self, state: Array, given: Array) -> Array:
+    def _nudged(self, state: ca.DM, given: ca.DM) -> ca.DM:
         """The state moved along its softest shape to the side of lower energy."""
         shape = self._softest(self._at(state, given).entries)
         shape *= self.rules.nudge / max(self._length(shape), TINY)
@@ -359,7 +372,7 @@ class Globalised:
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
         return sides[1] if up - down > 1e-9 * max(abs(up), abs(down)) else sides[0]
 
-    def _softest(self, entries: Array) -> Array:
+    def _softest(self, entries: ca.DM) -> Array:
         """The shape of the lowest eigenvalue, by inverse iteration from below it."""
         firm = self.rules.firm
         while self._factor(entries, firm) != 0 and firm < FIRMEST:
@@ -378,32 +391,31 @@ class Globalised:
     def _followed(self, given: Array) -> Outcome:
         """Where the loads lead, growing from zero."""
         program, rules = self.program, self.rules
-        state = np.array(program.begin(self._shared(given, 0.0))).ravel()
-        share, reached, step = 0.0, state, 1.0
+        share, reached, step = 0.0, program.begin(self._shared(given, 0.0)), 1.0
         found = None
         while share < 1.0 and self._left:
             there = min(1.0, share + step)
             loads = self._shared(given, there)
-            held = np.array(program.hold(reached, loads)).ravel()
+            held = program.hold(reached, loads)
             found = self._corrected(self._at(held, loads), loads, rules.corrections)
             if found.code is Code.SOLVED:
-                share, reached, step = there, found.state, 2.0 * step
+                share, reached, step = there, ca.DM(found.state), 2.0 * step
                 continue
             step *= 0.5
             if step < rules.shortest:
                 return found
         if found is None or share < 1.0:
-            return Outcome(Code.ITERATIONS, reached, np.inf, NOT_DEFINED, 0)
+            return Outcome(Code.ITERATIONS, _flat(reached), np.inf, NOT_DEFINED, 0)
         if found.negative > 0 and rules.escapes and program.model.minimisable:
-            return self._from(self._nudged(reached, given), given)
+            return self._from(self._nudged(reached, ca.DM(given)), ca.DM(given))
         return found
 
-    def _shared(self, given: Array, share: float) -> Array:
+    def _shared(self, given: Array, share: float) -> ca.DM:
         """What is given with a share of all loads and motions."""
         loads = self.program.slice_of_loads
-        return np.concatenate([given[: loads.start], share * given[loads]])
+        return ca.DM(np.concatenate([given[: loads.start], share * given[loads]]))
 
-    def _corrected(self, here: _Here, given: Array, most: int) -> Outcome:
+    def _corrected(self, here: _Here, given: ca.DM, most: int) -> Outcome:
         """Newton's method from a near state."""
         rules, last, first = self.rules, np.inf, True
         for _ in range(min(most, self._left)):
