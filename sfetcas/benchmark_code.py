@@ -34,6 +34,9 @@ CASES = (
 )
 """Space or plane, element, number of elements."""
 
+STEPS = ("generalised-alpha", "radau-3")
+"""Integrators whose steps are measured."""
+
 PROGRAM = """
 #define _POSIX_C_SOURCE 199309L
 #include <stdio.h>
@@ -120,7 +123,7 @@ def code() -> None:
             print(
                 f"{name:26s} {unknowns:8d} {error:9.1e} {1e3 * cold:9.4f} {1e3 * warm:9.4f} {compiled:9.2f} {size:9d}"
             )
-        for method in ("generalised-alpha", "radau-3"):
+        for method in STEPS:
             folder = Path(place) / method
             analysis = Analysis(type="dynamic", end=1.0, step=0.02, integrator=method)
             made = export(cantilever(True, "SFET5", 8, analysis), folder, name="beam", settings=Settings())

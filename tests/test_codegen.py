@@ -13,10 +13,11 @@ import pytest
 import systems
 from scenes import cantilever, helix
 
-from sfetcas import Prepared, Scene, SceneError, Settings, assemble, export, load, solve, solve_model
+from sfetcas import Prepared, Scene, SceneError, Settings, assemble, benchmark_code, export, load, solve, solve_model
 from sfetcas.codegen.arguments import argument, default_arguments
 from sfetcas.codegen.derivatives import derivatives
 from sfetcas.codegen.equilibrium import equilibrium_solver
+from sfetcas.mathematics import kernels
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.solvers.globalised import Code
@@ -662,3 +663,61 @@ def test_programs_that_are_none(name, options, sentence, tmp_path):
         options = {"arguments": [f"sections.{next(iter(scene.sections))}.EI3"]}
     with pytest.raises(SceneError, match=sentence):
         export(scene, tmp_path / "c", derivatives=True, **options)
+
+
+# -- tools that may be there ----------------------------------------------------------------------
+
+
+@needs_compiler
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="needs valgrind")
+def test_valgrind_is_silent(folder):
+    program = built(folder, "strip", flags=["-std=c99", "-O1", "-g"])
+    command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "--quiet", str(program)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == ""
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("gcc") is None, reason="needs CMake and a compiler")
+def test_cmake_builds_and_checks(folder, tmp_path):
+    for command in (["-S", str(folder), "-B", "build"], ["--build", "build"]):
+        subprocess.run(["cmake", *command], cwd=tmp_path, check=True, capture_output=True)
+    run = subprocess.run(["ctest"], cwd=tmp_path / "build", capture_output=True, text=True, check=False)
+    assert "100% tests passed" in run.stdout
+
+
+def test_export_needs_no_compiler(tmp_path, monkeypatch):
+    def none(*_):
+        raise AssertionError("an export compiles or loads nothing")
+
+    monkeypatch.setenv("SFETCAS_KERNELS", "compiled")
+    monkeypatch.setattr(kernels, "compiled", none)
+    monkeypatch.setattr(kernels, "_load", none)
+    export(beam(), tmp_path / "c")
+    export(beam(), tmp_path / "d", derivatives=True)
+
+
+def test_benchmark_of_generated_c(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark_code, "CASES", ((False, "SFET5", 2),))
+    monkeypatch.setattr(benchmark_code, "STEPS", ("radau-2",))
+    benchmark_code.code()
+    said_of = capsys.readouterr().out
+    assert ("plane, 2 SFET5" in said_of and "radau-2" in said_of) or "no C compiler" in said_of
+
+
+@needs_compiler
+def test_sensitivities_in_c_are_those_in_process(folder):
+    text = '#include "strip.h"\n#include <stdio.h>\nstatic strip_memory m;\n'
+    text += "static double x[STRIP_STATE], p[9], r[99], d[999];\n"
+    text += (
+        "int main(void){int i; strip_defaults(p); strip_solve(&m, p, x, 0, r, 0); strip_sensitivities(&m, p, x, d);\n"
+    )
+    text += 'for (i = 0; i < STRIP_RESULTS * STRIP_ARGUMENTS; ++i) printf("%.17g ", d[i]); return 0;}\n'
+    (folder / "slopes.c").write_text(text)
+    found = [float(x) for x in said(built(folder, "strip", source="slopes.c")).split()]
+    results = ["nodes.B.position", "reactions.A.moment"]
+    solver = equilibrium_solver(beam(), "c", results=results)
+    outcome, _ = solver.solve()
+    given = solver.prepare(solver.arguments.defaults)
+    wanted = np.array(solver.sensitivities(solver.arguments.defaults, outcome.state, given)).ravel()
+    assert np.array_equal(found, wanted)

@@ -1,5 +1,6 @@
 """Time steps as generated C: the steps of the integrator, to the last bit."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -129,3 +130,33 @@ def test_what_a_step_cannot_tell(options, sentence, tmp_path):
 def test_steps_of_a_library_are_not_exported(tmp_path):
     with pytest.raises(SceneError, match="found 'idas', whose steps are a library's own, accepted for C: radau-3"):
         export(rod(integrator="idas"), tmp_path / "c")
+
+
+UNIT = """
+import fmpy, json
+found = fmpy.simulate_fmu("MotionUnit.fmu", stop_time=0.5, step_size=0.01, output_interval=0.01,
+                          start_values={"loads.tip.value.1": 3.0}, output=["nodes.B.position.1", "nodes.B.angle"])
+print(json.dumps([float(x) for x in found[-1]]))
+"""
+
+
+@needs_compiler
+def test_unit_for_cosimulation(tmp_path):
+    made = export(rod(step=0.01), tmp_path / "c", name="motion")
+    subprocess.run(["make", "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
+    build = [sys.executable, "-m", "pythonfmu", "build", "-f", "motion_unit.py", "motion.py", "manifest.json"]
+    subprocess.run([*build, "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
+    run = subprocess.run([sys.executable, "-c", UNIT], cwd=tmp_path / "c", capture_output=True, text=True, check=True)
+    time, y, angle = json.loads(run.stdout.splitlines()[-1])
+    state, loads = made.begin, made.arguments.defaults.copy()
+    loads[-1] = 3.0
+    for _ in range(50):
+        state = made.step(state, 0.01, loads)
+    told = dict(
+        zip([r.name for r in made.results.results], np.split(made.told(state, loads), splits(made)), strict=True)
+    )
+    assert time == pytest.approx(0.5)
+    # The clock of the co-simulation sums up its steps: their lengths differ by rounding.
+    assert [y, angle] == pytest.approx([told["nodes.B.position"][1], told["nodes.B.angle"][0]], abs=1e-10)
+    # An earlier export with its unit is one.
+    export(rod(step=0.01), tmp_path / "c", name="motion", overwrite=True)

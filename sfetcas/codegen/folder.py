@@ -13,6 +13,7 @@ from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..files import write_folder
+from ..mathematics.kernels import interpreted
 from .derivatives import Derivatives
 from .derivatives import derivatives as program_of
 from .equilibrium import EquilibriumSolver, Place, equilibrium_solver
@@ -90,6 +91,33 @@ def export(
     path = Path(folder)
     check_name(name)
     check_folder(path, overwrite=overwrite)
+    with interpreted():
+        made, files = _made(scene, name, arguments, results, places, settings, sensitivities, derivatives)
+
+    def write(place: Path) -> None:
+        place.mkdir()
+        for file, text in files.items():
+            (place / file).write_text(text, encoding="utf-8")
+
+    write_folder(path, write)
+    return made
+
+
+Arguments = Sequence[str] | Mapping[str, tuple[float, float] | None] | None
+"""Names of numbers, or these with their ranges."""
+
+
+def _made(
+    scene: Scene,
+    name: str,
+    arguments: Arguments,
+    results: Sequence[str] | None,
+    places: Place | None,
+    settings: Settings | None,
+    sensitivities: bool,
+    derivatives: bool,
+) -> tuple[EquilibriumSolver | TimeStep | Derivatives, dict[str, str]]:
+    """What is exported, and its files."""
     made: EquilibriumSolver | TimeStep | Derivatives
     given: dict[str, Any] = {"arguments": arguments, "settings": settings}
     writer: Writer
@@ -107,15 +135,7 @@ def export(
     else:
         made = equilibrium_solver(scene, name, results=results, places=places, **given)
         writer = EquilibriumWriter(made, sensitivities=sensitivities)
-    files = writer.files()
-
-    def write(place: Path) -> None:
-        place.mkdir()
-        for file, text in files.items():
-            (place / file).write_text(text, encoding="utf-8")
-
-    write_folder(path, write)
-    return made
+    return made, writer.files()
 
 
 def check_name(name: str) -> None:
@@ -161,5 +181,6 @@ def _ours(path: Path) -> bool:
         return False
     known = {"manifest.json", "main.c", "check.c", "Makefile", "CMakeLists.txt", "README.md", "main", "build"}
     known |= {f"check_{name}", "__pycache__", f"lib{name}.so", f"lib{name}.dylib", f"{name}.dll"}
+    known |= {f"{name}_unit.py"} | {entry.name for entry in path.glob("*Unit.fmu")}
     known |= {f"{name}.{ending}" for ending in ("c", "h", "o", "py")}
     return all(entry.name in known for entry in path.iterdir())

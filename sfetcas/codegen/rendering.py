@@ -189,10 +189,15 @@ class Writer(abc.ABC):
             "main.c": filled(template(self.example), values),
             "check.c": filled(template(self.check), values),
             **({f"{self.name}.py": filled(template(self.loader), values)} if self.loader else {}),
+            **self.more(values),
             "Makefile": filled(template("Makefile"), values),
             "CMakeLists.txt": filled(template("CMakeLists.txt"), values),
             "README.md": filled(template(self.readme), values),
         }
+
+    def more(self, values: dict[str, object]) -> dict[str, str]:
+        """Further files of this kind."""
+        return {}
 
     def _values(self) -> dict[str, object]:
         name, upper = self.name, self.name.upper()

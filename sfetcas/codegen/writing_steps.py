@@ -8,7 +8,7 @@ import casadi as ca
 
 from ..description.records import counted
 from ..dynamics.steps import CONVERGED
-from .rendering import Status, Writer, row, rows
+from .rendering import Status, Writer, filled, row, rows, template
 from .source import table
 from .timestep import TimeStep
 
@@ -43,6 +43,11 @@ class StepWriter(Writer):
     def functions(self) -> list[ca.Function]:
         """The step, and what tells the results."""
         return [self.step.advance, self.step.tell]
+
+    def more(self, values: dict[str, object]) -> dict[str, str]:
+        """What makes a unit of FMI of the step."""
+        named = {**values, "Name": self.name[:1].upper() + self.name[1:]}
+        return {f"{self.name}_unit.py": filled(template("unit.py.in"), named)}
 
     @property
     def statuses(self) -> list[Status]:

@@ -8,6 +8,8 @@ Without a compiler everything runs on the virtual machine.
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import functools
 import hashlib
 import os
@@ -15,6 +17,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,7 +26,7 @@ import numpy as np
 
 from .arrays import Array
 
-__all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled"]
+__all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted"]
 
 Kernels = Literal["auto", "compiled", "interpreted"]
 """How element functions are evaluated."""
@@ -132,6 +135,19 @@ LOOPED = 0.5
 """What a number costs that a loop makes, in instructions: most of these are sums of products."""
 
 
+_INTERPRETED = contextvars.ContextVar("interpreted", default=False)
+
+
+@contextlib.contextmanager
+def interpreted() -> Iterator[None]:
+    """Within this nothing is compiled, and nothing that was compiled is loaded."""
+    token = _INTERPRETED.set(True)
+    try:
+        yield
+    finally:
+        _INTERPRETED.reset(token)
+
+
 def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca.Function:
     """The function interpreted or compiled, as asked or as it pays.
 
@@ -142,7 +158,7 @@ def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca
         in the cache where it is worth looking.  $SFETCAS_KERNELS changes what ``auto`` means to one of the others.
     """
     way = os.environ.get("SFETCAS_KERNELS", "auto") if kernels == "auto" else kernels
-    if way == "interpreted":
+    if way == "interpreted" or _INTERPRETED.get():
         return function
     run, written = _instructions(function)
     spent = calls * run * SECONDS_PER_INSTRUCTION

@@ -364,7 +364,7 @@ static int sf_followed(sf_run *run, sf_here *here, sf_here *there, int *negative
   run->given = given;
   if (share < 1.0) return status == @NAME@_SOLVED ? @NAME@_ITERATIONS : status;
 #if SF_MINIMISABLE
-  if (*negative > 0 && SF_ESCAPES) {
+  if (*negative > 0 && SF_ESCAPES > 0) {
     sf_nudged(run, here, there);
     return sf_from(run, here, there, negative);
   }
