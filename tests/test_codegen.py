@@ -712,7 +712,7 @@ def test_sensitivities_in_c_are_those_in_process(folder):
     text += (
         "int main(void){int i; strip_defaults(p); strip_solve(&m, p, x, 0, r, 0); strip_sensitivities(&m, p, x, d);\n"
     )
-    text += 'for (i = 0; i < STRIP_RESULTS * STRIP_ARGUMENTS; ++i) printf("%.17g ", d[i]); return 0;}\n'
+    text += 'for (i = 0; i < STRIP_RESULTS * STRIP_ARGUMENTS; ++i) printf("%.17g ", d[i]);\nreturn 0;}\n'
     (folder / "slopes.c").write_text(text)
     found = [float(x) for x in said(built(folder, "strip", source="slopes.c")).split()]
     results = ["nodes.B.position", "reactions.A.moment"]
