@@ -124,7 +124,9 @@ def _add_overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--elements", type=int, metavar="N", help="number of elements of each member")
     parser.add_argument("--integration", choices=("nodes", "gauss"), default="nodes", help="quadrature in elements")
     parser.add_argument("--assembly", choices=("auto", "closing", "nodal"), default="auto")
-    parser.add_argument("--solver", choices=("ipopt", "newton"), default="ipopt", help="what finds an equilibrium")
+    parser.add_argument(
+        "--solver", choices=("ipopt", "newton"), default="ipopt", help="what finds an equilibrium first"
+    )
 
 
 def _settings(options: argparse.Namespace) -> Settings:

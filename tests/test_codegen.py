@@ -530,7 +530,7 @@ def test_newton_is_deterministic():
     [
         ({"arguments": ["loads.tup.value"]}, "found 'tup', accepted: tip; did you mean 'tip'?"),
         ({"arguments": ["loads.tip.type"]}, "found 'loads.tip.type', accepted: a number of the scene"),
-        ({"arguments": ["nodes.B.position.0"]}, "found no range, accepted"),
+        ({"arguments": ["nodes.B.position.0"]}, "found no range, accepted: NAME=LOW:HIGH"),
         ({"arguments": {"factor": (2.0, 1.0)}}, "found 2 to 1, accepted: a range from low to high"),
         ({"arguments": {"nodes.B.position.0": (0.0, 1.0)}}, "arguments"),
         ({"results": ["nodes.B.speed"]}, "found 'speed', accepted: angle, position"),
@@ -721,3 +721,8 @@ def test_sensitivities_in_c_are_those_in_process(folder):
     given = solver.prepare(solver.arguments.defaults)
     wanted = np.array(solver.sensitivities(solver.arguments.defaults, outcome.state, given)).ravel()
     assert np.array_equal(found, wanted)
+
+
+def test_a_range_has_what_the_scene_says(tmp_path):
+    with pytest.raises(SceneError, match="found 4 in the scene, accepted: a range from low to high that has it"):
+        export(beam(), tmp_path / "c", arguments={"loads.tip.value": (0.0, 1.0)})

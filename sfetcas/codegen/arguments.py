@@ -90,6 +90,15 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     low, high = span if span is not None else (None, None)
     if low is not None and high is not None and not low < high:
         raise SceneError(f"found {low:g} to {high:g}, accepted: a range from low to high", ("arguments", name))
+    found = _argument(scene, name, low, high)
+    outside = [x for x in found.default if not found.limits[0] <= x <= found.limits[1]]
+    if outside:
+        message = f"found {outside[0]:g} in the scene, accepted: a range from low to high that has it"
+        raise SceneError(message, ("arguments", name))
+    return found
+
+
+def _argument(scene: Scene, name: str, low: float | None, high: float | None) -> Argument:
     path = name.split(".")
     if name == FACTOR:
         default = float(scene.analysis.steps[-1])

@@ -250,8 +250,8 @@ class _Probing:
         else:
             degree = DEGREES[-1] + 1
         if number.low is None:
-            accepted = f"{number.name}: [low, high], the range that it may have, as the model depends on it by no power"
-            raise SceneError(f"{number.name}: found no range, accepted: {accepted}", ("arguments",))
+            accepted = "NAME=LOW:HIGH, in Python {name: (low, high)}, as the model is no power of it"
+            raise SceneError(f"found no range, accepted: {accepted}", ("arguments", number.name))
         message = f"found {number.low:g} to {number.high:g}, where no polynomial tells how the model depends on it"
         raise SceneError(f"{message}, accepted: a smaller range", ("arguments", number.name))
 

@@ -165,7 +165,7 @@ def check_folder(path: Path, *, overwrite: bool) -> None:
     if not path.parent.is_dir():
         raise SceneError(f"{path}: found no folder {path.parent}, accepted: a new folder in one that exists")
     if path.exists() and any(path.iterdir()) and not overwrite:
-        raise SceneError(f"{path}: exists and is not empty, accepted: a new folder, or to overwrite it")
+        raise SceneError(f"{path}: exists and is not empty, accepted: a new folder, or to overwrite it (--overwrite)")
     if overwrite and path.exists() and any(path.iterdir()) and not _ours(path):
         raise SceneError(f"{path}: holds other things than an earlier export, accepted: to overwrite one")
 

@@ -181,7 +181,8 @@ class Writer(abc.ABC):
         source = filled("\n".join(parts), values)
         manifest = self._manifest()
         values |= self.cases | self._words(manifest)
-        values |= {mark: filled(template(f"{mark}.c"), values) for mark in ("entries", "put")}
+        marks = ("entries_of_arguments", "entries_of_results", "put")
+        values |= {mark: filled(template(f"{mark}.c"), values) for mark in marks}
         return {
             f"{self.name}.h": header,
             f"{self.name}.c": source,
@@ -238,7 +239,10 @@ class Writer(abc.ABC):
         known, told = self.arguments.arguments, self.results.results
         for identifier, one in zip(identifiers(a.name for a in known), known, strict=True):
             entry: dict[str, Any] = {"name": one.name, "constant": f"{self.name.upper()}_ARG_{identifier}"}
-            entry |= {"first": first, "size": len(one.default), "unit": one.unit, "meaning": one.meaning}
+            shape = [] if one.components is None else [len(one.default)]
+            entry |= {"first": first, "size": len(one.default), "shape": shape}
+            within = "" if one.low is None else f", from {one.low:g} to {one.high:g}"
+            entry |= {"unit": one.unit, "meaning": one.meaning + within}
             entry["default"] = one.default[0] if one.components is None else list(one.default)
             if one.components is not None:
                 entry["components"] = list(one.components)

@@ -170,7 +170,9 @@ class Results:
             return Result(
                 name, (), "J", "strain energy" if key == "elastic" else "potential energy of all that has one"
             )
-        accepted = "nodes.*, reactions.*, members.*, springs.*, stiffness.*, compliance.*, energy.*"
+        accepted = (
+            "nodes.*, reactions.*, members.*, springs.*, stiffness.*, compliance.*, energy.elastic, energy.potential"
+        )
         raise SceneError(f"found {name!r}, accepted: {accepted}", ("results",))
 
     @staticmethod

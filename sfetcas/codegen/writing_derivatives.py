@@ -67,6 +67,7 @@ class DerivativesWriter(Writer):
             "n_numbers": sum(sizes.values()),
             "sz_x": max(1, self.states),
             "sz_g": max(1, sizes["constraints"]),
+            "unit_of_length": repr(self.model.scales.length),
             "unit_of_energy": repr(self.model.scales.moment),
             "indent": " " * len(f"void {self.name}_hessian("),
             "model_in_words": f"In {self.where}: {flexible}, {counted(self.states, 'unknown')}, {rows_of}.",

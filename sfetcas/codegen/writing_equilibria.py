@@ -17,6 +17,9 @@ __all__ = ["EquilibriumWriter"]
 
 PIVOTS = "with_pivots_as_they_come"
 
+SLOPES = "`{name}_sensitivities` gives the derivatives of all results by all arguments at a solution.\n\n"
+"""What the README says of them."""
+
 
 class EquilibriumWriter(Writer):
     """Files of an equilibrium solver, with the derivatives of results by arguments if so wanted."""
@@ -83,6 +86,7 @@ class EquilibriumWriter(Writer):
             "indent": " " * len(f"int {self.name}_solve("),
             "sensitivities_declared": filled(template("sensitivities.h"), names) if self._sensitivities else "",
             "model_in_words": f"In {self.where}: {flexible}, {unknowns}.",
+            "about_sensitivities": SLOPES.format(name=self.name) if self._sensitivities else "",
             "error_in_words": f"{self.solver.answer.certificate.error_estimate or 0.0:.1g}",
             "start_in_words": "a bent state near that of the scene" if started else "the undeformed structure",
         }

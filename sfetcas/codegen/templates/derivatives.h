@@ -6,7 +6,7 @@
  * C99, nothing but libm; no memory is allocated, nothing global is written: any number of threads, each with a memory
  * of its own. Made by sfetcas with CasADi @casadi@; README.md and manifest.json say what everything means.
  *
- * All is dimensionless: energies in @unit_of_energy@ N m. Unknowns are the components of the rotations of the nodes
+ * All is dimensionless: lengths in @unit_of_length@ m, energies in @unit_of_energy@ N m, counted from any zero. Unknowns are the components of the rotations of the nodes
  * (quaternions, or angles in the plane), then displacements; multipliers are zero or one number for each constraint.
  */
 #ifndef @NAME@_H
@@ -37,7 +37,7 @@ typedef struct {
 /* The values that the arguments have in the scene. */
 void @name@_defaults(double *arguments);
 
-/* The answer for these values. */
+/* The answer of the scene, where its last factor acts: a place to begin. */
 void @name@_guess(double *x);
 
 void @name@_energy(@name@_memory *memory, const double *arguments, const double *x, double *energy);

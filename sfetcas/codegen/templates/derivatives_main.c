@@ -6,11 +6,12 @@
 
 #include "@name@.h"
 
-@entries@
+@entries_of_arguments@
 static double p[@NAME@_ARGUMENTS + 1], x[@NAME@_UNKNOWNS + 1], g[@NAME@_CONSTRAINTS + 1], slope[@NAME@_UNKNOWNS + 1];
 static @name@_memory memory;
 
 @put@
+
 static double largest(const double *values, int n) {
   double found = 0.0;
   int i;
@@ -20,15 +21,13 @@ static double largest(const double *values, int n) {
 }
 
 int main(int count, char **texts) {
-  const entry *one;
   double energy;
   int i;
   @name@_defaults(p);
   for (i = 1; i < count; ++i)
     if (!put(texts[i])) {
       fprintf(stderr, "found %s, accepted: name=value, or name.i=value for one number of several, of\n", texts[i]);
-      for (one = arguments; one->name; ++one)
-        fprintf(stderr, "  %s (%d, %s), here %.10g\n", one->name, one->size, one->unit, p[one->first]);
+      list();
       return 2;
     }
   @name@_guess(x);
@@ -37,6 +36,5 @@ int main(int count, char **texts) {
   @name@_constraints(&memory, p, x, g);
   printf("energy %.15g, largest derivative %.3g, largest constraint %.3g\n", energy, largest(slope, @NAME@_UNKNOWNS),
          largest(g, @NAME@_CONSTRAINTS));
-  for (one = results; one->name; ++one) printf("%s\n", one->name);
   return 0;
 }

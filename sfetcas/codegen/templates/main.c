@@ -5,10 +5,11 @@
 
 #include "@name@.h"
 
-@entries@static double p[@NAME@_ARGUMENTS + 1], state[@NAME@_STATE + 1], found[@NAME@_RESULTS + 1];
+@entries_of_arguments@@entries_of_results@static double p[@NAME@_ARGUMENTS + 1], state[@NAME@_STATE + 1], found[@NAME@_RESULTS + 1];
 static @name@_memory memory;
 
-@put@int main(int count, char **texts) {
+@put@
+int main(int count, char **texts) {
   const entry *one;
   @name@_report report;
   int i;
@@ -16,8 +17,7 @@ static @name@_memory memory;
   for (i = 1; i < count; ++i)
     if (!put(texts[i])) {
       fprintf(stderr, "found %s, accepted: name=value, or name.i=value for one number of several, of\n", texts[i]);
-      for (one = arguments; one->name; ++one)
-        fprintf(stderr, "  %s (%d, %s), here %.10g\n", one->name, one->size, one->unit, p[one->first]);
+      list();
       return 2;
     }
   @name@_solve(&memory, p, state, 0, found, &report);

@@ -21,3 +21,13 @@ static int put(const char *text) {
   return 0;
 }
 
+static void list(void) {
+  const entry *one;
+  int i;
+  for (one = arguments; one->name; ++one) {
+    fprintf(stderr, "  %s [%s], here", one->name, one->unit);
+    for (i = 0; i < one->size; ++i) fprintf(stderr, " %.10g", p[one->first + i]);
+    fprintf(stderr, "\n");
+  }
+}
+

@@ -55,7 +55,7 @@ void @name@_defaults(double *arguments);
  * arguments  @NAME@_ARGUMENTS numbers
  * state      @NAME@_STATE numbers: with warm the state to begin with, as an earlier solve left it; afterwards the
  *            solution, or what it was where there is none
- * warm       0 to begin with the undeformed structure
+ * warm       0 to begin with @start_in_words@
  * results    @NAME@_RESULTS numbers, or 0; not a number where there is no solution
  * report     what became of it, or 0
  *

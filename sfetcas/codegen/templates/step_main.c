@@ -5,20 +5,28 @@
 
 #include "@name@.h"
 
-@entries@static double p[@NAME@_ARGUMENTS + 1], state[@NAME@_STATE + 1], found[@NAME@_RESULTS + 1];
+@entries_of_arguments@@entries_of_results@static double p[@NAME@_ARGUMENTS + 1], state[@NAME@_STATE + 1], found[@NAME@_RESULTS + 1];
 static @name@_memory memory;
 
-@put@int main(int count, char **texts) {
+@put@
+int main(int count, char **texts) {
   const entry *one;
   @name@_report report;
-  int i, step, steps = count > 1 ? atoi(texts[1]) : 10;
-  double h = count > 2 ? strtod(texts[2], 0) : @usual_step@;
+  char *end = 0;
+  int i, step, steps = count > 1 ? (int)strtol(texts[1], &end, 10) : 10;
+  double h = @usual_step@;
+  if (count > 1 && *end == 0 && count > 2) h = strtod(texts[2], &end);
   @name@_defaults(p);
+  if (end && *end) {
+    fprintf(stderr, "found %s, accepted: ./main [steps [h [name=value ...]]], h in s, and names of\n",
+            count > 2 && strchr(texts[1], '=') == 0 ? texts[2] : texts[1]);
+    list();
+    return 2;
+  }
   for (i = 3; i < count; ++i)
     if (!put(texts[i])) {
       fprintf(stderr, "found %s, accepted: name=value, or name.i=value for one number of several, of\n", texts[i]);
-      for (one = arguments; one->name; ++one)
-        fprintf(stderr, "  %s (%d, %s), here %.10g\n", one->name, one->size, one->unit, p[one->first]);
+      list();
       return 2;
     }
   @name@_begin(state);

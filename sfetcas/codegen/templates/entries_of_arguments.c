@@ -8,7 +8,3 @@ static const entry arguments[] = {
 @argument_entries@
   {0, 0, 0, 0}};
 
-static const entry results[] = {
-@result_entries@
-  {0, 0, 0, 0}};
-

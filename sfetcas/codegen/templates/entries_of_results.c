@@ -1,0 +1,4 @@
+static const entry results[] = {
+@result_entries@
+  {0, 0, 0, 0}};
+
