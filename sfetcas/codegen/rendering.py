@@ -15,10 +15,10 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..mathematics.arrays import Array
+from ..mathematics.source import functions_in_c, sizes_of
 from ..mechanics.model import Model
 from .arguments import Arguments
 from .results import Results
-from .source import functions_in_c, sizes_of
 
 __all__ = ["Status", "Writer", "enumerated", "filled", "identifiers", "numbers", "row", "rows", "template"]
 

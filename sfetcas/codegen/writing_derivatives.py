@@ -9,9 +9,9 @@ import numpy as np
 
 from ..description.records import counted
 from ..mathematics.arrays import Array
+from ..mathematics.source import table
 from .derivatives import Derivatives
 from .rendering import Status, Writer, row, rows
-from .source import table
 
 __all__ = ["DerivativesWriter"]
 

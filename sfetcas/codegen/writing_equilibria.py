@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 
 from ..description.records import counted
+from ..mathematics.source import sparsity_table, table
 from ..solvers.globalised import MEANINGS, Code
 from .equilibrium import EquilibriumSolver
 from .rendering import Status, Writer, filled, row, rows, template
-from .source import sparsity_table, table
 
 __all__ = ["EquilibriumWriter"]
 

@@ -8,8 +8,8 @@ import casadi as ca
 
 from ..description.records import counted
 from ..dynamics.steps import CONVERGED
+from ..mathematics.source import table
 from .rendering import Status, Writer, filled, row, rows, template
-from .source import table
 from .timestep import TimeStep
 
 __all__ = ["StepWriter"]

@@ -25,6 +25,7 @@ import casadi as ca
 import numpy as np
 
 from .arrays import Array
+from .source import loadable
 
 __all__ = ["Batch", "Kernels", "cache_folder", "chosen", "compiled", "interpreted"]
 
@@ -97,12 +98,9 @@ def compiled(function: ca.Function) -> ca.Function:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            source = f"{function.name()}.c"
-            generator = ca.CodeGenerator(source)
-            generator.add(function)
-            generator.generate(folder + os.sep)
-            library = Path(folder) / path.name
-            command = [compiler, *_flags(function), "-o", str(library), str(Path(folder) / source), "-lm"]
+            source, library = Path(folder) / f"{function.name()}.c", Path(folder) / path.name
+            source.write_text(loadable(function))
+            command = [compiler, *_flags(function), "-o", str(library), str(source), "-lm"]
             subprocess.run(command, check=True, capture_output=True)
             os.replace(library, path)
     except (OSError, subprocess.CalledProcessError):

@@ -1,4 +1,4 @@
-"""CasADi functions as static C, and tables of constants."""
+"""CasADi functions as C, to be loaded or static, and tables of constants."""
 
 from __future__ import annotations
 
@@ -9,15 +9,26 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array
+from .arrays import Array
 
-__all__ = ["functions_in_c", "sizes_of", "sparsity_table", "table"]
+__all__ = ["functions_in_c", "loadable", "sizes_of", "sparsity_table", "table"]
 
-OPTIONS: dict[str, Any] = {"with_header": False, "with_export": False, "casadi_int": "int", "verbose": False}
-"""What CasADi shall write: without its remarks, which list every entry of every matrix."""
 
 DEFINITION = re.compile(r"^(?:static )?(?:int|void|double|casadi_real|casadi_int|const \w+\*) (\w+)\(")
 """First line of a function in generated code."""
+
+
+def _written(functions: Sequence[ca.Function], name: str, options: dict[str, Any]) -> str:
+    """What CasADi writes, without its remarks, which list every entry of every matrix."""
+    generator = ca.CodeGenerator(f"{name}.c", {"with_header": False, "verbose": False, **options})
+    for function in functions:
+        generator.add(function)
+    return str(generator.dump())
+
+
+def loadable(function: ca.Function) -> str:
+    """A function as C that CasADi loads once it is compiled."""
+    return _written([function], function.name(), {})
 
 
 def functions_in_c(functions: Sequence[ca.Function], prefix: str, roots: Iterable[str]) -> str:
@@ -29,10 +40,7 @@ def functions_in_c(functions: Sequence[ca.Function], prefix: str, roots: Iterabl
     prefix : of all names that CasADi gives
     roots : names of what is called from outside; of CasADi's own as in ``casadi_ldl``
     """
-    generator = ca.CodeGenerator(f"{prefix}.c", OPTIONS)
-    for function in functions:
-        generator.add(function)
-    head, chunks = _chunks(generator.dump())
+    head, chunks = _chunks(_written(functions, prefix, {"with_export": False, "casadi_int": "int"}))
     wanted, reached = list(roots), set[str]()
     while wanted:
         name = wanted.pop()
