@@ -20,7 +20,7 @@ from ..mechanics.model import Model, assemble
 from ..solvers.program import Program, data_of, is_data
 from .dependence import Dependence, Number, found
 
-__all__ = ["FACTOR", "Argument", "Arguments", "argument", "default_arguments"]
+__all__ = ["FACTOR", "Argument", "Arguments", "Asked", "argument", "asked_for", "default_arguments"]
 
 FACTOR = "factor"
 """The argument that multiplies all loads and motions without a history."""
@@ -65,6 +65,17 @@ class Argument:
         if self.components is None:
             return (self.name,)
         return tuple(f"{self.name}.{i}" for i in self.components)
+
+
+Asked = Sequence[str] | Mapping[str, tuple[float, float] | None] | None
+"""Names of numbers, or these with their ranges; None for the usual ones."""
+
+
+def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
+    """The arguments that are asked for."""
+    chosen = asked if asked is not None else default_arguments(scene)
+    spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
+    return [argument(scene, name, span) for name, span in spans.items()]
 
 
 def default_arguments(scene: Scene) -> list[str]:
@@ -331,7 +342,7 @@ class Arguments:
     def undeformed(self, p: ca.MX) -> ca.MX:
         """What ``rest`` tells, for numbers (numbers,)."""
         own = p[self._own] if self._own else ca.MX(0, 1)
-        return self.dependence.value(own)[: self._undeformed]
+        return self.dependence.value(own, slice(0, self._undeformed))
 
     # -- the function ---------------------------------------------------------------------------------
 
@@ -346,8 +357,6 @@ class Arguments:
                 (self._factor(p, group) * parts[i] for group, parts in zip(self._groups[1:], loads[1:], strict=True)),
                 self._factor(p, self._groups[0]) * loads[0][i],
             )
-        if self.model.spinning is not None:
-            raise SceneError("found turning axes, accepted: a scene without", ("rotating",))
         return ca.vertcat(ca.MX(0, 1), *(found[name] for name in self.program.sizes))
 
     def _factor(self, p: ca.MX, group: str | None) -> ca.MX | float:
@@ -355,7 +364,8 @@ class Arguments:
         for i, number in enumerate(self._numbers):
             if number.name == name:
                 return p[i]
-        return float(self._base.factors(float(self._scene.analysis.steps[-1]))[group])
+        # What is no argument stands as it would by default.
+        return argument(self._scene, name).default[0]
 
     def prepare(self, name: str) -> ca.Function:
         """(arguments) -> given."""
@@ -372,8 +382,6 @@ def _put(scene: Scene, table: dict[str, Any], path: Sequence[str], value: float)
         if key not in here:
             here[key] = plain(record)
         here = here[key]
-        if isinstance(here, tuple):
-            raise AssertionError
     last = path[-1]
     if isinstance(here, list):
         here[int(last)] = value

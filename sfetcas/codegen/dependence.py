@@ -96,14 +96,16 @@ class Dependence:
             flags[group.entries] = True
         return flags
 
-    def value(self, p: ca.MX) -> ca.MX:
-        """The data, (data,), for numbers (numbers,)."""
-        total = ca.MX(ca.DM(self.base))
+    def value(self, p: ca.MX, part: slice = slice(None)) -> ca.MX:
+        """The data, all or a part of them, for numbers (numbers,)."""
+        total = ca.MX(ca.DM(self.base[part]))
         for group in self.groups:
+            coefficients = _scattered(group, len(self.base))[part]
+            if not coefficients.any():
+                continue
             chosen = [self.numbers[i] for i in group.numbers]
             terms = _basis(chosen, group.degrees)(p[list(group.numbers)])
-            rows = ca.sparsify(ca.DM(_scattered(group, len(self.base))))
-            total += times(rows, terms)
+            total += times(ca.sparsify(ca.DM(coefficients)), terms)
         return total
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -18,7 +17,7 @@ from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 from ..solvers.problem import EquilibriumProblem
 from ..solvers.program import is_data
-from .arguments import Arguments
+from .arguments import Arguments, Asked
 from .equilibrium import equilibrium_solver
 from .results import Results
 
@@ -94,7 +93,7 @@ def derivatives(
     scene: Scene,
     name: str,
     *,
-    arguments: Sequence[str] | Mapping[str, tuple[float, float] | None] | None = None,
+    arguments: Asked = None,
     settings: Settings | None = None,
 ) -> Derivatives:
     """The program of a scene, on the mesh that its accuracy asks for.

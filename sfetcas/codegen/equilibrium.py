@@ -22,7 +22,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.globalised import Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared
-from .arguments import Argument, Arguments, argument, default_arguments
+from .arguments import Arguments, Asked, asked_for
 from .results import Results, default_results
 
 __all__ = ["EquilibriumSolver", "Place", "chosen_places", "equilibrium_solver", "refuse_search"]
@@ -91,7 +91,7 @@ class EquilibriumSolver:
 
         By the implicit function theorem: what the state does is the solution of one linear system for each argument.
         """
-        program, total = self.arguments.program, self.arguments.expressions.total
+        program = self.arguments.program
         p, state, given = ca.MX.sym("arguments", len(self.arguments.defaults)), program.state_symbol, program.symbol
         told = self.results.expression(program, self.arguments.undeformed(p))
         # Along the arguments only: whole derivatives by states would be a hundred times the code.
@@ -101,7 +101,7 @@ class EquilibriumSolver:
         held_by_p = ca.densify(ca.jtimes(program.held_expression, given, given_by_p))
         out = ca.jtimes(residual, given, given_by_p) + ca.jtimes(residual, state, held_by_p)
         step = -ca.solve(program.matrix, ca.densify(out), "qr", {"eps": 1e-300})
-        changed = ca.densify(held_by_p + ca.mtimes(program.moving(total), step))
+        changed = ca.densify(held_by_p + ca.mtimes(program.moving, step))
         found = ca.jacobian(told, p) + ca.jtimes(told, given, given_by_p) + ca.jtimes(told, state, changed)
         names = ["arguments", "state", "given"]
         flat = ca.vec(ca.densify(found).T)
@@ -139,7 +139,7 @@ def equilibrium_solver(
     scene: Scene,
     name: str,
     *,
-    arguments: Sequence[str] | Mapping[str, tuple[float, float] | None] | None = None,
+    arguments: Asked = None,
     results: Sequence[str] | None = None,
     places: Place | None = None,
     settings: Settings | None = None,
@@ -172,10 +172,7 @@ def equilibrium_solver(
     unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
     names = results or default_results(base, unique=unique)
     told = Results(base, names, chosen_places(members, places or {}), unique=unique)
-    chosen = arguments if arguments is not None else default_arguments(scene)
-    spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
-    own: list[Argument] = [argument(scene, n, span) for n, span in spans.items()]
-    known = Arguments(scene, base, own, told.rest, f"{name}_")
+    known = Arguments(scene, base, asked_for(scene, arguments), told.rest, f"{name}_")
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.
@@ -195,12 +192,8 @@ def _same(solver: EquilibriumSolver) -> bool:
     outcome, _ = solver.solve()
     if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
         return False
-    found, wanted = outcome.state, _answered(solver)
-    turned = solver.arguments.program.state(found).q, solver.arguments.program.state(wanted).q
-    if solver.model.space:
-        apart = np.minimum(*(np.abs(turned[0] - sign * turned[1]).max(axis=1) for sign in (1.0, -1.0)))
-        return bool((apart < APART).all())
-    return bool((np.abs(turned[0] - turned[1]) < APART).all())
+    found, wanted = (solver.arguments.program.state(flat) for flat in (outcome.state, _answered(solver)))
+    return Prepared(solver.model).distance(found, wanted) < APART
 
 
 APART = 0.05

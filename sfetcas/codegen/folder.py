@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import keyword
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..files import write_folder
 from ..mathematics.kernels import interpreted
+from .arguments import Asked
 from .derivatives import Derivatives
 from .derivatives import derivatives as program_of
 from .equilibrium import EquilibriumSolver, Place, equilibrium_solver
@@ -39,7 +40,7 @@ def export(
     folder: str | Path,
     *,
     name: str = "structure",
-    arguments: Sequence[str] | Mapping[str, tuple[float, float] | None] | None = None,
+    arguments: Asked = None,
     results: Sequence[str] | None = None,
     places: Place | None = None,
     sensitivities: bool = False,
@@ -103,14 +104,10 @@ def export(
     return made
 
 
-Arguments = Sequence[str] | Mapping[str, tuple[float, float] | None] | None
-"""Names of numbers, or these with their ranges."""
-
-
 def _made(
     scene: Scene,
     name: str,
-    arguments: Arguments,
+    arguments: Asked,
     results: Sequence[str] | None,
     places: Place | None,
     settings: Settings | None,

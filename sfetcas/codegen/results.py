@@ -158,6 +158,8 @@ class Results:
             return tables[kind](name, what, key)
         if kind in ("stiffness", "compliance"):
             self._known(rest, self.model.nodes, name)
+            if self.model.rotations.node_turn[rest] is None:
+                raise SceneError(f"found {name!r}, a node that has no rotation of its own", ("results",))
             if kind == "stiffness" and self.model.scene.nodes[rest].support != "free":
                 message = f"found {name!r}, a node that the ground holds, accepted: a free one, or compliance.{rest}"
                 raise SceneError(message, ("results",))
@@ -482,8 +484,7 @@ class _Told:
         """Tangent stiffness or compliance of a node: displacements, then rotations."""
         model, expressions, program = self._model, self._expressions, self._program
         number, axes = model.rotations.node_turn[node], expressions.axes
-        if number is None:
-            raise SceneError(f"found {kind}.{node}, a node that has no rotation of its own", ("results",))
+        assert number is not None
         step = ca.MX.sym("step", expressions.total)
         moved = program.moved_expression(step)
         place = model.segments.place(node)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from ..mechanics.equations import Equations
 from ..mechanics.expressions import Given
 from ..mechanics.masses import Masses, masses_of
 from ..mechanics.model import Model, assemble
-from .arguments import Arguments, argument, default_arguments
+from .arguments import Arguments, Asked, asked_for
 from .equilibrium import Place, chosen_places, refuse_search
 from .results import Results, default_motion_results
 
@@ -162,7 +162,7 @@ def time_step(
     scene: Scene,
     name: str,
     *,
-    arguments: Sequence[str] | Mapping[str, tuple[float, float] | None] | None = None,
+    arguments: Asked = None,
     results: Sequence[str] | None = None,
     places: Place | None = None,
     settings: Settings | None = None,
@@ -188,9 +188,7 @@ def time_step(
     base = assemble(scene, mesh, assembly="nodal")
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
     told = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
-    chosen = arguments if arguments is not None else default_arguments(scene)
-    spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
-    known = Arguments(scene, base, [argument(scene, n, span) for n, span in spans.items()], told.rest, f"{name}_")
+    known = Arguments(scene, base, asked_for(scene, arguments), told.rest, f"{name}_")
     own = StageEquations(Equations(base), masses_of(base), "interpreted")
     masses = masses_of(known.model)
     if not _same(own.masses, masses):

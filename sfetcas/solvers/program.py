@@ -142,11 +142,12 @@ class Program:
         """The state of which all expressions are made."""
         return self._symbols[0]
 
-    def moved_expression(self, step: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Rotations and displacements after a step of all unknowns and multipliers."""
-        q, y, _, _ = self.parts
+    def moved_expression(self, step: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Rotations, displacements and multipliers after a step of all unknowns and multipliers."""
+        q, y, lam, _ = self.parts
         bounds = [0, self.equations.turning_unknowns, self.equations.unknowns, self.expressions.total]
-        return moved_by(self.expressions, q, self.expressions.spins(step)), y + ca.vertsplit(step, bounds)[1]
+        _, shift, more = ca.vertsplit(step, bounds)
+        return moved_by(self.expressions, q, self.expressions.spins(step)), y + shift, lam + more
 
     @functools.cached_property
     def matrix(self) -> ca.MX:
@@ -255,14 +256,13 @@ class Program:
             q = q / ca.repmat(ca.sqrt(ca.sum1(q**2)), 4, 1)
         return ca.vertcat(ca.vec(self.expressions.held(ca.MX(q), self.given)), y, lam, near)
 
-    def moving(self, total: int) -> ca.MX:
+    @property
+    def moving(self) -> ca.MX:
         """Derivative of the state by a step of all unknowns and multipliers, (states, total)."""
-        q, y, lam, near = self.parts
-        step = ca.MX.sym("step", total)
-        _, shift, more = ca.vertsplit(step, [0, self.equations.turning_unknowns, self.equations.unknowns, total])
-        there = moved_by(self.expressions, q, self.expressions.spins(step))
-        moved = ca.vertcat(ca.vec(there), y + shift, lam + more, near)
-        return ca.substitute([ca.jacobian(moved, step)], [step], [ca.DM.zeros(total)])[0]
+        step = ca.MX.sym("step", self.expressions.total)
+        there, y, lam = self.moved_expression(step)
+        moved = ca.vertcat(ca.vec(there), y, lam, self.parts[3])
+        return ca.substitute([ca.jacobian(moved, step)], [step], [ca.DM.zeros(self.expressions.total)])[0]
 
     @functools.cached_property
     def hold(self) -> ca.Function:
@@ -273,14 +273,11 @@ class Program:
     @functools.cached_property
     def move(self) -> ca.Function:
         """(state, step, share) -> the state after a share of a step of all unknowns and multipliers."""
-        state, (q, y, lam, near) = self._symbols
+        state, (q, _, _, near) = self._symbols
         step, share = ca.MX.sym("step", self.expressions.total), ca.MX.sym("share")
-        turning, unknowns = self.equations.turning_unknowns, self.equations.unknowns
-        taken = share * step
-        _, shift, more = ca.vertsplit(taken, [0, turning, unknowns, self.expressions.total])
-        phi = self.expressions.spins(taken)
-        there = moved_by(self.expressions, q, phi)
-        moved = ca.vertcat(ca.vec(there), y + shift, lam + more, self._wound(q, near, phi, there))
+        there, y, lam = self.moved_expression(share * step)
+        phi = self.expressions.spins(share * step)
+        moved = ca.vertcat(ca.vec(there), y, lam, self._wound(q, near, phi, there))
         return self._function("move", {"state": state, "step": step, "share": share}, {"moved": moved})
 
     @functools.cached_property
