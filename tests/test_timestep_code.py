@@ -160,3 +160,16 @@ def test_unit_for_cosimulation(tmp_path):
     assert [y, angle] == pytest.approx([told["nodes.B.position"][1], told["nodes.B.angle"][0]], abs=1e-10)
     # An earlier export with its unit is one.
     export(rod(step=0.01), tmp_path / "c", name="motion", overwrite=True)
+
+
+def test_a_history_that_is_no_argument_stands_as_the_argument_would():
+    table = rod().to_dict()
+    table["histories"] = {"ramp": {"t": [0, 1, 2], "value": [0.25, 1.0, 0.0]}}
+    table["loads"]["tip"]["history"] = "ramp"
+    forces = []
+    for names in (["loads.tip.value"], ["loads.tip.value", "histories.ramp"]):
+        arguments = time_step(Scene.from_dict(table), "motion", arguments=names).arguments
+        given = np.array(arguments.prepare("prepare")(arguments.defaults)).ravel()
+        forces.append(given[arguments.program.slice_of("force")])
+    assert np.array_equal(*forces)
+    assert forces[0].any()
