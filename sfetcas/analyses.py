@@ -12,6 +12,7 @@ from .dynamics.modes import find_modes
 from .dynamics.simulation import simulate
 from .equilibria import statics, stops
 from .equilibria.statics import Settings
+from .errors import SceneError
 from .mechanics.resistance import check_resistance
 from .paths import paths
 
@@ -54,6 +55,8 @@ def solve(
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
+    if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
+        raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
     if scene.analysis.type == "dynamic":
         return simulate(scene, settings, look_up, progress)
     check_loaded(scene)

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from .description.records import nearest, say
+from .description.records import say
 from .description.scene import Expect, Scene
 from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
+from .equilibria.quantities import entry_of, value_of
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
 from .paths.path import FlutterPoint, Path
@@ -108,58 +109,24 @@ def _value(solution: Answer, entry: Equilibrium | Instant, expect: Expect) -> An
     """What the answer says; of modes as of equilibria."""
     kind, _, key = expect.quantity.partition(".")
     if kind == "modes" and isinstance(solution, Modes):
-        return _entry(solution.values(), key)
+        return entry_of(solution.values(), key)
     return look_up(entry, expect.quantity, expect.at)
 
 
 def look_up(step: Equilibrium | Instant, quantity: str, at: float | None = None) -> Any:
-    """A quantity by its name in the answer, as ``nodes.B.position`` or ``members.beam.moment``.
+    """A quantity by its name in the answer, see :func:`~sfetcas.equilibria.quantities.value_of`."""
 
-    Parameters
-    ----------
-    at : float, optional
-        Fraction of the length; needed for quantities along members.
-    """
-    parts = quantity.split(".")
-    if parts[0] == "members":
-        if len(parts) != 3 or at is None:
-            raise SceneError(f"found {quantity!r}, accepted: members.NAME.QUANTITY with the key 'at'")
-        along = step.along(parts[1], [at])
-        return _entry(along, parts[2])[0]
-    if parts[0] == "nodes" and len(parts) == 3:
-        entry: dict[str, Any] = {"position": step.position(parts[1])}
-        turned = step.quaternion(parts[1])
-        if turned is not None:
-            entry |= (
-                {"quaternion": turned} if step.model.space else {"quaternion": turned, "angle": step.angle(parts[1])}
-            )
+    def further(kind: str, name: str) -> dict[str, Any]:
         if isinstance(step, Instant):
-            entry["velocity"] = step.velocity(parts[1])
-        return _entry(entry, parts[2])
-    if parts[0] == "reactions" and len(parts) == 3:
-        force, moment = step.reaction(parts[1])
-        return _entry({"force": force, "moment": moment}, parts[2])
-    if parts[0] == "springs" and len(parts) == 3:
-        return _entry(step.spring(parts[1]).to_dict(), parts[2])
-    if parts[0] == "motions" and len(parts) == 3:
-        return _entry(step.motion(parts[1]), parts[2])
-    if parts[0] == "contacts" and len(parts) == 3:
-        return _entry(step.contacts[parts[1]], parts[2])
-    if parts[0] == "energy" and len(parts) == 2:
-        return _entry(step.energy, parts[1])
-    if parts[0] == "momentum" and len(parts) == 2 and isinstance(step, Instant):
-        return _entry(dict(step.momentum), parts[1])
-    if parts[0] == "certificate" and len(parts) == 2 and isinstance(step, Equilibrium):
-        return _entry(step.certificate.to_dict(), parts[1])
-    if quantity == "factor":
-        return step.factor
-    if quantity == "omega" and isinstance(step, FlutterPoint):
-        return step.omega
-    known = (
-        "nodes.NAME.KEY, members.NAME.KEY, reactions.NAME.KEY, springs.NAME.KEY, motions.NAME.KEY, "
-        "contacts.NAME.KEY, energy.KEY, certificate.KEY, factor, at flutter points omega"
-    )
-    raise SceneError(f"found {quantity!r}, accepted: {known}")
+            if kind == "nodes":
+                return {"velocity": step.velocity(name)}
+            tables: dict[str, dict[str, Any]] = {"energy": step.energy, "momentum": step.momentum}
+            return tables.get(kind, {})
+        if kind == "certificate":
+            return step.certificate.to_dict()
+        return {"omega": step.omega} if kind == "omega" and isinstance(step, FlutterPoint) else {}
+
+    return value_of(step, quantity, at, further)
 
 
 def _assigned(scene: Scene, solution: Answer) -> dict[int, tuple[Equilibrium, bool]]:
@@ -214,12 +181,6 @@ def _met(expect: Expect, entry: Equilibrium) -> bool:
         return _compared(expect, look_up(entry, expect.quantity, expect.at)).passed
     except (SceneError, TypeError, ValueError):
         return False
-
-
-def _entry(table: dict[str, Any], key: str) -> Any:
-    if key not in table:
-        raise SceneError(f"found {key!r}; {nearest(key, table)}")
-    return table[key]
 
 
 def _compared(expect: Expect, value: Any) -> Check:

@@ -81,7 +81,7 @@ def _report_motion(motion: Trajectory) -> None:
     if len(ends) > 1:
         _report_course(motion)
     worst = ", ".join(f"{kind} {value:.1e}" for kind, value in motion.violation.items())
-    print(f"  worst violation: {worst}; {_accuracy(motion.error_estimate)}")
+    print(f"  worst violation: {worst}; {_accuracy(motion.error_estimate, motion.error_of)}")
     for note in motion.notes:
         print(f"  note: {note}")
 
@@ -225,13 +225,15 @@ def _report_step(step: Equilibrium, place: str) -> None:
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate
-    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {_accuracy(proof.error_estimate)}")
+    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {_accuracy(proof.error_estimate, proof.error_of)}")
     for note in step.notes:
         print(f"  note: {note}")
 
 
-def _accuracy(error: float | None) -> str:
-    return "error not estimated" if error is None else f"estimated error {error:.1e} of the size"
+def _accuracy(error: float | None, quantity: str) -> str:
+    if error is None:
+        return "error not estimated"
+    return f"estimated error {error:.1e} of {quantity or 'the size'}"
 
 
 def _kind(step: Equilibrium) -> str:

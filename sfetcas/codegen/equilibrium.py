@@ -233,8 +233,9 @@ def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
     model = max((step.model for step in solution.steps), key=lambda one: one.mesh.elements)
     asked = [settings.elements or member.elements for member in scene.members.values() if member.type == "flexible"]
     mesh = model.mesh
-    if not any(asked):
-        # The answer of statics is on twice the elements that its accuracy asks for.
+    halved = max(step.certificate.halved or 0.0 for step in solution.steps)
+    if not any(asked) and halved <= (settings.accuracy or scene.analysis.accuracy):
+        # Half the elements are as near as was asked for.
         flexible = [n for n, member in scene.members.items() if member.type == "flexible"]
         mesh = replace(mesh, cuts={n: every_other(c) if n in flexible else c for n, c in mesh.cuts.items()})
     return mesh, model.assembly, solution.last

@@ -12,7 +12,7 @@ from ..description.scene import Scene
 from ..description.supports import along
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mechanics.accuracy import largest_difference, roughness
+from ..mechanics.accuracy import gained, largest_difference, remaining, roughness
 from ..mechanics.balance import three
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh, Touch
@@ -74,10 +74,20 @@ class ContactRun:
         Wanted error of the positions over the size of the scene.
     fixed : set of str
         Members whose mesh is prescribed.
+    judge : callable, optional
+        Two states, the second on half the element lengths, and the factor -> how far they are apart, and the estimated
+        error of the second; of the positions where it is left out.
     """
 
-    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], accuracy: float, fixed: set[str]) -> None:
-        self.scene, self.accuracy, self.fixed = scene, accuracy, fixed
+    def __init__(
+        self,
+        scene: Scene,
+        prepare: Callable[[Mesh], Prepared],
+        accuracy: float,
+        fixed: set[str],
+        judge: Callable[[Held, Held, float], tuple[float, float]] | None = None,
+    ) -> None:
+        self.scene, self.accuracy, self.fixed, self.judge = scene, accuracy, fixed, judge or _judge
         self.toucher = Toucher(scene, prepare, COARSE, edge_sides(scene))
         self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
         self.cushions = Cushions(scene, prepare, self.reviser.sides)
@@ -278,9 +288,12 @@ class ContactRun:
             marks = self._marked(now, smooth)
             if not any(marked.any() for marked in marks.values()):
                 finer = self._onto(now.mesh.refined(), now, way)
-                error = largest_difference(now.touched.fields, finer.touched.fields)
+                difference, error = self.judge(now, finer, factor)
+                if self._all_fixed:
+                    error = difference
+                    break
                 now = finer
-                if error <= self.accuracy or self._all_fixed:
+                if error <= self.accuracy:
                     break
                 smooth *= 0.1
             elif now.mesh.elements > MOST_ELEMENTS:
@@ -447,6 +460,12 @@ def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
     fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
     if len(fewer) < len(touches):
         yield fewer
+
+
+def _judge(one: Held, other: Held, factor: float) -> tuple[float, float]:
+    coarse, fine = one.touched.fields, other.touched.fields
+    difference = largest_difference(coarse, fine)
+    return difference, remaining(difference, gained(coarse, fine))
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:

@@ -58,6 +58,7 @@ USUAL_MODES = 8
 """Modes that are looked for where their number is left out."""
 
 _TYPES = {
+    "accuracy_of": ("static", "dynamic"),
     "steps": ("static", "path"),
     "range": ("path",),
     "points": ("path",),
@@ -120,6 +121,9 @@ class Analysis(Record):
     type : static; path: the equilibria from factor 0 on, through limit points; modes: small vibrations about the
         equilibrium of the loads (factor 1); or dynamic: the motion in time
     accuracy : wanted error of the positions relative to the size of the scene, 1e-14 to 0.1
+    accuracy_of : static, dynamic: place in the answer of a quantity that the accuracy is meant of instead, as
+        ``reactions.A.moment`` or ``members.beam.moment at 0.5``: positions over the size of the scene, rotations in
+        rad, all else over itself, along members over the largest there
     steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
     unstable : leave an unstable equilibrium for a stable one, or stay there
     equilibria : one, to which the loads lead when they grow together from zero, or all that a search finds
@@ -145,6 +149,7 @@ class Analysis(Record):
 
     type: Literal["static", "path", "modes", "dynamic"] = "static"
     accuracy: Annotated[Number, AfterValidator(checked_accuracy)] = 1e-4
+    accuracy_of: str = ""
     steps: Numbers = (1.0,)
     unstable: Literal["leave", "stay"] = "leave"
     equilibria: Literal["one", "all"] = "one"

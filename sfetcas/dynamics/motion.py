@@ -142,6 +142,8 @@ class Trajectory:
         Steps in time of the last run.
     error_estimate : float or None
         Of the positions over the size of the scene, largest over the times; None where step and mesh are prescribed.
+    error_of : str
+        The quantity that this is of instead, over its largest value; empty: the positions.
     violation : mapping
         Largest that ``norms`` of quaternions and ``closings`` (over the unit of length) were off at the ends of steps.
     notes : tuple of str
@@ -156,6 +158,7 @@ class Trajectory:
     integrator: str
     count: int
     error_estimate: float | None
+    error_of: str
     violation: Mapping[str, float]
     notes: tuple[str, ...] = ()
     failure: str = ""
@@ -193,6 +196,7 @@ class Trajectory:
             "integrator": self.integrator,
             "count": self.count,
             "error_estimate": self.error_estimate,
+            **({"error_of": self.error_of} if self.error_of else {}),
             "violation": dict(self.violation),
             "notes": list(self.notes),
             "times": self.times.tolist(),

@@ -12,7 +12,8 @@ import casadi as ca
 import numpy as np
 
 from ..description.scene import Scene
-from ..equilibria.meshing import Meshing
+from ..equilibria.meshing import WHERE, Meshing
+from ..equilibria.quantities import Quantity
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError, Status
@@ -110,7 +111,7 @@ class Simulation:
         analysis = scene.analysis
         self.name = analysis.integrator or USUAL
         meshing = Meshing(self.scene, settings)
-        self.accuracy, self.asked = meshing.accuracy, meshing.asked
+        self.accuracy, self.asked, self.quantity = meshing.accuracy, meshing.asked, meshing.quantity
         self.prescribed = meshing._prescribed
         self.mesh: Mesh = replace(meshing.target, places=True)
         self.seconds = {"model": 0.0, "build": 0.0, "solve": 0.0}
@@ -144,13 +145,13 @@ class Simulation:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
         model = assemble(self.scene, mesh, assembly="nodal")
-        equations = Equations(model)
+        equations = Equations(model, kernels=self.settings.kernels)
         masses = masses_of(model)
         built = time.perf_counter()
         analysis = self.scene.analysis
         steps = USUAL_STEPS if before is None else 2 * before
         steps = steps if analysis.step is None else int(analysis.duration / analysis.step)
-        system = StageEquations(equations, masses, calls=CALLS * max(steps, 1))
+        system = StageEquations(equations, masses, self.settings.kernels, calls=CALLS * max(steps, 1))
         integrator = INTEGRATORS[self.name](system, self.progress)
         self.seconds["model"] += built - begin
         self.seconds["build"] += time.perf_counter() - built
@@ -208,7 +209,9 @@ class Simulation:
     def before(self) -> Equilibrium:
         """The equilibrium before the motion, found once."""
         if self._before is None:
-            self._before = equilibrium_before(self.given, replace(self.settings, accuracy=0.1 * self.accuracy))
+            self._before = equilibrium_before(
+                self.given, replace(self.settings, accuracy=0.1 * self.accuracy, accuracy_of=None)
+            )
         return self._before
 
     _before: Equilibrium | None = None
@@ -242,6 +245,8 @@ class Simulation:
 
     def _difference(self, coarse: _Run, fine: _Run) -> float:
         """Estimated error of the finer run: distances of nodes and middles of members, over the size of the scene."""
+        if self.quantity is not None:
+            return self._difference_of(self.quantity, coarse, fine)
         scene, apart = self.scene, 0.0
         turning = coarse.instants[0].model.rotations.node_turn
         arms = {name: self._arm(coarse, name) for name in scene.nodes if turning[name] is not None}
@@ -263,6 +268,20 @@ class Simulation:
                 moved = one.fields.positions(member, middle) - other.fields.positions(member, middle)
                 apart = max(apart, float(np.abs(moved).max()))
         return apart / scene.size / GAINED
+
+    def _difference_of(self, quantity: Quantity, coarse: _Run, fine: _Run) -> float:
+        """Estimated error of a quantity of the finer run, over its largest value."""
+        own: list[Array] = []
+        apart = 0.0
+        try:
+            for one, other in zip(coarse.instants, fine.instants, strict=False):
+                a, b = quantity.value(one, self.measure), quantity.value(other, self.measure)
+                flip = -1.0 if quantity.name.endswith(".quaternion") and a @ b < 0.0 else 1.0
+                own.append(b)
+                apart = max(apart, float(np.linalg.norm(a - flip * b)) if one.time == other.time else 0.0)
+        except SceneError as error:
+            raise SceneError(str(error), WHERE) from None
+        return apart / quantity.unit(fine.instants[0], own) / GAINED
 
     @staticmethod
     def _arm(run: _Run, name: str) -> float:
@@ -287,6 +306,7 @@ class Simulation:
             integrator=self.name,
             count=run.count,
             error_estimate=error,
+            error_of="" if self.quantity is None else self.quantity.text,
             violation={"norms": run.norm, "closings": run.gap},
             notes=run.notes,
             failure="" if run.failure is None else run.failure.detail,

@@ -8,18 +8,24 @@ from typing import Any
 
 from ..description.scene import Scene
 from ..errors import SceneError
+from ..mechanics.accuracy import gained, largest_difference, remaining
 from ..mechanics.elements import ELEMENTS
 from ..mechanics.mesh import Mesh, first_mesh, uniform_mesh
 from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
+from .quantities import Quantity
 from .settings import Settings
+from .solution import Equilibrium
 
-__all__ = ["PILOT_ELEMENTS", "Found", "Meshing"]
+__all__ = ["PILOT_ELEMENTS", "WHERE", "Found", "Meshing"]
 
 FINE = 1e-8
 """Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
+
+WHERE = ("analysis", "accuracy_of")
+"""Where a scene names what the accuracy is of."""
 
 PILOT_ELEMENTS = 60
 """A mesh that was asked for is its own pilot up to this many elements."""
@@ -50,6 +56,8 @@ class Meshing:
         As given to :func:`~sfetcas.equilibria.statics.solve`.
     accuracy : float
         Wanted error; ``asked`` says whether to be short of it matters.
+    quantity : Quantity or None
+        What it is of; None: the positions.
     seconds : dict
         Time spent on models and on solving.
     target, pilot_mesh : Mesh
@@ -62,6 +70,8 @@ class Meshing:
         self.scene, self.settings, self.stops = scene, settings, stops
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
+        name = settings.accuracy_of or scene.analysis.accuracy_of
+        self.quantity = Quantity.named(name) if name else None
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self._choose_meshes()
@@ -95,9 +105,31 @@ class Meshing:
         """Whether the meshes of all flexible members are asked for."""
         return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
 
+    @property
+    def error_of(self) -> str:
+        """Name of the quantity, empty for the positions."""
+        return "" if self.quantity is None else self.quantity.text
+
+    def judged(self, coarse: Equilibrium, fine: Equilibrium) -> tuple[float, float]:
+        """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one.
+
+        Raises
+        ------
+        SceneError
+            The scene has no such quantity.
+        """
+        if self.quantity is None:
+            difference, gain = largest_difference(coarse.fields, fine.fields), gained(coarse.fields, fine.fields)
+            return difference, remaining(difference, gain)
+        try:
+            difference = self.quantity.difference(coarse, fine)
+        except SceneError as error:
+            raise SceneError(str(error), WHERE) from None
+        return difference, remaining(difference, gained(coarse.fields, fine.fields, positions=self.quantity.positions))
+
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
-        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly))
+        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly), kernels=self.settings.kernels)
         # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
         self.assembly = prepared.model.assembly
         _ = prepared.equations

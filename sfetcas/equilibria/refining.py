@@ -9,7 +9,7 @@ import numpy as np
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
-from ..mechanics.accuracy import every_other, largest_difference, roughness
+from ..mechanics.accuracy import every_other, roughness
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
@@ -21,7 +21,7 @@ from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
 from .meshing import Found
 from .piloting import KEPT, Piloting
-from .single import finished
+from .single import finished, unjudged
 from .solution import Equilibrium
 
 __all__ = ["LEVELS", "Refining"]
@@ -31,6 +31,9 @@ HUGE = 2000
 
 LEVELS = 40
 """Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
+
+STALLED = 3
+"""Halvings of all elements in a row that leave more than half of the error: what is left is rounding."""
 
 MOST_FURTHER = 300
 """The same for what a search found: what needs more is seldom an equilibrium of a beam."""
@@ -90,24 +93,34 @@ class Refining(Piloting):
         own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
         there = mesh is self.target or own
         now = pilot if there else self._onto(self.target, pilot, factor)
-        smooth = np.sqrt(self.accuracy)
+        smooth, last, stalled = np.sqrt(self.accuracy), np.inf, 0
         loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
             marked = self._marked(now, loading, smooth)
             if not any(m.any() for m in marked.values()):
                 finer = self._onto(self._halved(now), now, factor)
-                error = self._difference(now, finer, factor)
+                difference, error = self._difference(now, finer, factor)
                 now = finer
                 if error <= self.accuracy:
-                    return self._answer(now, factor, error)
-                smooth *= 0.1
+                    return self._answer(now, factor, max(error, self._of_fixed(now, factor)), difference)
+                stalled = stalled + 1 if error > 0.5 * last else 0
+                if stalled == STALLED:
+                    return self._answer(now, factor, max(error, self._of_fixed(now, factor)), difference)
+                last, smooth = error, 0.1 * smooth
             elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
                 now = self._onto(now.prepared.model.mesh.refined(marked), now, factor)
             loading = now.prepared.model.loading(factor)
         finer = self._onto(self._halved(now), now, factor)
-        return self._answer(finer, factor, self._difference(now, finer, factor))
+        difference, error = self._difference(now, finer, factor)
+        return self._answer(finer, factor, max(error, self._of_fixed(finer, factor)), difference)
+
+    def _of_fixed(self, now: Found, factor: float) -> float:
+        """What members contribute whose number of elements is asked for, and which the halving left as they were."""
+        if not self.fixed:
+            return 0.0
+        return self._difference(now, self._onto(now.prepared.model.mesh.refined(), now, factor), factor)[0]
 
     def _halved(self, now: Found) -> Mesh:
         cuts = now.prepared.model.mesh.cuts
@@ -122,13 +135,14 @@ class Refining(Piloting):
             coarse = self._onto(half, pilot, factor)
             now = self._onto(mesh, coarse, factor)
             # The error falls by 4^p a halving; twice that share for not being there yet.
-            error = self._difference(coarse, now, factor) * 2.0 / (4.0**mesh.order - 1.0)
-            return self._answer(now, factor, error)
+            difference, _ = self._difference(coarse, now, factor)
+            return self._answer(now, factor, difference * 2.0 / (4.0**mesh.order - 1.0), difference)
         now = pilot if self.pilot_mesh is mesh else self._onto(mesh, pilot, factor)
         finer = self._onto(mesh.refined(), now, factor)
-        return self._answer(now, factor, self._difference(now, finer, factor))
+        return self._answer(now, factor, self._difference(now, finer, factor)[0])
 
-    def _answer(self, found: Found, factor: float, error: float) -> Equilibrium:
+    def _answer(self, found: Found, factor: float, error: float, halved: float | None = None) -> Equilibrium:
+        """The answer with its estimated error, and how far it is from that on half the elements."""
         prepared = found.prepared
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
@@ -147,15 +161,19 @@ class Refining(Piloting):
             factor,
             stability,
             estimate=error,
+            halved=halved,
+            error_of=self.error_of,
             notes=found.notes,
             iterations=found.iterations,
         )
 
-    def _difference(self, coarse: Found, fine: Found, factor: float) -> float:
-        sides = [
-            Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (coarse, fine)
-        ]
-        return largest_difference(*sides)
+    def _difference(self, coarse: Found, fine: Found, factor: float) -> tuple[float, float]:
+        """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
+        one, other = (
+            unjudged(found.prepared, found.corrected, found.prepared.model.loading(factor), factor)
+            for found in (coarse, fine)
+        )
+        return self.judged(one, other)
 
     def _marked(self, found: Found, loading: Loading, smooth: float) -> dict[str, Array]:
         """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""

@@ -7,6 +7,7 @@ from typing import Literal
 
 from ..description.task import checked_accuracy
 from ..errors import SceneError
+from ..mathematics.kernels import Kernels
 from ..mechanics.elements import ELEMENTS
 from .single import SolverName
 
@@ -21,6 +22,9 @@ class Settings:
     ----------
     accuracy : float or None
         Wanted error of the positions over the size of the scene; None takes that of the scene.
+    accuracy_of : str or None
+        A quantity that this is meant of instead of the positions, as ``reactions.A.moment`` or
+        ``members.beam.moment at 0.5``; None takes that of the scene.
     element, elements : str, int or None
         Element of all members and number of elements of each; None takes those of the members, or chooses.
     gauss : bool
@@ -31,17 +35,21 @@ class Settings:
         Check the branch by following the loads from zero.
     solver : str
         ``ipopt``, or ``newton``: Newton's method from afar, which is faster, and IPOPT where that finds nothing.
+    kernels : str
+        Element functions: ``auto`` compiles them where that pays in one run, ``compiled``, ``interpreted``.
     runs : int or None
         Newton runs at most in a search for several equilibria, for each factor; None takes what suits the size.
     """
 
     accuracy: float | None = None
+    accuracy_of: str | None = None
     element: str | None = None
     elements: int | None = None
     gauss: bool = False
     assembly: Literal["auto", "closing", "nodal"] = "auto"
     branch: bool = True
     solver: SolverName = "ipopt"
+    kernels: Kernels = "auto"
     runs: int | None = None
 
     def __post_init__(self) -> None:
@@ -58,5 +66,7 @@ class Settings:
             raise SceneError(f"runs: found {self.runs}, accepted: 0 to 1000000")
         if self.solver not in ("ipopt", "newton"):
             raise SceneError(f"solver: found {self.solver!r}, accepted: ipopt, newton")
+        if self.kernels not in ("auto", "compiled", "interpreted"):
+            raise SceneError(f"kernels: found {self.kernels!r}, accepted: auto, compiled, interpreted")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")

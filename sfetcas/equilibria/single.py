@@ -16,7 +16,7 @@ from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
 from .solution import Equilibrium, equilibrium
 
-__all__ = ["SolverName", "cold", "finished", "solve_model"]
+__all__ = ["SolverName", "cold", "finished", "solve_model", "unjudged"]
 
 SolverName = Literal["ipopt", "newton"]
 """What finds an equilibrium that none near is known of."""
@@ -90,6 +90,15 @@ def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> 
     return prepared.minimise(loading, state)
 
 
+UNJUDGED = Stability("not defined", 0, np.nan, np.zeros(0), np.zeros(0))
+"""Of a state on the way, whose stability nobody asks for."""
+
+
+def unjudged(prepared: Prepared, found: Corrected, loading: Loading, factor: float) -> Equilibrium:
+    """A state on the way by name, without a test of its stability."""
+    return finished(prepared, found, loading, factor, UNJUDGED)
+
+
 def finished(
     prepared: Prepared,
     found: Corrected,
@@ -98,6 +107,8 @@ def finished(
     stability: Stability,
     *,
     estimate: float | None = None,
+    halved: float | None = None,
+    error_of: str = "",
     notes: tuple[str, ...] = (),
     iterations: int = 0,
 ) -> Equilibrium:
@@ -111,6 +122,8 @@ def finished(
         found.residual,
         stability,
         error_estimate=estimate,
+        halved=halved,
+        error_of=error_of,
         notes=notes,
         iterations=iterations,
     )

@@ -43,6 +43,10 @@ class Certificate:
         Its smallest eigenvalue, N: second variation by a rotation field over the integral of its square.
     error_estimate : float or None
         Estimated discretisation error of the positions over the size of the scene.
+    halved : float or None
+        How far, in the same measure, the answer on half the elements was from this.
+    error_of : str
+        The quantity that these two are of; empty: the positions.
     escape : mapping
         Escape shape by member: rotations about the fixed axes, largest 1, at the places of ``Equilibrium.places``.
     """
@@ -52,6 +56,8 @@ class Certificate:
     negative: int
     smallest: float
     error_estimate: float | None
+    halved: float | None = None
+    error_of: str = ""
     escape: Mapping[str, Array] = field(repr=False, default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -59,7 +65,8 @@ class Certificate:
         smallest = self.smallest if np.isfinite(self.smallest) else None
         negative = None if self.stable == "not defined" else self.negative
         answer = {"residual": self.residual, "stable": self.stable, "negative": negative, "smallest": smallest}
-        return {**answer, "error_estimate": self.error_estimate}
+        answer["error_estimate"] = self.error_estimate
+        return {**answer, "error_of": self.error_of} if self.error_of else answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +291,8 @@ def equilibrium(
     stability: Stability,
     *,
     error_estimate: float | None = None,
+    halved: float | None = None,
+    error_of: str = "",
     notes: tuple[str, ...] = (),
     iterations: int = 0,
 ) -> Equilibrium:
@@ -306,6 +315,8 @@ def equilibrium(
         negative=stability.negative,
         smallest=stability.smallest * model.scales.force,
         error_estimate=error_estimate,
+        halved=halved,
+        error_of=error_of,
         escape=escape,
     )
     fields = Fields(equations, state, loading)

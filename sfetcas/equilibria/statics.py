@@ -29,12 +29,12 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 from ..solvers.unheld import refuse_unheld
-from .meshing import Found
+from .meshing import WHERE, Found
 from .piloting import NO_ENERGY, NO_POTENTIAL
 from .refining import LEVELS, Refining
 from .settings import Settings
 from .several import Search, long_elements, missing, same, search
-from .single import finished, solve_model
+from .single import finished, solve_model, unjudged
 from .solution import Equilibrium, Solution, at_factor
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
@@ -94,7 +94,9 @@ class _Run(Refining):
             self._refuse_all(pilot.model)
         steps: list[Equilibrium] = []
         last: tuple[float, Found] | None = None
-        contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed) if self.scene.contacts else None
+        contact = None
+        if self.scene.contacts:
+            contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed, self._judged_in_contact)
         for factor in self.scene.analysis.steps:
             refuse_unheld(pilot, factor)
             try:
@@ -135,15 +137,17 @@ class _Run(Refining):
         answers[0] = replace(answers[0], notes=(*answers[0].notes, note))
         return [answers[0], *sorted(answers[1:], key=lambda other: other.potential)]
 
-    @staticmethod
-    def _refuse_all(model: Model) -> None:
-        """Refuse to search under loads whose energy is not there, or not known.
+    def _refuse_all(self, model: Model) -> None:
+        """Refuse to search under loads whose energy is not there, or not known, or to the accuracy of a quantity.
 
         Raises
         ------
         SceneError
-            Such loads.
+            Such loads, or such an accuracy.
         """
+        if self.quantity is not None:
+            why = "equilibria are told apart by the error of their positions"
+            raise SceneError(f"found {self.quantity.text!r}, accepted with all equilibria: none, as {why}", WHERE)
         if model.has_potential:
             return
         why = "loads without potential have no energy to search by"
@@ -243,6 +247,11 @@ class _Run(Refining):
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
         raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
 
+    def _judged_in_contact(self, coarse: Held, fine: Held, factor: float) -> tuple[float, float]:
+        """How far two states in contact are apart, and the estimated error of the finer one."""
+        one, other = (unjudged(held.prepared, held.corrected, held.loading, factor) for held in (coarse, fine))
+        return self.judged(one, other)
+
     def _crept(self, contact: ContactRun, pilot: Prepared, factor: float, unstable: float) -> Equilibrium:
         """The same by small steps from where the loads would make it jump: nothing jumps over an obstacle."""
         self.creeping = True
@@ -274,6 +283,7 @@ class _Run(Refining):
             factor,
             found.stability,
             estimate=found.error,
+            error_of=self.error_of,
             notes=found.notes,
         )
         refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])

@@ -240,7 +240,7 @@ class _Run:
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
         model = assemble(self.scene, mesh, assembly=self.assembly)
-        prepared = Prepared(model, evaluations=EVALUATIONS)
+        prepared = Prepared(model, kernels=self.settings.kernels, evaluations=EVALUATIONS)
         self.assembly = model.assembly
         _ = prepared.equations
         self.seconds["model"] += time.perf_counter() - begin
