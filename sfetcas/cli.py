@@ -1,4 +1,4 @@
-"""The command line: run, check, info, export."""
+"""The command line: run, check, info, trade, export."""
 
 from __future__ import annotations
 
@@ -28,9 +28,11 @@ from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
-from .outputs import outputs_of
+from .outputs import outputs_of, outputs_of_trade
 from .reports import flexible, print_checks, report
 from .solvers.prepared import Prepared
+from .tradeoff.tables import as_markdown
+from .tradeoff.trading import Limits, trade, with_peer
 
 __all__ = ["main"]
 
@@ -94,6 +96,25 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("file", type=Path)
     _add_overrides(info)
     info.set_defaults(command=_info)
+    trading = commands.add_parser("trade", help="measure accuracy against time: which discretisation for which error")
+    trading.add_argument("file", type=Path)
+    trading.add_argument("--markdown", type=Path, metavar="OUT.md", help="write the table of all settings")
+    trading.add_argument("--csv", type=Path, metavar="OUT.csv", help="write all numbers as lines")
+    trading.add_argument("--json", type=Path, metavar="OUT", help="write everything as JSON")
+    trading.add_argument("--plot", type=Path, metavar="OUT.png", help="write a work-precision picture")
+    trading.add_argument("--against", choices=("refined", "file"), default="refined", help="what errors are against")
+    trading.add_argument("--accuracy-of", metavar="NAME", help="errors of a quantity, as reactions.A.moment")
+    trading.add_argument(
+        "--peer",
+        action="append",
+        default=[],
+        metavar="COMMAND",
+        help="another program, with {file} for the scene; it prints answers as run --json does, one a line",
+    )
+    trading.add_argument("--repeats", type=int, default=Limits.repeats, help="whole runs of each setting")
+    trading.add_argument("--longest", type=float, default=Limits.longest, metavar="S", help="seconds of a setting")
+    trading.add_argument("--budget", type=float, default=Limits.budget, metavar="S", help="seconds of all")
+    trading.set_defaults(command=_trade)
     code = commands.add_parser("export", help="write an equilibrium solver of the scene as C without dependencies")
     code.add_argument("file", type=Path)
     code.add_argument("folder", type=Path, metavar="DIR", help="a new folder")
@@ -120,6 +141,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--accuracy", type=float, help="wanted error of positions over the size of the scene")
+    parser.add_argument("--accuracy-of", metavar="NAME", help="a quantity that it is of instead: reactions.A.moment")
     parser.add_argument("--element", choices=ELEMENTS, metavar="SFETn", help="element of all members: SFET2 to SFET9")
     parser.add_argument("--elements", type=int, metavar="N", help="number of elements of each member")
     parser.add_argument("--integration", choices=("nodes", "gauss"), default="nodes", help="quadrature in elements")
@@ -132,6 +154,7 @@ def _add_overrides(parser: argparse.ArgumentParser) -> None:
 def _settings(options: argparse.Namespace) -> Settings:
     return Settings(
         accuracy=options.accuracy,
+        accuracy_of=options.accuracy_of,
         element=options.element,
         elements=options.elements,
         gauss=options.integration == "gauss",
@@ -272,6 +295,41 @@ def _export(options: argparse.Namespace) -> int:
     if solver.results.results:
         print(f"  {counted(solver.results.size, 'number')} in {counted(len(solver.results.results), 'result')}")
     return SOLVED
+
+
+def _trade(options: argparse.Namespace) -> int:
+    limits = Limits(options.repeats, options.longest, options.budget)
+    scene = load(options.file)
+    if options.accuracy_of is not None:
+        analysis = scene.analysis.model_copy(update={"accuracy_of": options.accuracy_of})
+        scene = scene.replace(analysis=analysis)
+    outputs = outputs_of_trade(options)
+    with _named_progress() as progress:
+        found = _named(options.file, lambda: trade(scene, limits=limits, against=options.against, progress=progress))
+        for command in options.peer:
+            progress(f"peer, {command}")
+            found = with_peer(found, command, options.file)
+    for output in outputs:
+        output.write(found)
+    print(as_markdown(found, every=False), end="")
+    return SOLVED
+
+
+@contextlib.contextmanager
+def _named_progress() -> Iterator[Callable[[str], object]]:
+    """A line that names what is run, for somebody who looks at a terminal; it is wiped away at the end."""
+    if not sys.stderr.isatty():
+        yield lambda name: None
+        return
+    from tqdm import tqdm
+
+    with tqdm(bar_format="run {n}: {desc} [{elapsed}]", leave=False, file=sys.stderr) as bar:
+
+        def told(name: str) -> None:
+            bar.set_description_str(name, refresh=False)
+            bar.update()
+
+        yield told
 
 
 def _span(text: str) -> tuple[str, tuple[float, float] | None]:

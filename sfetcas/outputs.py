@@ -15,8 +15,10 @@ from typing import Any
 from .description.scene import Scene
 from .errors import SceneError
 from .files import write_file, write_folder
+from .tradeoff.tables import as_csv, as_json, as_markdown
+from .tradeoff.trading import Trade
 
-__all__ = ["Output", "outputs_of"]
+__all__ = ["Output", "outputs_of", "outputs_of_trade"]
 
 Writer = Callable[[Any, Path], Any]
 """What writes an answer to a file."""
@@ -83,6 +85,42 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
     if options.matrices is not None:
         found.append(_matrices(options.matrices, scene))
     return found
+
+
+def outputs_of_trade(options: argparse.Namespace) -> list[Output]:
+    """Files of a trade that the options ask for, before anything is run.
+
+    Raises
+    ------
+    SceneError
+        They cannot be written.
+    """
+    texts: dict[str, Callable[[Trade], str]] = {"markdown": as_markdown, "csv": as_csv, "json": as_json}
+    found: list[Output] = []
+    for key in (*texts, "plot"):
+        path = getattr(options, key)
+        if path is None:
+            continue
+        _check_writable(path)
+        if path.exists() and path.samefile(options.file):
+            raise SceneError(f"{path}: is the scene itself, accepted: another file")
+        if any(other.path.resolve() == path.resolve() for other in found):
+            raise SceneError(f"{path}: found twice, accepted: different files")
+        writer = _front(path) if key == "plot" else _text(texts[key])
+        found.append(Output(f"--{key}", path, writer))
+    return found
+
+
+def _text(told: Callable[[Trade], str]) -> Writer:
+    return lambda trade, there: there.write_text(told(trade))
+
+
+def _front(path: Path) -> Writer:
+    from .pictures.files import check_ending
+    from .pictures.fronts import save_front
+
+    _placed(path, lambda: check_ending(path))
+    return save_front
 
 
 def _matrices(path: Path, scene: Scene) -> Output:

@@ -104,6 +104,7 @@ ORDER = [
     "equilibria",
     "equilibria.mirrors",
     "equilibria.solution",
+    "equilibria.quantities",
     "equilibria.several",
     "equilibria.single",
     "equilibria.settings",
@@ -153,6 +154,17 @@ ORDER = [
     "codegen.writing_equilibria",
     "codegen.writing_steps",
     "codegen.folder",
+    "checks",
+    "analyses",
+    "tradeoff",
+    "tradeoff.variants",
+    "tradeoff.observed",
+    "tradeoff.measuring",
+    "tradeoff.running",
+    "tradeoff.machine",
+    "tradeoff.peers",
+    "tradeoff.trading",
+    "tradeoff.tables",
     "pictures",
     "pictures.sketch",
     "pictures.limits",
@@ -163,12 +175,13 @@ ORDER = [
     "pictures.plotting",
     "pictures.charts",
     "pictures.motions",
+    "pictures.fronts",
     "pictures.animation",
     "pictures.paraview",
-    "checks",
-    "analyses",
     "benchmark_motion",
     "benchmark_code",
+    "benchmark_accuracy",
+    "benchmark_pieces",
     "benchmark",
     "reports",
     "outputs",
@@ -178,7 +191,15 @@ ORDER = [
 ]
 """A module imports only from names to its left."""
 
-PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion", "benchmark_code")
+PROGRAMS = (
+    "cli",
+    "reports",
+    "benchmark",
+    "benchmark_motion",
+    "benchmark_code",
+    "benchmark_accuracy",
+    "benchmark_pieces",
+)
 """What is run and not imported: only these print."""
 
 PICTURES = (
@@ -187,6 +208,7 @@ PICTURES = (
     "pictures.plotting",
     "pictures.charts",
     "pictures.motions",
+    "pictures.fronts",
     "pictures.animation",
 )
 """What needs matplotlib, which a run pays for only when a picture is asked for."""

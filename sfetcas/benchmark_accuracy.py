@@ -1,0 +1,120 @@
+"""The knob measured: what ``accuracy`` promises against what comes out; part of ``python -m sfetcas.benchmark``.
+
+All problems of statics in the folder ``problems`` of the working folder are solved to several accuracies.  True errors
+are against the same equilibria on a quarter of the element lengths, in contact against the finest answer;
+effectivity is estimated over true error.  For 1e-6 the time is compared with that of the best mesh of equal elements.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .description.scene import Scene
+from .description.scenefile import load
+from .errors import SceneError
+from .tradeoff.measuring import Measurement, measure
+from .tradeoff.tables import markdown_table
+from .tradeoff.variants import Variant, families
+
+__all__ = ["knob", "static_problems"]
+
+ASKED = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+"""Accuracies."""
+
+COMPARED = 1e-6
+"""That at which times are compared with the best mesh."""
+
+FINEST = 1e-11
+
+EXACT = 1e-13
+"""Errors below this are rounding, of which no estimate can be told right or wrong."""
+
+
+def static_problems() -> dict[str, Scene]:
+    """Scenes of statics in the folder ``problems``, by their names.
+
+    Raises
+    ------
+    SceneError
+        There is no such folder.
+    """
+    files = sorted(Path("problems").glob("*.toml"))
+    if not files:
+        raise SceneError("problems: found no scenes here, accepted: a working folder that has the folder problems")
+    scenes = {file.stem: load(file) for file in files}
+    return {name: scene for name, scene in scenes.items() if scene.analysis.type == "static"}
+
+
+def knob() -> None:
+    """Effectivity, share of answers that keep what was asked for, and time against the best mesh by hand."""
+    print("Accuracy asked for and kept, over all problems of statics; effectivity: estimated over true error\n")
+    scenes = static_problems()
+    found = {
+        name: {asked: measure(scene, Variant(accuracy=asked), 0) for asked in ASKED} for name, scene in scenes.items()
+    }
+    references = {name: measure(scene, Variant(accuracy=FINEST), 0) for name, scene in scenes.items()}
+    rows: list[tuple[str, ...]] = []
+    for asked in ASKED:
+        errors = {name: _error(runs[asked], references[name]) for name, runs in found.items()}
+        effects = [
+            float(run.estimate) / errors[name]
+            for name, run in ((name, runs[asked]) for name, runs in found.items())
+            if run.estimate and EXACT < errors[name] < np.inf
+        ]
+        kept = sum(error <= asked for error in errors.values())
+        worst = max(errors, key=lambda name: errors[name])
+        low, middle, high = np.quantile(effects, [0.05, 0.5, 0.95])
+        rows.append(
+            (
+                f"{asked:.0e}",
+                f"{kept} of {len(errors)}",
+                f"{errors[worst] / asked:.2g} ({worst})",
+                f"{min(effects):.2g}",
+                f"{low:.2g}",
+                f"{middle:.2g}",
+                f"{high:.2g}",
+            )
+        )
+    heads = ("accuracy", "kept", "largest error over it", "effectivity, least", "5 %", "median", "95 %")
+    print("\n".join(markdown_table(heads, rows)))
+    _against_the_best(scenes, references)
+
+
+def _error(run: Measurement, reference: Measurement) -> float:
+    """True error of a run; infinite without an answer."""
+    if run.own_error is not None:
+        return run.own_error
+    if run.observation is None or reference.observation is None:
+        return np.inf
+    return run.observation.error(reference.observation)
+
+
+def _against_the_best(scenes: dict[str, Scene], references: dict[str, Measurement]) -> None:
+    print(f"\naccuracy = {COMPARED:g} against the best mesh of equal elements: milliseconds, ratio, that mesh\n")
+    ratios = {}
+    for name, scene in scenes.items():
+        asked = measure(scene, Variant(accuracy=COMPARED), 3)
+        best: Measurement | None = None
+        for family in families(scene):
+            for variant in family:
+                run = measure(scene, variant, 3)
+                if run.failure or (best is not None and run.seconds > 1.5 * best.seconds):
+                    # Finer ones take longer.
+                    if not run.failure:
+                        break
+                    continue
+                if _error(run, references[name]) <= COMPARED:
+                    best = run if best is None or run.seconds < best.seconds else best
+                    break
+        if best is None:
+            print(f"{name:>60} {1e3 * asked.seconds:9.1f} ms; no mesh of equal elements is as near")
+            continue
+        ratios[name] = asked.seconds / best.seconds
+        times = f"{1e3 * asked.seconds:9.1f} {1e3 * best.seconds:9.1f} ms {ratios[name]:6.2f}"
+        print(f"{name:>60} {times}  {best.variant.name}")
+    told = np.array(list(ratios.values()))
+    if len(told):
+        within = int((told <= 3.0).sum())
+        print(f"\nmedian {np.median(told):.2f}, largest {told.max():.2f}, at most 3 in {within} of {len(told)}")

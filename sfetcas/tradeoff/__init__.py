@@ -1,0 +1,1 @@
+"""Accuracy against time: the discretisations of one scene run, measured and weighed."""

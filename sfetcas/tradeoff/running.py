@@ -1,0 +1,66 @@
+"""Work done in processes of their own, one at a time: nothing disturbs it, and it is ended where it takes long.
+
+A server process imports what is needed once and makes a copy of itself for each piece of work (``forkserver``), where
+the system can; elsewhere each imports for itself.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+__all__ = ["Apart", "EndedError"]
+
+PRELOADED = ["sfetcas.tradeoff.measuring"]
+
+
+class EndedError(Exception):
+    """The work was ended; or, without a number of seconds, its process died."""
+
+    def __init__(self, seconds: float | None) -> None:
+        super().__init__(f"took more than {seconds:g} s" if seconds is not None else "its process died")
+
+
+class Apart:
+    """Runs functions in fresh processes."""
+
+    def __init__(self) -> None:
+        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+        self._context: Any = multiprocessing.get_context(method)
+        if method == "forkserver":
+            self._context.set_forkserver_preload(PRELOADED)
+
+    def __call__(self, longest: float, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function returns.
+
+        Parameters
+        ----------
+        longest : float
+            Seconds until it is ended.
+
+        Raises
+        ------
+        EndedError
+            It was ended, or died.
+        """
+        here, there = self._context.Pipe(duplex=False)
+        process = self._context.Process(target=_work, args=(there, function, arguments), daemon=True)
+        process.start()
+        there.close()
+        try:
+            if not here.poll(longest):
+                raise EndedError(longest)
+            return here.recv()
+        except EOFError:
+            raise EndedError(None) from None
+        finally:
+            here.close()
+            process.kill()
+            process.join()
+
+
+def _work(there: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    there.send(function(*arguments))
+    there.close()
