@@ -93,7 +93,9 @@ class Refining(Piloting):
         own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
         there = mesh is self.target or own
         now = pilot if there else self._onto(self.target, pilot, factor)
-        smooth, last, stalled = np.sqrt(self.accuracy), np.inf, 0
+        usual = np.sqrt(self.accuracy)
+        # Of one quantity a mesh may be right that is too coarse for all positions.
+        smooth, last, stalled = usual if self.quantity is None else np.inf, np.inf, 0
         loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
             marked = self._marked(now, loading, smooth)
@@ -106,7 +108,7 @@ class Refining(Piloting):
                 stalled = stalled + 1 if error > 0.5 * last else 0
                 if stalled == STALLED:
                     return self._answer(now, factor, max(error, self._of_fixed(now, factor)), difference)
-                last, smooth = error, 0.1 * smooth
+                last, smooth = error, min(usual, 0.1 * smooth)
             elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
