@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..description.records import counted
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
@@ -43,6 +44,12 @@ MOST_ELEMENTS = 20_000
 
 MOST_TURNED = 1e8
 """Largest angle of an answer, rad: rounding leaves 1e-8 of it."""
+
+APART = 1.5
+"""Rotations along a mesh that is asked for further than this, rad, from those on the pilot: a turn may be lost."""
+
+COARSE = 0.1
+"""Share of the largest section moment by which moments of two meshes may differ without a note."""
 
 HELD = 2e-9
 """Eigenvalues above this, in those of the softest member, hold a mechanism, if barely: rounding leaves about 1e-9."""
@@ -89,7 +96,7 @@ class Refining(Piloting):
         mesh = pilot.prepared.model.mesh
         own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
         there = mesh is self.target or own
-        now = pilot if there else self._onto(self.target, pilot, factor)
+        now = pilot if there else self._onto_target(pilot, factor)
         smooth = np.sqrt(self.accuracy)
         loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
@@ -124,9 +131,31 @@ class Refining(Piloting):
             # The error falls by 4^p a halving; twice that share for not being there yet.
             error = self._difference(coarse, now, factor) * 2.0 / (4.0**mesh.order - 1.0)
             return self._answer(now, factor, error)
-        now = pilot if self.pilot_mesh is mesh else self._onto(mesh, pilot, factor)
+        now = pilot if self.pilot_mesh is mesh else self._onto_target(pilot, factor)
         finer = self._onto(mesh.refined(), now, factor)
-        return self._answer(now, factor, self._difference(now, finer, factor))
+        return self._answer(_with_coarse_moments(now, finer, factor), factor, self._difference(now, finer, factor))
+
+    def _onto_target(self, pilot: Found, factor: float) -> Found:
+        """The same on the mesh that is asked for.
+
+        Raises
+        ------
+        SolveError
+            That is too coarse for it.
+        """
+        now = self._onto(self.target, pilot, factor)
+        if not now.prepared.model.space:
+            return now
+        fine, coarse = pilot.prepared, now.prepared.model
+        apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
+        few, many = (counted(n, "element", "elements") for n in (self.target.elements, fine.model.mesh.elements))
+        if apart > APART:
+            detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}: take more"
+            raise SolveError(Status.FAILED, detail, now.corrected.state)
+        if pilot.stability.negative == 0 < now.prepared.negative(now.corrected):
+            detail = f"{few} asked for snap away from what is stable on {many}: take more"
+            raise SolveError(Status.FAILED, detail, now.corrected.state)
+        return now
 
     def _answer(self, found: Found, factor: float, error: float) -> Equilibrium:
         prepared = found.prepared
@@ -139,7 +168,9 @@ class Refining(Piloting):
         if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
-            found = replace(found, corrected=corrected, notes=(*found.notes, note))
+            found = replace(found, corrected=corrected, stability=stability, notes=(*found.notes, note))
+            # The error was that of the state that was left.
+            error = self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor)
         return finished(
             prepared,
             found.corrected,
@@ -162,6 +193,21 @@ class Refining(Piloting):
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+
+def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:
+    """The same, with a note where section moments are far from those on half the elements, wherever positions are."""
+    sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (now, finer)]
+    most = apart = 0.0
+    for name, cuts in now.prepared.model.mesh.cuts.items():
+        middles = 0.5 * (cuts[1:] + cuts[:-1])
+        coarse, fine = (side.along(name, middles)["moment"] for side in sides)
+        most = max(most, float(np.linalg.norm(fine, axis=1).max(initial=0.0)))
+        apart = max(apart, float(np.linalg.norm(fine - coarse, axis=1).max(initial=0.0)))
+    if apart <= COARSE * most:
+        return now
+    share = f"by {100.0 * apart / most:.2g} % of the largest" if most > 0.0 else "from none"
+    return replace(now, notes=(*now.notes, f"section moments differ {share} from those on half the elements asked for"))
 
 
 def _refuse_wound(prepared: Prepared, found: Corrected) -> None:
