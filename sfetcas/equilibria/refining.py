@@ -81,7 +81,7 @@ class Refining(Piloting):
         prepared = self._prepared(mesh)
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)
-        corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        corrected = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
         if source.kept and not corrected.converged:
             corrected = deflated(prepared, state, loading, ()) or corrected
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
@@ -89,6 +89,16 @@ class Refining(Piloting):
         if not corrected.converged:
             corrected, _ = prepared.minimise(loading, state)
         return replace(source, prepared=prepared, corrected=corrected)
+
+    @staticmethod
+    def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:
+        """Newton's method; along a flat energy rounding of 1e-14 leads it 1e-5 rad astray from mesh to mesh."""
+        near = prepared.correct(state, loading, iterations=25, most=1.5)
+        if not flat or not near.converged:
+            return near
+        shape = prepared.stability(near).shape
+        held = prepared.correct(state, loading, iterations=25, most=1.5, flat=shape)
+        return held if held.converged else near
 
     def _refined(self, pilot: Found, factor: float) -> Equilibrium:
         if self._prescribed:
