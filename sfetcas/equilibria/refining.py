@@ -216,7 +216,7 @@ def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:
         apart = max(apart, float(np.linalg.norm(fine - coarse, axis=1).max(initial=0.0)))
     if apart <= COARSE * most:
         return now
-    share = f"by {100.0 * apart / most:.2g} % of the largest" if most > 0.0 else "from none"
+    share = f"by {100.0 * apart / most:.0f} % of the largest" if most > 0.0 else "from none"
     return replace(now, notes=(*now.notes, f"section moments differ {share} from those on half the elements asked for"))
 
 
