@@ -169,6 +169,7 @@ ORDER = [
     "analyses",
     "benchmark_motion",
     "benchmark_code",
+    "benchmark_extremes",
     "benchmark",
     "reports",
     "outputs",
@@ -178,7 +179,7 @@ ORDER = [
 ]
 """A module imports only from names to its left."""
 
-PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion", "benchmark_code")
+PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion", "benchmark_code", "benchmark_extremes")
 """What is run and not imported: only these print."""
 
 PICTURES = (
