@@ -127,7 +127,7 @@ def elastica_tip(load: float) -> Array:
 
     With sin(theta) = d at the tip, tan^2(psi) = 2 d / (1 - d) and k^2 = (1 + d) / 2 it is sqrt(load) = F(psi, k).
     """
-    if load <= 1e-4:
+    if load <= 1e-5:
         return np.array([1.0 - load**2 / 15.0, load / 3.0, 0.0])
     if load > 1e5:
         return np.array([np.sqrt(2.0 / load), 1.0 - (2.0 - np.sqrt(2.0)) / np.sqrt(load), 0.0])
