@@ -476,7 +476,7 @@ def stiff() -> Iterator[Outcome]:
             push, way = portal(10.0**exponent, space), np.array(turned([1, 0, 0], space))
             start = np.array(turned([0, 1, 0], space))
             # The frame is linear but for the square of the sway of 1e-5.
-            yield measured(push, lambda s, way=way, start=start: abs((s.position("B") - start) @ way - 1e-5), 1e-10)
+            yield measured(push, lambda s, way=way, start=start: abs((s.position("B") - start) @ way - 1e-5), 1e-10)  # type: ignore[misc]
 
 
 def unlike() -> Iterator[Outcome]:
@@ -486,7 +486,7 @@ def unlike() -> Iterator[Outcome]:
             up = np.array(turned([0, 0, 1], True))
             scene = bend(name, 10.0**exponent)
             # Linear but for squares of the deflection of 1e-5 and what one stiffness is to the other: measured.
-            yield measured(scene, lambda s, up=up: abs(s.position("B") @ up - 1e-5), 1e-10)
+            yield measured(scene, lambda s, up=up: abs(s.position("B") @ up - 1e-5), 1e-10)  # type: ignore[misc]
 
 
 def sizes() -> Iterator[Outcome]:
@@ -496,7 +496,7 @@ def sizes() -> Iterator[Outcome]:
         for force in (1e-6, 1.0, 1e6):
             yield measured(
                 frame(length, force),
-                lambda s, length=length: max(
+                lambda s, length=length: max(  # type: ignore[misc]
                     float(np.abs(s.position(n) / length - p).max()) for n, p in places.items()
                 ),
             )
@@ -532,7 +532,7 @@ def graded() -> Iterator[Outcome]:
         yield measured(with_short_member(share, 0.0, 10.0), _at("D", tip))
         amplitude = (1.0 + share) * column_amplitude(1.2 * 0.25 * np.pi**2)
         scene = with_short_member(share, 1.2 * 0.25 * np.pi**2, 0.0)
-        yield measured(scene, lambda s, y=amplitude: abs(abs(s.position("D")[1]) - y))
+        yield measured(scene, lambda s, y=amplitude: abs(abs(s.position("D")[1]) - y))  # type: ignore[misc]
 
 
 def rings() -> Iterator[Outcome]:
@@ -558,7 +558,7 @@ def straight() -> Iterator[Outcome]:
             rise = 10.0**-exponent
             # A length of 1 that is rounded to 1e-16 tells a rise only to 1e-16 over its square.
             blur = FLOOR + 1e-15 / rise**2
-            yield measured(bars(rise, kind), lambda s, r=rise: abs(s.reaction("A")[0][0] * 2.0 * r + 1.0), blur)
+            yield measured(bars(rise, kind), lambda s, r=rise: abs(s.reaction("A")[0][0] * 2.0 * r + 1.0), blur)  # type: ignore[misc]
 
 
 def columns() -> Iterator[Outcome]:
@@ -571,7 +571,7 @@ def columns() -> Iterator[Outcome]:
             amplitude = column_amplitude(0.25 * np.pi**2 * (1.0 + beyond))
             yield measured(
                 column(beyond, section, space),
-                lambda s, axis=axis, y=amplitude: abs(float(np.linalg.norm(np.cross(s.position("B"), axis))) - y),
+                lambda s, axis=axis, y=amplitude: abs(float(np.linalg.norm(np.cross(s.position("B"), axis))) - y),  # type: ignore[misc]
                 accuracy=1e-8,
             )
 
@@ -583,7 +583,9 @@ def turns() -> Iterator[Outcome]:
             moment = 2.0 * np.pi * amount
             # What is compared is the moment, of which the estimate says nothing, but a note from a tenth on.
             yield measured(
-                twisted(amount, element, count), lambda s, m=moment: abs(s.reaction("B")[1][0] / m - 1.0), 0.1 / SAID
+                twisted(amount, element, count),
+                lambda s, m=moment: abs(s.reaction("B")[1][0] / m - 1.0),  # type: ignore[misc]
+                0.1 / SAID,  # type: ignore[misc]  # type: ignore[misc]
             )
 
 

@@ -32,8 +32,9 @@ def test_steps_that_are_no_steps_are_told(step, told):
 def test_steps_that_suit_are_not(step, method):
     motion = extremes.solve_motion(extremes.pendulum(step, 20.0 * step, method))
     assert motion.notes == ()
-    # A bar that begins to fall from level about its end: 3/4 g t^2 at its tip, less what the bending takes of it.
-    assert -motion.last.position("B")[1] == pytest.approx(0.75 * 9.81 * (20.0 * step) ** 2, rel=0.5)
+    # At first the tip falls freely, by g t^2 / 2; as a stiff bar would, by 3/4 of g t^2.  5e-3 is what steps leave.
+    fallen = -motion.last.position("B")[1] / (9.81 * (20.0 * step) ** 2)
+    assert 0.5 - 5e-3 < fallen < 0.75 + 5e-3
 
 
 @pytest.mark.parametrize("method", ["radau-3", "radau-2", "conserving"])
