@@ -398,7 +398,7 @@ def pendulum(step: float, end: float, integrator: str) -> Scene:
 
 # -- what is measured -----------------------------------------------------------------------------
 
-DOUBTS = ("is not told", "change point", "section moments differ", "the step is")
+DOUBTS = ("is not told", "change point", "section moments differ", "branch off there")
 """Words of the notes that say that an answer may be another one."""
 
 
@@ -664,7 +664,7 @@ LINES: dict[str, tuple[str, Callable[[], Iterable[Outcome]]]] = {
 """What is tried, with what is compared, and how."""
 
 SHORT = re.compile(
-    r" \((?!estimate).*|: from such .*| by \d+ %.*| by [\de.+-]+: the step.*|(?<=the step is so short).*"
+    r" \((?!estimate).*|: from such .*| by \d+ %.*|^loads without .*; | are below zero: .*|(?<=the step is so short).*"
 )
 """What the table leaves out of sentences: figures and advice."""
 
