@@ -1,7 +1,7 @@
 """Accuracy and speed measured: ``python -m sfetcas.benchmark [NAME ...]``.
 
-Names are order, loads, size, repeated, net, path, motion, steps, code, accuracy, pieces and start; left out, all are
-run.
+Names are order, loads, size, repeated, net, path, motion, steps, code, accuracy, pieces, start and extremes; left
+out, all are run.
 
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
@@ -26,6 +26,7 @@ import numpy as np
 
 from .benchmark_accuracy import knob
 from .benchmark_code import code
+from .benchmark_extremes import extremes
 from .benchmark_motion import motion, step_cost
 from .benchmark_pieces import pieces
 from .description.scene import Analysis, Load, Member, Node, Scene
@@ -404,7 +405,7 @@ def main(names: list[str]) -> None:
     """Run the benchmarks of these names, all by default."""
     known = {"order": order, "loads": loads, "size": size, "repeated": repeated}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
-    known |= {"accuracy": knob, "pieces": pieces, "start": start}
+    known |= {"accuracy": knob, "pieces": pieces, "start": start, "extremes": extremes}
     for name in names or list(known):
         if name not in known:
             raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join(known)}")

@@ -182,6 +182,7 @@ ORDER = [
     "benchmark_code",
     "benchmark_accuracy",
     "benchmark_pieces",
+    "benchmark_extremes",
     "benchmark",
     "reports",
     "outputs",
@@ -199,6 +200,7 @@ PROGRAMS = (
     "benchmark_code",
     "benchmark_accuracy",
     "benchmark_pieces",
+    "benchmark_extremes",
 )
 """What is run and not imported: only these print."""
 

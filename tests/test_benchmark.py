@@ -24,7 +24,7 @@ def rows(printed):
 
 
 def test_benchmark_of_another_name_is_refused():
-    accepted = "net, path, motion, steps, code, accuracy, pieces, start"
+    accepted = "net, path, motion, steps, code, accuracy, pieces, start, extremes"
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         benchmark.main(["nets"])
 

@@ -308,7 +308,7 @@ class Simulation:
             error_estimate=error,
             error_of="" if self.quantity is None else self.quantity.text,
             violation={"norms": run.norm, "closings": run.gap},
-            notes=run.notes,
+            notes=(*run.notes, *self._unlikely(run)),
             failure="" if run.failure is None else run.failure.detail,
         )
         if run.failure is not None:
@@ -316,6 +316,36 @@ class Simulation:
                 run.failure.reached = motion
             raise run.failure
         return motion
+
+    def _unlikely(self, run: _Run) -> tuple[str, ...]:
+        """Notes where a prescribed step, of which nothing estimates the error, is far too short or too long."""
+        if self.scene.analysis.step is None or not run.instants:
+            return ()
+        if run.gap > ROUNDED:
+            return (f"joints are off by {run.gap:.0e}: the step is so short that rounding decides the velocities",)
+        kinetic, elastic, loads = np.array([instant.energies for instant in run.instants]).T
+        total = kinetic + elastic + loads
+        most = float(kinetic.max() + np.ptp(elastic) + np.ptp(loads))
+        changed = float(np.abs(total - total[0]).max())
+        if _keeps_energy(self.scene) and changed > LOST * most > 0.0:
+            share = f"{100.0 * changed / most:.0f} % of what moves"
+            return (f"nothing here gives or takes energy, but the total changes by {share}: the step is long for it",)
+        return ()
+
+
+def _keeps_energy(scene: Scene) -> bool:
+    """Whether nothing changes the total energy: no history, motion, follower, drag or damping."""
+    given = any(load.history is not None or load.follows for load in scene.loads.values()) or bool(scene.motions)
+    taken = any(part.damping or part.drag for part in scene.sections.values())
+    taken = taken or any(spring.damping for spring in scene.springs.values())
+    return not (given or taken or scene.rotating is not None or any(node.drag for node in scene.nodes.values()))
+
+
+ROUNDED = 1e-11
+"""Closings off by more than this, over the unit of length: usual are 1e-15."""
+
+LOST = 0.05
+"""Share of what moves that a total energy may change by without a note: Radau's methods damp waves by some percent."""
 
 
 def _resistance(system: StageEquations, begun: Begun) -> Array:

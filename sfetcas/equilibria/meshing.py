@@ -28,7 +28,7 @@ WHERE = ("analysis", "accuracy_of")
 """Where a scene names what the accuracy is of."""
 
 PILOT_ELEMENTS = 60
-"""A mesh that was asked for is its own pilot up to this many elements."""
+"""A mesh that was asked for, if no coarser than the first one in space, is its own pilot up to this many elements."""
 
 PILOT_ORDER = 4
 """Coarse meshes of lower order have equilibria that no beam has."""
@@ -95,7 +95,11 @@ class Meshing:
         equal = uniform_mesh(scene, order, {n: count or 1 for n, count in counts.items()})
         cuts = {n: (equal if n in self.fixed else mesh).cuts[n] for n in mesh.cuts}
         self.target = Mesh(order, cuts, settings.gauss, mesh.rigid, stops=self.stops)
-        if order >= PILOT_ORDER and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
+        # Quaternions lose turns between nodes that are too far apart: the way there is not followed on such a mesh.
+        turns = scene.resolved_dimension == "plane" or all(
+            len(self.target.cuts[n]) >= len(mesh.cuts[n]) for n in self.fixed
+        )
+        if order >= PILOT_ORDER and turns and (self.target.elements <= PILOT_ELEMENTS or not self.fixed):
             self.pilot_mesh = self.target
         else:
             self.pilot_mesh = replace(first_mesh(scene, max(order, PILOT_ORDER), turning=1.0), stops=self.stops)

@@ -13,6 +13,7 @@ from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
+from ..solvers.newton import loose_rows
 from ..solvers.prepared import Prepared
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .settings import Settings
@@ -50,6 +51,14 @@ TAUT = (
 CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
 """Growth of the loads from step to step where a structure between obstacles becomes unstable."""
 
+IN_LINE = 1e-3
+"""Share of the largest singular value of the closings below which links are in one line, but for rounding and steps."""
+
+CHANGE_POINT = (
+    "driven links begin in one line, or nearly: from such a change point they may go on in two ways, and this is one; "
+    "begin away from it, or choose by start places of nodes"
+)
+
 
 class Piloting(Meshing):
     """Meshes, and the way to the equilibrium on the pilot."""
@@ -62,12 +71,13 @@ class Piloting(Meshing):
     def _found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
         try:
-            return self._on_pilot(pilot, factor, last)
+            return _with_change_point(self._on_pilot(pilot, factor, last))
         except SolveError as error:
             if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
                 raise
             try:
-                return self._on_pilot(self._prepared(pilot.model.mesh.refined().refined()), factor, None)
+                finer = self._prepared(pilot.model.mesh.refined().refined())
+                return _with_change_point(self._on_pilot(finer, factor, None))
             except SolveError:
                 raise error from None
 
@@ -232,6 +242,17 @@ class Piloting(Meshing):
         if stability.negative and self.leave and not energy_known:
             notes += (KEPT,)
         return Found(pilot, corrected, stability, notes, left=result.left)
+
+
+def _with_change_point(found: Found) -> Found:
+    """The same, with a note where driven links begin in one line, or as good as that."""
+    if not any(motion.rotation is not None for motion in found.prepared.model.scene.motions.values()):
+        return found
+    equations, nothing = found.prepared.equations, found.prepared.model.loading(0.0, 0.0)
+    begin = loose_rows(equations, equations.at(equations.start(nothing), nothing), IN_LINE)
+    if begin.shape[-1] <= loose_rows(equations, found.corrected.point, IN_LINE).shape[-1]:
+        return found
+    return replace(found, notes=(*found.notes, CHANGE_POINT))
 
 
 def _at(part: float, factors: tuple[float, float] | None) -> str:

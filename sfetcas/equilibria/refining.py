@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..description.records import counted
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
@@ -47,6 +48,12 @@ MOST_ELEMENTS = 20_000
 MOST_TURNED = 1e8
 """Largest angle of an answer, rad: rounding leaves 1e-8 of it."""
 
+APART = 1.5
+"""Rotations along a mesh that is asked for further than this, rad, from those on the pilot: a turn may be lost."""
+
+COARSE = 0.1
+"""Share of the largest section moment by which moments of two meshes may differ without a note."""
+
 HELD = 2e-9
 """Eigenvalues above this, in those of the softest member, hold a mechanism, if barely: rounding leaves about 1e-9."""
 
@@ -77,7 +84,7 @@ class Refining(Piloting):
         prepared = self._prepared(mesh)
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)
-        corrected = prepared.correct(state, loading, iterations=25, most=1.5)
+        corrected = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
         if source.kept and not corrected.converged:
             corrected = deflated(prepared, state, loading, ()) or corrected
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
@@ -86,13 +93,23 @@ class Refining(Piloting):
             corrected, _ = prepared.minimise(loading, state)
         return replace(source, prepared=prepared, corrected=corrected)
 
+    @staticmethod
+    def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:
+        """Newton's method; along a flat energy rounding of 1e-14 leads it 1e-5 rad astray from mesh to mesh."""
+        near = prepared.correct(state, loading, iterations=25, most=1.5)
+        if not flat or not near.converged:
+            return near
+        shape = prepared.stability(near).shape
+        held = prepared.correct(state, loading, iterations=25, most=1.5, flat=shape)
+        return held if held.converged else near
+
     def _refined(self, pilot: Found, factor: float) -> Equilibrium:
         if self._prescribed:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh
         own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
         there = mesh is self.target or own
-        now = pilot if there else self._onto(self.target, pilot, factor)
+        now = pilot if there else self._onto_target(pilot, factor)
         usual = np.sqrt(self.accuracy)
         # Of one quantity a mesh may be right that is too coarse for all positions.
         smooth, last, stalled = usual if self.quantity is None else np.inf, np.inf, 0
@@ -139,9 +156,32 @@ class Refining(Piloting):
             # The error falls by 4^p a halving; twice that share for not being there yet.
             difference, _ = self._difference(coarse, now, factor)
             return self._answer(now, factor, difference * 2.0 / (4.0**mesh.order - 1.0), difference)
-        now = pilot if self.pilot_mesh is mesh else self._onto(mesh, pilot, factor)
+        now = pilot if self.pilot_mesh is mesh else self._onto_target(pilot, factor)
         finer = self._onto(mesh.refined(), now, factor)
-        return self._answer(now, factor, self._difference(now, finer, factor)[0])
+        error = self._difference(now, finer, factor)[0]
+        return self._answer(_with_coarse_moments(now, finer, factor), factor, error)
+
+    def _onto_target(self, pilot: Found, factor: float) -> Found:
+        """The same on the mesh that is asked for.
+
+        Raises
+        ------
+        SolveError
+            That is too coarse for it.
+        """
+        now = self._onto(self.target, pilot, factor)
+        if not now.prepared.model.space:
+            return now
+        fine, coarse = pilot.prepared, now.prepared.model
+        apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
+        few, many = (counted(n, "element", "elements") for n in (self.target.elements, fine.model.mesh.elements))
+        if apart > APART:
+            detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}: take more"
+            raise SolveError(Status.FAILED, detail, now.corrected.state)
+        if pilot.stability.negative == 0 < now.prepared.negative(now.corrected):
+            detail = f"{few} asked for snap away from what is stable on {many}: take more"
+            raise SolveError(Status.FAILED, detail, now.corrected.state)
+        return now
 
     def _answer(self, found: Found, factor: float, error: float, halved: float | None = None) -> Equilibrium:
         """The answer with its estimated error, and how far it is from that on half the elements."""
@@ -155,7 +195,9 @@ class Refining(Piloting):
         if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
-            found = replace(found, corrected=corrected, notes=(*found.notes, note))
+            found = replace(found, corrected=corrected, stability=stability, notes=(*found.notes, note))
+            # The error was that of the state that was left.
+            error, _ = self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor)
         return finished(
             prepared,
             found.corrected,
@@ -182,6 +224,21 @@ class Refining(Piloting):
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+
+def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:
+    """The same, with a note where section moments are far from those on half the elements, wherever positions are."""
+    sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (now, finer)]
+    most = apart = 0.0
+    for name, cuts in now.prepared.model.mesh.cuts.items():
+        middles = 0.5 * (cuts[1:] + cuts[:-1])
+        coarse, fine = (side.along(name, middles)["moment"] for side in sides)
+        most = max(most, float(np.linalg.norm(fine, axis=1).max(initial=0.0)))
+        apart = max(apart, float(np.linalg.norm(fine - coarse, axis=1).max(initial=0.0)))
+    if apart <= COARSE * most:
+        return now
+    share = f"by {100.0 * apart / most:.0f} % of the largest" if most > 0.0 else "from none"
+    return replace(now, notes=(*now.notes, f"section moments differ {share} from those on half the elements asked for"))
 
 
 def _refuse_wound(prepared: Prepared, found: Corrected) -> None:

@@ -99,6 +99,13 @@ def unjudged(prepared: Prepared, found: Corrected, loading: Loading, factor: flo
     return finished(prepared, found, loading, factor, UNJUDGED)
 
 
+HIDDEN = (
+    "members that are very stiff or short beside others leave more rounding than the smallest eigenvalue: whether this "
+    "is stable is not told; make such members rigid"
+)
+"""What is said where neutral means not told."""
+
+
 def finished(
     prepared: Prepared,
     found: Corrected,
@@ -113,6 +120,7 @@ def finished(
     iterations: int = 0,
 ) -> Equilibrium:
     """The equilibrium with its name, certificate and notes."""
+    notes = (*notes, HIDDEN) if stability.hidden else notes
     return equilibrium(
         prepared.equations,
         found.state,

@@ -227,6 +227,7 @@ def _graded(cuts: Array, breaks: Array, layer: float) -> Array:
         distances = np.maximum(layer, 1e-13) * 2.0 ** np.arange(min(steps, 40))
         places += [left + distances, right - distances]
     merged = np.unique(np.concatenate(places))
-    # Cuts that nearly meet others would make slivers; breaks stay.
-    sliver = np.diff(merged, prepend=-1.0) < (0.3 * layer if np.isfinite(layer) else SAME)
+    # Cuts that nearly meet others would make slivers; breaks stay, and elements that turning needs shorter than layers.
+    least = 0.3 * min(layer, float(np.median(np.diff(cuts)))) if np.isfinite(layer) else SAME
+    sliver = np.diff(merged, prepend=-1.0) < least
     return merged[~sliver | np.isin(merged, breaks)]

@@ -96,6 +96,7 @@ def correct(
     most: float = np.inf,
     contraction: float = 1.0,
     tangent: Array | None = None,
+    flat: Array | None = None,
 ) -> Corrected:
     """Newton's method from a near state down to rounding.
 
@@ -112,6 +113,8 @@ def correct(
     tangent : ndarray, optional
         Entries of the Newton matrix of the equilibrium that is left, for the first step: then it goes along the
         path, while the matrix under the new load may already point away from it.
+    flat : ndarray, optional
+        A shape (turning unknowns) of a flat energy: no step goes along it.
     """
     state = equations.holding(state, loading)
     point = equations.at(state, loading)
@@ -130,7 +133,10 @@ def correct(
                 step = newton_step(equations, point, weight)
         except np.linalg.LinAlgError:
             break
-        length = float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
+        turning = step[: equations.turning_unknowns]
+        if flat is not None:
+            turning -= flat * (turning @ (weight * flat)) / (flat @ (weight * flat))
+        length = float(np.abs(turning).max(initial=0.0))
         if not np.isfinite(length):
             break
         if count == 0:

@@ -185,7 +185,9 @@ class Prepared:
             No equilibrium: what IPOPT says of it.
         """
         if not self.model.minimisable:
-            raise SolveError(Status.FAILED, "loads without potential cannot be minimised, only followed", state)
+            mesh = counted(self.model.mesh.elements, "element", "elements")
+            detail = f"Newton's method did not converge on {mesh}, and loads without potential cannot be minimised"
+            raise SolveError(Status.FAILED, f"{detail}: more elements may help", state)
         if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
             # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
             found = self.correct(state, loading, iterations=50)

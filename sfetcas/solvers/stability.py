@@ -29,6 +29,12 @@ NEUTRAL = 1e-7
 ROUNDING = 2e-15
 """The same, relative to the largest entry of the weighted matrix."""
 
+ENTRY = 5e-16
+"""Rounding of an entry, relative to itself."""
+
+GRADED = 1e-5
+"""Limits above this come of members that are very short or stiff beside others: rounding is told mode by mode then."""
+
 DENSE = 120
 """Up to this many unknowns all eigenvalues by LAPACK are cheaper than factorisations (measured)."""
 
@@ -56,6 +62,8 @@ class Stability:
         Escape shape: the turning unknowns of the smallest eigenvalue, largest entry 1.
     travel : ndarray
         The displacements kept as unknowns in it.
+    limit : float
+        Below this, on the scale of the module's docstring, its eigenvalue cannot be told from zero.
     """
 
     stable: bool | str
@@ -63,6 +71,12 @@ class Stability:
     smallest: float
     shape: Array
     travel: Array
+    limit: float = NEUTRAL
+
+    @property
+    def hidden(self) -> bool:
+        """Whether rounding of what is stiff, and no flat energy, makes it neutral."""
+        return self.stable == "neutral" and self.limit > GRADED
 
 
 class StabilityTest:
@@ -133,9 +147,11 @@ class StabilityTest:
         if self._n == 0:
             return Stability(True, 0, np.inf, np.zeros(0), nothing)
         entries = self._weighted(point)
-        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
-        find = self._dense if self._is_dense else self._sparse
-        values, vector, negative = find(point, entries, limit)
+        limit = self._limit(entries)
+        if self._is_graded(limit):
+            values, vector, negative, limit = self._most_doubtful(point, entries)
+        else:
+            values, vector, negative = (self._dense if self._is_dense else self._sparse)(point, entries, limit)
         if not len(values):
             return Stability(True, 0, np.inf, np.zeros(turning), nothing)
         stable: bool | str = bool(values[0] > limit)
@@ -147,17 +163,65 @@ class StabilityTest:
         shape = shape / turned[np.argmax(np.abs(turned))]
         travel = nothing.copy()
         travel[equations.elastic_displacements - turning] = shape[turning:]
-        return Stability(stable, negative, quotient, shape[:turning], travel)
+        return Stability(stable, negative, quotient, shape[:turning], travel, limit)
 
     def negative(self, point: Point) -> int:
         """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
         if self._n == 0:
             return 0
         entries = self._weighted(point)
-        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        limit = self._limit(entries)
+        if self._is_graded(limit):
+            values, _, limits = self._mode_by_mode(point, entries)
+            return int((values < -limits).sum())
         if not self._is_dense:
             return self._below(point, entries, -limit)
         return int((np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]) < -limit).sum())
+
+    @staticmethod
+    def _limit(entries: Array) -> float:
+        """Largest eigenvalue that cannot be told from zero, whatever its mode."""
+        return NEUTRAL + ROUNDING * float(np.abs(entries).max())
+
+    def _is_graded(self, limit: float) -> bool:
+        return limit > GRADED and self._n <= FULL
+
+    def _most_doubtful(self, point: Point, entries: Array) -> tuple[Array, Array, int, float]:
+        """Eigenvalues from that which is lowest beside its own limit, its vector, how many are below, that limit."""
+        values, vectors, limits = self._mode_by_mode(point, entries)
+        if not len(values):
+            return values, np.zeros(self._n), 0, NEUTRAL
+        lowest = int(np.argmin(values / limits))
+        return values[lowest:], vectors[:, lowest], int((values < -limits).sum()), float(limits[lowest])
+
+    def _mode_by_mode(self, point: Point, entries: Array) -> tuple[Array, Array, Array]:
+        """All eigenvalues, rising, their vectors as columns, and the limit below which each is rounding.
+
+        Entries are as exact as their own size, not as the largest one: a mode that does not bend what is stiff is
+        blurred by what stiff entries leave of its own energy.  With all diagonals made alike the matrix keeps that.
+        """
+        size = np.abs(entries)
+        scale = 1.0 / np.sqrt(size[self._diagonal] + 1.0)
+        scaled = entries * scale[self._h_row] * scale[self._h_column]
+        h, basis = self._projected(scaled, self._rows(point) * scale)
+        mass = basis.T @ (scale[:, None] ** 2 * basis)
+        shift = -1.0
+        while shift > -LOWEST:
+            try:
+                root = np.linalg.cholesky(h - shift * mass)
+                break
+            except np.linalg.LinAlgError:
+                shift *= 8.0
+        else:
+            raise np.linalg.LinAlgError("eigenvalues without a bound")
+        half = np.linalg.solve(root, mass)
+        inverse = np.linalg.solve(root, half.T)
+        found, vectors = np.linalg.eigh(0.5 * (inverse + inverse.T))
+        values = shift + 1.0 / np.maximum(found[::-1], 1.0 / LOWEST)
+        vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))
+        vectors = vectors / np.linalg.norm(vectors, axis=0)
+        blurred = np.einsum("ik,ik->k", np.abs(vectors[self._h_row]) * size[:, None], np.abs(vectors[self._h_column]))
+        return values, vectors, NEUTRAL + ENTRY * blurred + ROUNDING * abs(shift)
 
     @property
     def _is_dense(self) -> bool:
@@ -179,7 +243,11 @@ class StabilityTest:
         if self._n == 0:
             return Inertia(0, 0)
         entries = self._weighted(point)
-        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        limit = self._limit(entries)
+        if self._is_graded(limit):
+            values, _, limits = self._mode_by_mode(point, entries)
+            below = int((values < -limits).sum())
+            return Inertia(below, int((values <= limits).sum()) - below)
         if not self._is_dense:
             below = self._below(point, entries, -limit)
             return Inertia(below, 0) if not doubtful else Inertia(below, self._below(point, entries, limit) - below)
@@ -348,6 +416,9 @@ class StabilityTest:
             last = values[nearest]
         return values[nearest], block[:, nearest]
 
+
+LOWEST = 1e30
+"""No eigenvalue is sought below minus this."""
 
 BESIDE = 1.3e-4
 """Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
