@@ -53,6 +53,9 @@ BEYOND = 1e4
 UNBALANCED = 0.01
 """Share of the loads that is out of balance without redundant multipliers: these carry it on next to nothing."""
 
+CARRIED = 1e-6
+"""The same of multipliers that are large: rounding of what hardly acts is far less."""
+
 NEARLY = 1e-3
 """Share of the largest singular value of the closings below which members may be on their way to being stretched."""
 
@@ -247,10 +250,11 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
+    most = CARRIED if largest > LARGE else UNBALANCED
     which = "the smallest are given"
     if residual <= SOLVED:
         corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > UNBALANCED * loads > 0.0:
+    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > most * loads > 0.0:
         raise _stretched(equations, loose, corrected)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
