@@ -167,8 +167,11 @@ ORDER = [
     "pictures.paraview",
     "checks",
     "analyses",
+    "random_scenes",
+    "random_checks",
     "benchmark_motion",
     "benchmark_code",
+    "benchmark_random",
     "benchmark",
     "reports",
     "outputs",
@@ -178,7 +181,7 @@ ORDER = [
 ]
 """A module imports only from names to its left."""
 
-PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion", "benchmark_code")
+PROGRAMS = ("cli", "reports", "benchmark", "benchmark_motion", "benchmark_code", "benchmark_random")
 """What is run and not imported: only these print."""
 
 PICTURES = (
