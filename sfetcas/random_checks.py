@@ -168,7 +168,7 @@ def compared(step: Equilibrium, other: Variant) -> str:
     -------
     str
         ``same``; ``another equilibrium`` where both are equilibria of one model, have the same energy (mirrored states,
-        or one of a family that nothing holds) or say that the loads could not be followed from zero; ``unstable in
+        or one of a family that nothing holds), or say that the way from zero was lost or jumped; ``unstable in
         space`` where the answer of the plane is; ``refused: ...``, ``wrong: ...``, or ``differs by ...``.
     """
     try:
@@ -185,8 +185,10 @@ def compared(step: Equilibrium, other: Variant) -> str:
     kinds = f"{step.certificate.stable}, {found.certificate.stable}"
     if _level(step, found, other):
         return f"another equilibrium (of the same energy; {kinds})"
-    if any("could not be followed" in note for answer in (step, found) for note in answer.notes):
-        return f"another equilibrium (the way from zero was lost; {kinds})"
+    notes = [note for answer in (step, found) for note in answer.notes]
+    for words, way in (("could not be followed", "the way from zero was lost"), ("jumped", "a jump on the way")):
+        if any(words in note for note in notes):
+            return f"another equilibrium ({way}; {kinds})"
     # Started from where the other one has its nodes each model may find that one too: then both are equilibria.
     mine = _from(other.scene, {n: other.there(step.position(n)) for n in other.scene.nodes}, other.settings)
     its = _from(step.model.scene, {n: other.back(found.position(n)) for n in other.scene.nodes}, {})
