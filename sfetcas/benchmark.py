@@ -1,7 +1,7 @@
 """Accuracy and speed measured: ``python -m sfetcas.benchmark [NAME ...]``.
 
 Names are order, loads, size, repeated, net, path, motion, steps, code, accuracy, pieces, start and extremes; left
-out, all are run.
+out, all are run.  Another one, ``random``, stands alone, takes options (``--help``) and half an hour.
 
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
@@ -29,6 +29,7 @@ from .benchmark_code import code
 from .benchmark_extremes import extremes
 from .benchmark_motion import motion, step_cost
 from .benchmark_pieces import pieces
+from .benchmark_random import random_scenes
 from .description.scene import Analysis, Load, Member, Node, Scene
 from .description.sections import CrossSection
 from .description.shapes import Arc
@@ -406,9 +407,12 @@ def main(names: list[str]) -> None:
     known = {"order": order, "loads": loads, "size": size, "repeated": repeated}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
     known |= {"accuracy": knob, "pieces": pieces, "start": start, "extremes": extremes}
+    if names[:1] == ["random"]:
+        random_scenes(names[1:])
+        return
     for name in names or list(known):
         if name not in known:
-            raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join(known)}")
+            raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join(known)}, or random")
         try:
             known[name]()
         except (SceneError, SolveError) as error:

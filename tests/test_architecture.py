@@ -178,11 +178,14 @@ ORDER = [
     "pictures.fronts",
     "pictures.animation",
     "pictures.paraview",
+    "random_scenes",
+    "random_checks",
     "benchmark_motion",
     "benchmark_code",
     "benchmark_accuracy",
     "benchmark_pieces",
     "benchmark_extremes",
+    "benchmark_random",
     "benchmark",
     "reports",
     "outputs",
@@ -201,6 +204,7 @@ PROGRAMS = (
     "benchmark_accuracy",
     "benchmark_pieces",
     "benchmark_extremes",
+    "benchmark_random",
 )
 """What is run and not imported: only these print."""
 

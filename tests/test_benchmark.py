@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from sfetcas import benchmark, benchmark_motion
+from sfetcas import benchmark, benchmark_motion, benchmark_random
 from sfetcas.checks import check
 from sfetcas.description.scene import Analysis, Expect
 from sfetcas.equilibria.statics import solve
@@ -24,7 +24,7 @@ def rows(printed):
 
 
 def test_benchmark_of_another_name_is_refused():
-    accepted = "net, path, motion, steps, code, accuracy, pieces, start, extremes"
+    accepted = "net, path, motion, steps, code, accuracy, pieces, start, extremes, or random"
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         benchmark.main(["nets"])
 
@@ -130,3 +130,17 @@ def test_motion_is_measured_against_a_finer_run(monkeypatch, capsys):
     line = next(line for line in capsys.readouterr().out.splitlines() if "radau-3" in line)
     # Two elements of order 3 resolve some waves of a sudden release: a percent, not more and not rounding.
     assert 1e-4 < float(line.split()[5]) < 3e-2
+
+
+def test_random_scenes_are_counted(capsys):
+    benchmark.main(["random", "--count", "3", "--first", "8"])
+    printed = capsys.readouterr().out
+    assert "| of 3 scenes |" in printed
+    rows = dict(re.findall(r"^\| ([\w :-]+) \| (\d+) \|", printed, re.MULTILINE))
+    assert int(rows["solved"]) == 3
+    assert "| otherwise | moved | reordered | assembly | gauss | space |" in printed
+
+
+def test_what_takes_too_long_is_killed_and_counted():
+    (outcome,) = benchmark_random.random_run([8], seconds=0.0)
+    assert (outcome.kind, outcome.others) == ("too slow", {})

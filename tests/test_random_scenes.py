@@ -1,135 +1,328 @@
-"""Random structures: solved and certified, or refused with a sentence; never anything else."""
+"""Random scenes: solved and certified, or refused with a sentence, and the same however they are put."""
+
+import dataclasses
+import functools
+from collections import Counter
 
 import numpy as np
-from hypothesis import HealthCheck, Phase, assume, given, settings
-from hypothesis import strategies as st
-from scenes import SOFT, UNLIKE, arc_across, made
+import pytest
+from scenes import turned_about
 
-import sfetcas
-from sfetcas import SceneError, SolveError, Status
+from sfetcas import Scene, SceneError, SolveError, Status, solve
+from sfetcas.random_checks import VARIANTS, compared, defects, variant, wrong
+from sfetcas.random_scenes import random_scene, reordered, transformed
 
-SUPPORTS = [{"support": "clamped"}, {"support": "ball"}, {"support": "hinge"}]
-FORCES = [0.01, 1.0, 8.0, 60.0]
+SEEDS = range(2009, 2049)
+"""Even ones are in the plane, odd ones in space; the benchmark has others."""
 
-
-@st.composite
-def structures(draw, space):
-    """A tree of members on random nodes, sometimes closed to loops, on random supports, under random loads."""
-    count = draw(st.integers(2, 5))
-    seed = draw(st.integers(0, 10_000))
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(-1, 1, size=(count, 3)) * [1, 1, 1 if space else 0]
-    gaps = np.linalg.norm(points[:, None] - points[None], axis=2) + 9 * np.eye(count)
-    assume(gaps.min() > 0.15)
-    nodes = {f"n{i}": {"position": p.tolist()} for i, p in enumerate(points)}
-    nodes["n0"]["support"] = draw(st.sampled_from(["clamped", "clamped", "ball", "hinge"]))
-    pairs = [(draw(st.integers(0, i - 1)), i) for i in range(1, count)]
-    if draw(st.booleans()) and count > 2:
-        pairs.append((0, count - 1) if (0, count - 1) not in pairs else (1, count - 1))
-    pairs = [p for p in dict.fromkeys(pairs) if p[0] != p[1]]
-    if draw(st.booleans()):
-        last = nodes[f"n{count - 1}"]
-        kind = draw(st.sampled_from(["clamped", "ball", "slider"]))
-        last["support"] = kind
-        if kind == "slider":
-            last |= {"direction": rng.normal(size=3).tolist() if space else [*rng.normal(size=2).tolist(), 0.0]}
-            last["rotation"] = draw(st.sampled_from(["fixed", "ball"]))
-    members = {}
-    for number, (a, b) in enumerate(pairs):
-        member = {"nodes": [f"n{a}", f"n{b}"], "section": draw(st.sampled_from(["soft", "unlike"]))}
-        if draw(st.booleans()):
-            across = rng.normal(size=3) if space else np.eye(3)[2]
-            member["shape"] = arc_across(points[a], points[b], float(rng.uniform(-2.5, 2.5)), across)
-        if draw(st.integers(0, 4)) == 0:
-            member["release"] = ["rigid", draw(st.sampled_from(["hinge", "ball"]))]
-        members[f"m{number}"] = member
-    size = draw(st.sampled_from(FORCES))
-    direction = rng.normal(size=3) * [1, 1, 1 if space else 0]
-    loads = {"f": {"type": "force", "node": f"n{count - 1}", "value": (size * direction).tolist()}}
-    if draw(st.booleans()):
-        value = (rng.normal(size=3) * [1, 1, 1 if space else 0]).tolist()
-        loads["q"] = {"type": "distributed", "member": "m0", "value": value}
-    table = {
-        "dimension": "space" if space else "plane",
-        "sections": {"soft": {**SOFT}, "unlike": {**UNLIKE}},
-        "nodes": nodes,
-        "members": members,
-        "loads": loads,
-    }
-    if draw(st.booleans()):
-        vector = rng.uniform(-0.2, 0.2, size=3) * [1, 1, 1 if space else 0]
-        table["motions"] = {"m": {"node": "n0", "displacement": vector.tolist()}}
-    if draw(st.booleans()):
-        table["gravity"] = [0.0, -3.0, 0.0]
-    return table
+FEW = dict.fromkeys(VARIANTS, SEEDS[:12])
+"""Asked again in every way; what the variants cost is bounded by this."""
 
 
-def certified(table):
-    """True where it was solved; every answer is in balance, every refusal a sentence."""
+@functools.cache
+def answer(seed):
+    """The last step, or the refusal."""
     try:
-        solution = sfetcas.solve(made(table))
+        return solve(random_scene(seed))
     except (SceneError, SolveError) as error:
-        refusal = error
-    else:
-        refusal = None
-    if refusal is not None:
-        assert len(str(refusal)) > 20
-        assert getattr(refusal, "status", None) is not Status.SOLVED
-        return False
-    step = solution.last
-    certificate = step.certificate
-    assert certificate.residual < 1e-9
-    assert certificate.stable is not False
-    assert certificate.error_estimate <= 1e-4
-    force, largest = np.zeros(3), 1.0
-    scene = step.model.scene
-    for load in scene.loads.values():
-        length = scene.center_lines[load.member].length if load.type == "distributed" else 1.0
-        force += length * np.asarray(load.vector)
-    for name, member in scene.members.items():
-        if scene.gravity is not None:
-            mass = scene.sections[member.section].mass([0.5])[0] * scene.center_lines[name].length
-            force += mass * np.asarray(scene.gravity)
-        ends = step.along(name, [0.0, 1.0])["position"]
-        np.testing.assert_allclose(ends, [step.position(n) for n in member.nodes], atol=1e-8)
-    for name, node in scene.nodes.items():
-        if node.support == "free":
-            continue
-        reaction = step.reaction(name)[0]
-        force, largest = force + reaction, max(largest, np.abs(reaction).max())
-        if node.support != "slider":
-            moved = next((m.displacement for m in scene.motions.values() if m.node == name), (0, 0, 0))
-            np.testing.assert_allclose(step.position(name), np.add(node.position, moved), atol=1e-8)
-    # The residual is below 1e-9 of the largest force or moment; lengths of order one turn one into the other.
-    np.testing.assert_allclose(force, 0.0, atol=1e-8 * largest)
-    return True
+        return error
 
 
-TALLY = {"solved": 0, "refused": 0}
-FEW = settings(
-    max_examples=25,
-    derandomize=True,
-    deadline=None,
-    database=None,
-    phases=[Phase.generate],
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],
-)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_solved_and_certified_or_refused_with_a_sentence(seed):
+    found = answer(seed)
+    if isinstance(found, Exception):
+        assert len(str(found)) > 20
+        assert getattr(found, "status", None) is not Status.SOLVED
+        return
+    assert found.status is Status.SOLVED
+    for step in found.steps:
+        assert wrong(step) == []
+        assert step.certificate.error_estimate <= found.scene.analysis.accuracy
 
 
-@FEW
-@given(structures(space=False))
-def test_plane(table):
-    TALLY["solved" if certified(table) else "refused"] += 1
-
-
-@FEW
-@given(structures(space=True))
-def test_space(table):
-    TALLY["solved" if certified(table) else "refused"] += 1
-
-
-def test_most_were_solved():
+def test_most_are_solved():
     """Refusing everything would pass the tests above."""
-    if sum(TALLY.values()) == 0:
-        test_plane()
-    assert TALLY["solved"] > 2 * TALLY["refused"]
+    refused = [seed for seed in SEEDS if isinstance(answer(seed), Exception)]
+    # A quarter hangs by next to nothing or is stretched; the benchmark says which.
+    assert len(refused) < len(SEEDS) / 3
+
+
+@pytest.mark.parametrize(("name", "seed"), [(name, seed) for name, seeds in FEW.items() for seed in seeds])
+def test_the_same_however_it_is_put(name, seed):
+    """Another equilibrium has to be one of both models; what cannot be modelled otherwise is refused."""
+    found = answer(seed)
+    if isinstance(found, Exception) or (name == "space" and found.scene.resolved_dimension == "space"):
+        pytest.skip("nothing to compare")
+    said = compared(found.last, variant(name, found.scene, found.last, seed))
+    assert said.startswith(("same", "another equilibrium", "unstable in space", "refused")), said
+    if said.startswith("refused"):
+        # Gauss points do not carry distributed followers; out of plane what nothing holds may turn.
+        assert "need integration at the nodes" in said if name == "gauss" else name == "space", said
+
+
+def test_a_seed_gives_one_scene_and_others_give_others():
+    tables = [random_scene(seed).to_dict() for seed in SEEDS[:10]]
+    assert tables == [random_scene(seed).to_dict() for seed in SEEDS[:10]]
+    assert all(a["nodes"] != b["nodes"] for i, a in enumerate(tables) for b in tables[:i])
+    assert random_scene(7, "plane").resolved_dimension == "plane"
+    assert random_scene(8, "space").resolved_dimension == "space"
+
+
+def kinds(scene):
+    """Words for what a scene has."""
+    yield scene.resolved_dimension
+    yield "loop" if len(scene.members) >= len(scene.nodes) else "tree"
+    for node in scene.nodes.values():
+        yield f"support {node.support}"
+        yield f"joint {node.joint}"
+    for member in scene.members.values():
+        yield f"member {member.type}"
+        yield f"shape {member.shape.type}"
+        yield from (f"release {how}" for how in member.release)
+    for section in scene.sections.values():
+        yield f"section {type(section.EI3).__name__}"
+    for spring in scene.springs.values():
+        yield f"spring {spring.type}{' between' if spring.between else ''}{' along' if spring.direction else ''}"
+    for load in scene.loads.values():
+        yield f"load {load.type} {'inside' if load.member else 'at a node'}"
+        yield f"load {load.frame}"
+    for motion in scene.motions.values():
+        yield f"motion {'between' if motion.between else 'rotation' if motion.rotation is not None else 'displacement'}"
+    yield f"gravity {scene.gravity is not None}"
+    yield f"history {bool(scene.histories)}"
+
+
+def test_everything_is_drawn():
+    found = Counter(word for seed in (*range(120), 161, 235) for word in set(kinds(random_scene(seed))))
+    wanted = ["plane", "space", "loop", "tree", "gravity True", "gravity False", "history True"]
+    wanted += [f"support {how}" for how in ("free", "clamped", "hinge", "ball", "slider", "cylindrical", "universal")]
+    wanted += [f"joint {how}" for how in ("rigid", "hinge", "ball", "universal")]
+    wanted += [f"member {how}" for how in ("flexible", "rigid", "small")]
+    wanted += [f"shape {how}" for how in ("straight", "arc", "helix", "curvature", "spline")]
+    releases = ("hinge", "ball", "universal", "slider", "cylindrical", "slot")
+    wanted += [f"release {how}" for how in releases] + [f"section {how}" for how in ("float", "Table", "Polynomial")]
+    wanted += [f"spring {how}" for how in ("rotational", "rotational between", "translational", "translational along")]
+    wanted += [f"load {how}" for how in ("force at a node", "force inside", "moment at a node", "moment inside")]
+    wanted += [f"load {how}" for how in ("distributed inside", "follower", "section")]
+    wanted += [f"motion {how}" for how in ("between", "rotation", "displacement")]
+    assert [word for word in wanted if not found[word]] == []
+
+
+def test_transforming_back_gives_the_scene():
+    turn = turned_about([0.3, -0.5, 0.8], 1.3)
+    for seed in range(1, 41, 2):
+        table = random_scene(seed).to_dict()
+        there = transformed(table, turn, [0.3, -0.2, 0.5], 20.0, 0.03)
+        back = transformed(there, turn.T, (-20.0 * (turn.T @ [0.3, -0.2, 0.5])).tolist(), 1 / 20.0, 1 / 0.03)
+        again, scene = Scene.from_dict(back), Scene.from_dict(table)
+        for name, line in scene.center_lines.items():
+            x = np.linspace(0.0, 1.0, 5)
+            # Rounding of a few products; what is transformed wrongly differs by much.
+            np.testing.assert_allclose(again.center_lines[name].positions(x), line.positions(x), atol=1e-9 * scene.size)
+            turned = np.abs(np.sum(again.center_lines[name].quaternions(x) * line.quaternions(x), axis=1))
+            np.testing.assert_allclose(turned, 1.0, atol=1e-9)
+        for name, load in scene.loads.items():
+            np.testing.assert_allclose(
+                again.loads[name].vector, load.vector, rtol=1e-9, atol=1e-9 * np.abs(load.vector).max()
+            )
+        for name, spring in scene.springs.items():
+            assert again.springs[name].stiffness == pytest.approx(spring.stiffness, rel=1e-9)
+        for name, section in scene.sections.items():
+            np.testing.assert_allclose(again.sections[name].stiffness([0.3]), section.stiffness([0.3]), rtol=1e-9)
+
+
+def test_another_order_has_the_same_entries():
+    for seed in SEEDS[:5]:
+        table = random_scene(seed).to_dict()
+        other = reordered(table, seed)
+        assert Scene.from_dict(other).to_dict() == table
+        assert list(other["nodes"]) != list(table["nodes"]) or len(other["nodes"]) < 4
+
+
+def other(scene, table, name, **changes):
+    """The scene with one entry of a table changed."""
+    entries = getattr(scene, table)
+    return scene.replace(**{table: {**entries, name: entries[name].replace(**changes)}})
+
+
+BENT = Scene.from_dict(
+    {
+        "dimension": "space",
+        "gravity": [0, -2, 0.5],
+        "sections": {"s": {"EI2": 2.0, "EI3": 1.0, "GJ": 0.7, "rhoA": 0.5}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0.2, 0.1]},
+            "C": {"position": [1.6, 0.1, 0.4]},
+        },
+        "members": {
+            "m": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": 0.7, "normal": [-0.2, 1, 0]}},
+            "r": {"nodes": ["B", "C"], "section": "s", "type": "rigid"},
+        },
+        "springs": {"pull": {"type": "translational", "node": "C", "stiffness": 2.0}},
+        "loads": {
+            "spread": {"type": "distributed", "member": "m", "value": [0.2, 0.9, 0.4], "frame": "follower"},
+            "tip": {"type": "force", "node": "C", "value": [0.5, -1.0, 0.3]},
+            "turn": {"type": "moment", "member": "m", "at": 0.4, "value": [0.1, 0.2, -0.3]},
+        },
+    }
+)
+"""With a load, a member and a spring of each kind that is looked at in its own way."""
+
+TAMPERED = {
+    "nothing": (BENT, set()),
+    "force": (other(BENT, "loads", "tip", value=[0.5, -1.1, 0.3]), {"forces", "moments"}),
+    "moment": (other(BENT, "loads", "turn", value=[0.1, 0.25, -0.3]), {"moments"}),
+    "frame": (other(BENT, "loads", "spread", frame="fixed"), {"forces", "moments", "beams"}),
+    "weight": (other(BENT, "sections", "s", rhoA=0.6), {"forces", "moments", "beams"}),
+    "stiffness": (other(BENT, "sections", "s", EI3=1.3), {"beams", "bends"}),
+    "twist": (other(BENT, "sections", "s", GJ=1.0), {"beams", "bends"}),
+    "spring": (other(BENT, "springs", "pull", stiffness=2.1), {"springs"}),
+    "anchor": (other(BENT, "springs", "pull", anchor=[1.6, 0.2, 0.4]), {"forces", "moments", "springs"}),
+}
+
+
+@pytest.mark.parametrize("changed", TAMPERED)
+def test_an_answer_to_another_scene_is_seen(changed):
+    scene, wanted = TAMPERED[changed]
+    found = dataclasses.asdict(defects(bent(), scene))
+    # What is changed is changed by a tenth and more; what an answer misses is 1e-6 and less.
+    assert {name for name, value in found.items() if value > 1e-5} >= wanted
+    assert changed != "nothing" or max(found.values()) < 1e-5
+    assert wrong(bent()) == []
+
+
+@functools.cache
+def bent():
+    return solve(BENT).last
+
+
+@pytest.mark.parametrize("attribute", ["position", "quaternion"])
+def test_ends_that_leave_their_nodes_are_seen(attribute, monkeypatch):
+    step = bent()
+    moved = getattr(step, attribute)("B") + np.array([0.0, 1e-3, 0.0] if attribute == "position" else [0, 0, 0, 1e-3])
+    told = {"B": moved}
+    real = getattr(type(step), attribute)
+    monkeypatch.setattr(type(step), attribute, lambda self, node: told.get(node, real(self, node)))
+    assert any(word.startswith("ends" if attribute == "position" else "turned") for word in wrong(step))
+
+
+def test_another_answer_is_told_from_the_same(monkeypatch):
+    """A strip that is shortened buckles to where a small force points, or against it; a softer one is elsewhere."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0], "support": "clamped"},
+                "B": {"position": [0.5, 0]},
+                "C": {"position": [1, 0], "support": "clamped"},
+            },
+            "members": {"l": {"nodes": ["A", "B"], "section": "s"}, "r": {"nodes": ["B", "C"], "section": "s"}},
+            "motions": {"push": {"node": "C", "displacement": [-0.05, 0]}},
+            "loads": {"side": {"type": "force", "node": "B", "value": [0.5, 0.5]}},
+        }
+    )
+    step = solve(scene).last
+    below = scene.replace(nodes={**scene.nodes, "B": scene.nodes["B"].replace(start=[0.475, -0.15])})
+    same = variant("gauss", scene, step)
+    assert compared(step, same) == "same"
+    assert compared(step, dataclasses.replace(same, scene=below)).startswith(
+        "another equilibrium (of both models; True, True"
+    )
+    softer = other(scene, "sections", "s", EI3=0.8)
+    assert compared(step, dataclasses.replace(same, scene=softer)).startswith("differs by")
+
+
+def test_a_column_that_leaves_the_plane_is_told():
+    """Stiff in the plane, soft across it: the answer of the plane is an equilibrium in space, an unstable one."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI2": 0.05, "EI3": 1.0, "GJ": 0.05}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "loads": {"tip": {"type": "force", "node": "B", "value": [-1.0, 0.3]}},
+            "dimension": "plane",
+        }
+    )
+    step = solve(scene).last
+    assert compared(step, variant("space", scene, step)) == "unstable in space"
+
+
+@pytest.mark.parametrize("support", ["clamped", "hinge"])
+def test_section_moments_of_a_rigid_arm_hinged_at_a_support(support):
+    """In space the ground holds it across the axis: it took that for nothing, and what no joint gives for the arm's."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0, 0], "support": support, "joint": "hinge", "axis": [0.3, 0.2, 1]},
+                "B": {"position": [1, 0.1, 0.2]},
+                "C": {"position": [-0.7, 0.8, 0.1], "support": "hinge", "axis": [0, 1, 0]},
+            },
+            "members": {
+                "arm": {"nodes": ["A", "B"], "type": "rigid"},
+                "beam": {
+                    "nodes": ["A", "C"],
+                    "section": "s",
+                    "shape": {"type": "arc", "angle": 0.6, "normal": [0.1, 0, 0.7]},
+                },
+            },
+            "springs": {"knee": {"node": "A", "stiffness": 3.0, "between": ["beam", "arm"]}},
+            "loads": {"tip": {"type": "force", "node": "B", "value": [0.1, 0.4, -0.6]}},
+        }
+    )
+    step = solve(scene).last
+    # Of an arm that is loaded at its end: no moment there, and at its start that of the force.
+    ends = step.along("arm", [0.0, 1.0])
+    np.testing.assert_allclose(ends["moment"][1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(ends["moment"][0], np.cross(step.position("B"), [0.1, 0.4, -0.6]), atol=1e-9)
+    assert wrong(step) == []
+
+
+def test_a_hinge_in_a_node_on_a_guide_turns_about_the_guide():
+    """A node without rotation of its own cannot turn about its guide, and members in it about another axis."""
+    table = {
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0, 0], "support": "cylindrical", "direction": [0, 0.5, 1], "joint": "hinge"},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "loads": {"tip": {"type": "force", "node": "B", "value": [0, 1, 0]}},
+    }
+    with pytest.raises(SceneError, match=r"nodes.B.axis: found .*, accepted: along the direction"):
+        Scene.from_dict(table)
+    table["nodes"]["B"]["axis"] = [0, 1, 2]
+    assert Scene.from_dict(table).nodes["B"].support == "cylindrical"
+
+
+def test_weight_of_a_rigid_member_with_a_kink_in_its_mass():
+    """The kink is where integration has to stop, along a straight arm and for the nodes of a bent one."""
+    for shape in ({"type": "straight"}, {"type": "arc", "angle": 0.8}):
+        scene = Scene.from_dict(
+            {
+                "gravity": [0, -10],
+                "sections": {"s": {"EI3": 1.0, "rhoA": {"at": [0, 0.3, 1], "value": [1.0, 5.0, 1.0]}}},
+                "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+                "members": {"arm": {"nodes": ["A", "B"], "type": "rigid", "section": "s", "shape": shape}},
+            }
+        )
+        # Two trapezia of mean 3 kg/m over 1 m; the resultant of the triangle above 1 kg/m stands at (1 + 0.3)/3.
+        force, moment = solve(scene).last.reaction("A")
+        np.testing.assert_allclose(force, [0, 30.0, 0], atol=1e-10)
+        np.testing.assert_allclose(moment, [0, 0, 10 * (0.5 + 2 * 1.3 / 3)], atol=1e-10)
+
+
+def test_a_turn_within_an_element_is_no_answer():
+    """In space this one jumps into a state whose rotation goes once round within 1e-9 of a member."""
+    plane = random_scene(550)
+    found = solve(plane).last
+    said = compared(found, variant("space", plane, found, 550))
+    assert said.startswith(("refused", "same", "another equilibrium", "unstable in space")), said
+
+
+def test_a_strut_held_at_its_exact_length_is_stretched():
+    """Its weight is little beside the load elsewhere: large multipliers carried it on next to no sag."""
+    with pytest.raises(SolveError, match="fully stretched between held points"):
+        solve(random_scene(2037))

@@ -231,7 +231,16 @@ def _check_axes(scene: Scene) -> None:
         if node.support != "slider" and node.rotation != "fixed":
             found = f"found {node.rotation!r}, accepted: only for a slider, and the support is {node.support!r}"
             raise SceneError(found, ("nodes", name, "rotation"))
+        if node.support == "cylindrical" and node.joint == "hinge" and node.direction is not None:
+            _check_axis_of_guide(name, node)
         _check_universal(name, node, name in universals)
+
+
+def _check_axis_of_guide(name: str, node: Node) -> None:
+    """A node without rotation of its own cannot turn about its guide, and members about another axis in it."""
+    if np.linalg.norm(np.cross(unit(node.axis), unit(node.turn_axis))) > SKEW:
+        accepted = f"along the direction of the cylindrical support, {say(node.direction)}, or a joint that is no hinge"
+        raise SceneError(f"found {say(node.axis)}, accepted: {accepted}", ("nodes", name, "axis"))
 
 
 def _check_universal(name: str, node: Node, end: bool) -> None:

@@ -45,6 +45,9 @@ DRIFT = 1.0
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
 
+TORN = 0.5
+"""Roughness of an element, rad, that no refinement has made smooth: meshes that follow errors leave 0.01 and less."""
+
 MOST_TURNED = 1e8
 """Largest angle of an answer, rad: rounding leaves 1e-8 of it."""
 
@@ -62,6 +65,9 @@ BEYOND = 1e4
 
 UNBALANCED = 0.01
 """Share of the loads that is out of balance without redundant multipliers: these carry it on next to nothing."""
+
+CARRIED = 1e-6
+"""The same of multipliers that are large: rounding of what hardly acts is far less."""
 
 NEARLY = 1e-3
 """Share of the largest singular value of the closings below which members may be on their way to being stretched."""
@@ -112,7 +118,7 @@ class Refining(Piloting):
         now = pilot if there else self._onto_target(pilot, factor)
         usual = np.sqrt(self.accuracy)
         # Of one quantity a mesh may be right that is too coarse for all positions.
-        smooth, last, stalled = usual if self.quantity is None else np.inf, np.inf, 0
+        smooth, last, stalled = usual if self.quantity is None else max(usual, 0.5 * TORN), np.inf, 0
         loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
             marked = self._marked(now, loading, smooth)
@@ -190,6 +196,7 @@ class Refining(Piloting):
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
         _refuse_wound(prepared, found.corrected)
+        self._refuse_torn(found, loading)
         if not found.kept:
             _refuse_free(prepared, found.corrected, stability)
         if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
@@ -210,6 +217,24 @@ class Refining(Piloting):
             notes=found.notes,
             iterations=found.iterations,
         )
+
+    def _refuse_torn(self, found: Found, loading: Loading) -> None:
+        """Refuse rotations that jump within an element, however short: a full turn there bends no beam.
+
+        Between q and -q elements pass by without a place moved or, at their nodes, a moment: no estimate sees it.
+
+        Raises
+        ------
+        SolveError
+            Names the member.
+        """
+        model = found.prepared.model
+        rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading))
+        for name in model.members:
+            worst = float(rough[model.elements_of(name)].max(initial=0.0))
+            if name not in self.fixed and worst > TORN:
+                detail = f"an equilibrium of the mesh only: member {name!r} turns by a jump within an element"
+                raise SolveError(Status.FAILED, detail, found.corrected.state)
 
     def _difference(self, coarse: Found, fine: Found, factor: float) -> tuple[float, float]:
         """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
@@ -324,10 +349,11 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
+    most = CARRIED if largest > LARGE else UNBALANCED
     which = "the smallest are given"
     if residual <= SOLVED:
         corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > UNBALANCED * loads > 0.0:
+    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > most * loads > 0.0:
         raise _stretched(equations, loose, corrected)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.

@@ -7,6 +7,7 @@ Source: Abramowitz and Stegun 25.4.29 and 25.4.32; barycentric formulas as in Be
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array
 
-__all__ = ["differentiation", "evaluation", "gauss", "integration", "legendre_tail", "lobatto"]
+__all__ = ["differentiation", "evaluation", "gauss", "integration", "legendre_tail", "lobatto", "pieces"]
 
 
 def _fixed(array: Array) -> Array:
@@ -42,6 +43,14 @@ def lobatto(n: int) -> tuple[Array, Array]:
     x = 0.5 * (x - x[::-1])
     w = 2.0 / (n * (n - 1) * legendre.legval(x, top) ** 2)
     return _fixed(0.5 * (x + 1.0)), _fixed(0.5 * w)
+
+
+def pieces(breaks: Sequence[float], n: int) -> tuple[Array, Array]:
+    """The Gauss-Lobatto points and weights of each piece of [0, 1] between these places."""
+    x, w = lobatto(n)
+    edges = np.array([0.0, *breaks, 1.0])
+    lengths = np.diff(edges)[:, None]
+    return (edges[:-1, None] + lengths * x).ravel(), (lengths * w).ravel()
 
 
 def _barycentric(nodes: Array) -> Array:

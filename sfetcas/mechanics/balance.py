@@ -183,10 +183,19 @@ class Balance:
         columns = {("member", name): i for i, name in enumerate(names)}
         columns |= {("node", n): len(names) + i for i, n in enumerate(held)}
         balances = [self._at_node(columns, names, node) for node in nodes]
+        hinged: list[tuple[str, tuple[dict[int, float], Array]]] = []
         for name in names:
-            ends = end_joints(scene, scene.members[name])
-            balances += [self._at_pin(columns, name, i) for i, (_, joint) in enumerate(ends) if joint not in STIFF]
+            for i, (node, joint) in enumerate(end_joints(scene, scene.members[name])):
+                if joint in STIFF:
+                    continue
+                if self._grounded(node):
+                    hinged.append((node, self._at_pin(columns, name, i)))
+                else:
+                    balances.append(self._at_pin(columns, name, i))
         rows = [({3 * i + k: gain for i, gain in row.items()}, right[k]) for row, right in balances for k in range(3)]
+        for n, (row, right) in hinged:
+            along = np.asarray(scene.nodes[n].axis) / np.linalg.norm(scene.nodes[n].axis)
+            rows.append(({3 * i + k: gain * along[k] for i, gain in row.items() for k in range(3)}, right @ along))
         for n in filter(self._turns_freely, held):
             first, axis = 3 * columns["node", n], np.asarray(scene.nodes[n].turn_axis)
             rows.append(({first + k: part for k, part in enumerate(axis / np.linalg.norm(axis))}, 0.0))
@@ -194,6 +203,11 @@ class Balance:
         solved = _smallest(rows, weights).reshape(-1, 3)
         starts = {name: solved[i] for (kind, name), i in columns.items() if kind == "member"}
         return starts, {name: solved[i] for (kind, name), i in columns.items() if kind == "node"}
+
+    def _grounded(self, node: str) -> bool:
+        """Whether the ground holds member ends hinged at a node across the axis: no joint of theirs says how much."""
+        record = self.model.scene.nodes[node]
+        return self.model.space and record.joint == "hinge" and record.turn not in ("free", "ball", "universal")
 
     def _turns_freely(self, node: str) -> bool:
         """A supported hinge that nothing drives: the ground exerts no moment about its axis."""

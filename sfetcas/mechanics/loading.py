@@ -17,7 +17,7 @@ from ..description.sections import evaluate
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.interpolation import lobatto
+from ..mathematics.interpolation import pieces
 from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
 from .connections import Group, freedoms
@@ -346,9 +346,10 @@ class _Writer:
 
     def _add_weight_of_chord(self, group: Loading, member: str) -> None:
         """The mass of a rigid member is spread over the straight line between its nodes, whatever its shape."""
-        x, w = lobatto(9)
+        section = self.scene.sections[str(self.scene.members[member].section)]
+        x, w = pieces(section.breaks, 9)
         start, end = (np.asarray(self.scene.nodes[n].position) for n in self.scene.members[member].nodes)
-        share = self.scene.sections[str(self.scene.members[member].section)].mass(x) * w * np.linalg.norm(end - start)
+        share = section.mass(x) * w * np.linalg.norm(end - start)
         weight = self.vector(self.scene.gravity)
         self.push(group, self.segments.place(self.segments.ends[member, 0]), (share @ (1.0 - x)) * weight)
         self.push(group, self.segments.place(self.segments.ends[member, 1]), (share @ x) * weight)

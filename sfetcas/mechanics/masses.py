@@ -18,7 +18,7 @@ from ..description.shapes import Straight, place
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.interpolation import differentiation, lobatto
+from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
@@ -198,7 +198,7 @@ class _Weigher:
         section = scene.sections[str(member.section)]
         if section.missing(["rhoA"]):
             return
-        x, w = lobatto(9)
+        x, w = pieces(section.breaks, 9)
         start, end = (scene.nodes[n].position for n in member.nodes)
         chord = place(Straight(), start, end, member.b2, ("members", name))
         share = section.mass(x) * w * chord.length

@@ -146,7 +146,7 @@ def breaks_of(scene: Scene, member: str) -> Array:
     """Fractions at which the solution along a member has a kink and an element has to end."""
     section = scene.members[member].section
     places = [0.0, 1.0, *scene.center_lines[member].breaks]
-    if section is not None and scene.members[member].type == "flexible":
+    if section is not None:
         places += scene.sections[section].breaks
     for load in scene.loads.values():
         if load.member == member:
