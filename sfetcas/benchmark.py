@@ -24,12 +24,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .benchmark_accuracy import knob
-from .benchmark_code import code
-from .benchmark_extremes import extremes
-from .benchmark_motion import motion, step_cost
-from .benchmark_pieces import pieces
-from .benchmark_random import random_scenes
+from .benchmarks.accuracy import knob
+from .benchmarks.code import code
+from .benchmarks.extremes import extremes
+from .benchmarks.motion import motion, step_cost
+from .benchmarks.pieces import pieces
+from .benchmarks.random_run import random_scenes
 from .description.scene import Analysis, Load, Member, Node, Scene
 from .description.sections import CrossSection
 from .description.shapes import Arc

@@ -5,7 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from sfetcas import benchmark, benchmark_motion, benchmark_random
+from sfetcas import benchmark
+from sfetcas.benchmarks import motion as benchmark_motion
+from sfetcas.benchmarks import random_run as benchmark_random
 from sfetcas.checks import check
 from sfetcas.description.scene import Analysis, Expect
 from sfetcas.equilibria.statics import solve

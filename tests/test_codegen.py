@@ -13,7 +13,8 @@ import pytest
 import systems
 from scenes import cantilever, helix
 
-from sfetcas import Prepared, Scene, SceneError, Settings, assemble, benchmark_code, export, load, solve, solve_model
+from sfetcas import Prepared, Scene, SceneError, Settings, assemble, export, load, solve, solve_model
+from sfetcas.benchmarks import code as benchmark_code
 from sfetcas.codegen.arguments import argument, default_arguments
 from sfetcas.codegen.derivatives import derivatives
 from sfetcas.codegen.equilibrium import equilibrium_solver

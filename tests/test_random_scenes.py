@@ -9,8 +9,8 @@ import pytest
 from scenes import turned_about
 
 from sfetcas import Scene, SceneError, SolveError, Status, solve
-from sfetcas.random_checks import VARIANTS, compared, defects, variant, wrong
-from sfetcas.random_scenes import random_scene, reordered, transformed
+from sfetcas.benchmarks.random_checks import VARIANTS, compared, defects, variant, wrong
+from sfetcas.benchmarks.random_scenes import random_scene, reordered, transformed
 
 SEEDS = range(2009, 2049)
 """Even ones are in the plane, odd ones in space; the benchmark has others."""

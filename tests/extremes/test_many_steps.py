@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sfetcas import SolveError
-from sfetcas import benchmark_extremes as extremes
+from sfetcas.benchmarks import extremes
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 

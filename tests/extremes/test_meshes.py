@@ -5,7 +5,7 @@ import pytest
 from scenes import elastica
 
 from sfetcas import SolveError
-from sfetcas import benchmark_extremes as extremes
+from sfetcas.benchmarks import extremes
 from sfetcas.equilibria.statics import solve
 
 PLANE_AND_SPACE = pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sfetcas import SceneError, SolveError, Status
-from sfetcas import benchmark_extremes as extremes
+from sfetcas.benchmarks import extremes
 from sfetcas.equilibria.piloting import CHANGE_POINT
 from sfetcas.equilibria.statics import solve
 

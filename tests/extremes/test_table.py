@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sfetcas import benchmark
-from sfetcas import benchmark_extremes as extremes
+from sfetcas.benchmarks import extremes
 
 
 @pytest.mark.parametrize(

@@ -20,15 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from .description.scene import Scene
-from .dynamics.motion import Trajectory
-from .dynamics.simulation import simulate
-from .equilibria.solution import Equilibrium
-from .equilibria.statics import Settings, solve
-from .errors import SceneError, SolveError, Status
-from .mathematics import quaternion
-from .mathematics.arrays import Array
-from .mathematics.interpolation import lobatto
+from ..description.scene import Scene
+from ..dynamics.motion import Trajectory
+from ..dynamics.simulation import simulate
+from ..equilibria.solution import Equilibrium
+from ..equilibria.statics import Settings, solve
+from ..errors import SceneError, SolveError, Status
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mathematics.interpolation import lobatto
 
 __all__ = [
     "LINES",

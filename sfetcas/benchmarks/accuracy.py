@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .description.scene import Scene
-from .description.scenefile import load
-from .errors import SceneError
-from .tradeoff.measuring import Measurement, measure
-from .tradeoff.tables import markdown_table
-from .tradeoff.variants import Variant, families
+from ..description.scene import Scene
+from ..description.scenefile import load
+from ..errors import SceneError
+from ..tradeoff.measuring import Measurement, measure
+from ..tradeoff.tables import markdown_table
+from ..tradeoff.variants import Variant, families
 
 __all__ = ["knob", "static_problems"]
 

@@ -16,20 +16,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from .description.scene import Analysis, History, Load, Member, Node, Scene
-from .description.sections import CrossSection
-from .dynamics.beginning import at_rest
-from .dynamics.integrating import Memory, Stepper, integrate
-from .dynamics.methods import GeneralisedAlpha, Method, Radau
-from .dynamics.sampling import Sampler
-from .dynamics.stages import StageEquations
-from .mathematics.arrays import Array
-from .mathematics.kernels import Kernels
-from .mechanics.elements import ELEMENTS
-from .mechanics.equations import Equations
-from .mechanics.masses import masses_of
-from .mechanics.mesh import uniform_mesh
-from .mechanics.model import assemble
+from ..description.scene import Analysis, History, Load, Member, Node, Scene
+from ..description.sections import CrossSection
+from ..dynamics.beginning import at_rest
+from ..dynamics.integrating import Memory, Stepper, integrate
+from ..dynamics.methods import GeneralisedAlpha, Method, Radau
+from ..dynamics.sampling import Sampler
+from ..dynamics.stages import StageEquations
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Kernels
+from ..mechanics.elements import ELEMENTS
+from ..mechanics.equations import Equations
+from ..mechanics.masses import masses_of
+from ..mechanics.mesh import uniform_mesh
+from ..mechanics.model import assemble
 
 __all__ = ["motion", "step_cost"]
 

@@ -9,20 +9,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from .description.scene import Analysis, Load, Member, Node, Scene
-from .description.sections import CrossSection
-from .description.springs import Spring
-from .dynamics.beginning import at_rest
-from .dynamics.integrating import Memory, Stepper
-from .dynamics.methods import Radau
-from .dynamics.stages import StageEquations
-from .equilibria.single import solve_model
-from .mechanics.equations import Equations
-from .mechanics.masses import masses_of
-from .mechanics.mesh import uniform_mesh
-from .mechanics.model import Model, assemble
-from .solvers.prepared import Prepared
-from .tradeoff.tables import markdown_table
+from ..description.scene import Analysis, Load, Member, Node, Scene
+from ..description.sections import CrossSection
+from ..description.springs import Spring
+from ..dynamics.beginning import at_rest
+from ..dynamics.integrating import Memory, Stepper
+from ..dynamics.methods import Radau
+from ..dynamics.stages import StageEquations
+from ..equilibria.single import solve_model
+from ..mechanics.equations import Equations
+from ..mechanics.masses import masses_of
+from ..mechanics.mesh import uniform_mesh
+from ..mechanics.model import Model, assemble
+from ..solvers.prepared import Prepared
+from ..tradeoff.tables import markdown_table
 
 __all__ = ["pieces"]
 

@@ -20,9 +20,9 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Any
 
-from .equilibria.solution import Solution
-from .equilibria.statics import solve
-from .errors import SceneError, SolveError
+from ..equilibria.solution import Solution
+from ..equilibria.statics import solve
+from ..errors import SceneError, SolveError
 from .random_checks import VARIANTS, compared, variant, wrong
 from .random_scenes import random_scene
 
