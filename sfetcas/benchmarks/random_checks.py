@@ -362,7 +362,9 @@ class _Looked:
             ends, inner = self.scene.members[member].nodes, self.inner[member]
             sides = [(i, sign) for i, sign in ((0, 1.0), (1, -1.0)) if ends[i] == name]
             parts += [(s * inner["force"][i], s * inner["moment"][i], inner["position"][i]) for i, s in sides]
-            parts += [(self.weights(member)[i], np.zeros(3), here) for i, _ in sides if self.hung(member)]
+            parts += [
+                (self.weights(member)[i], np.zeros(3), inner["position"][i]) for i, _ in sides if self.hung(member)
+            ]
         if node.support != "free":
             parts.append((*step.reaction(name), here))
         turned = step.quaternion(name)

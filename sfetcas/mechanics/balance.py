@@ -151,8 +151,10 @@ class Balance:
         record = self.model.scene.nodes[node]
         if record.support == "free" or record.joint != "hinge":
             return []
-        ends = self.model.rotations.ends
-        return [ends[name][m.nodes.index(node)] for name, m in self.model.scene.members.items() if node in m.nodes]
+        rotations = self.model.rotations
+        turns = [rotations.ends[n][m.nodes.index(node)] for n, m in self.model.scene.members.items() if node in m.nodes]
+        # A member that is rigid up to another support is held there.
+        return [turn for turn in turns if turn not in rotations.node_turn.values()]
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import InertiaSolver, pattern
 from ..mechanics.equations import Equations, Point
@@ -213,7 +214,7 @@ class StabilityTest:
             except np.linalg.LinAlgError:
                 shift *= 8.0
         else:
-            raise np.linalg.LinAlgError("eigenvalues without a bound")
+            raise SolveError(Status.FAILED, "stiffness on the closings that has no bound, of a state far from rest")
         half = np.linalg.solve(root, mass)
         inverse = np.linalg.solve(root, half.T)
         found, vectors = np.linalg.eigh(0.5 * (inverse + inverse.T))
@@ -375,14 +376,8 @@ class StabilityTest:
         loads = np.zeros((equations.total, block.shape[1]))
         smallest = np.array([np.inf])
         for count in range(60):
-            shifted = point.entries.copy()
-            shifted[equations.diagonal[self._chosen]] -= shift * self._weights
-            # A tiny negative diagonal keeps redundant rows from making the matrix singular.
-            shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
-            equations.solver.factor(shifted)
             loads[self._chosen] = root * block
-            block = root * equations.solver.solve(loads)[self._chosen]
-            block = np.linalg.qr(block)[0]
+            block = np.linalg.qr(root * self._solved(point, shift, loads)[self._chosen])[0]
             product = self._times(entries, block)
             new, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
@@ -393,6 +388,20 @@ class StabilityTest:
                 # Each solve factorises anyway: a nearer shift is free and converges ten times as fast.
                 shift = new[0] - 0.1 * (new[-1] - new[0]) - 1e-3 * abs(new[0])
         return smallest, block[:, 0]
+
+    def _solved(self, point: Point, shift: float, loads: Array) -> Array:
+        """Solution of the shifted Newton matrix, whose redundant rows a negative diagonal keeps from being singular."""
+        equations = self.equations
+        for soft in (1e-14, 1e-12, 1e-10):
+            shifted = point.entries.copy()
+            shifted[equations.diagonal[self._chosen]] -= shift * self._weights
+            shifted[equations.diagonal[equations.unknowns :]] -= soft
+            equations.solver.factor(shifted)
+            try:
+                return np.asarray(equations.solver.solve(loads))
+            except np.linalg.LinAlgError:
+                continue
+        raise SolveError(Status.FAILED, "the tangent stays singular however it is shifted")
 
     def _inverse_iterated(self, point: Point, entries: Array) -> tuple[Array, Array]:
         """The eigenvalues nearest to zero, half of a block, and their vectors."""
