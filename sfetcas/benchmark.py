@@ -48,6 +48,9 @@ T = TypeVar("T")
 TIP = np.array([0.445004402246249, 0.810609024880296])
 """Tip of the cantilever under F L^2/EI = 10, elliptic integrals."""
 
+PATH_ACCURACIES = (1e-4, 1e-6, 1e-8)
+"""Accuracies at which paths are compared with single solves."""
+
 NETS = {
     "wavy strips": (100, 300, 1000, 2000),
     "rigid rows": (250, 1000, 2000),
@@ -384,7 +387,7 @@ def path() -> None:
         "215-degree arch": (arch(), [-100.0, 1000.0], 500.0),
     }
     for name, (scene, factors, factor) in courses.items():
-        for accuracy in (1e-4, 1e-6, 1e-8):
+        for accuracy in PATH_ACCURACIES:
             along = scene.replace(analysis=Analysis(type="path", range=factors, accuracy=accuracy))
             seconds, found = _median(lambda along=along: follow_path(along, Settings()), 3)  # type: ignore[misc]
             single = scene.replace(analysis=Analysis(steps=[factor], accuracy=accuracy))

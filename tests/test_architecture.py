@@ -247,6 +247,21 @@ def sources(name, node):
     return {place}
 
 
+def taken():
+    """For each module what others import from it: (module, names)."""
+    found = {}
+    for other, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.level and len(sources(other, node)) == 1:
+                (name,) = sources(other, node)
+                names = {alias.name for alias in node.names} - {name.split(".")[-1]}
+                found.setdefault(name, []).append((other, names))
+    return found
+
+
+TAKEN = taken()
+
+
 def imported(name):
     """(own modules, other top-level packages) that a module imports, also inside functions."""
     own, other = set(), set()
@@ -332,11 +347,8 @@ def test_all_is_complete_and_documented(name):
     if name == "__init__":
         return
     # What other modules import is public in the module it comes from.
-    for other in MODULES:
-        for node in ast.walk(TREES[other]):
-            if isinstance(node, ast.ImportFrom) and node.level and sources(other, node) == {name}:
-                names = {alias.name for alias in node.names} - {name.split(".")[-1]}
-                assert names <= set(module.__all__), f"imported by {other}"
+    for other, names in TAKEN.get(name, []):
+        assert names <= set(module.__all__), f"imported by {other}"
 
 
 @each

@@ -97,7 +97,8 @@ def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
         assert int(row[2]) == solve(scene).last.model.unknowns
 
 
-def test_paths_are_measured(capsys, once):
+def test_paths_are_measured(capsys, once, monkeypatch):
+    monkeypatch.setattr(benchmark, "PATH_ACCURACIES", (1e-4,))
     benchmark.main(["path"])
     for line in capsys.readouterr().out.strip().splitlines()[2:]:
         _, points, limits, seconds, each, single, hundred = re.match(

@@ -58,9 +58,9 @@ def beam(**more):
 def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
     scene = load(file)
     solver = export(scene, tmp_path / "c", name="structure")
-    words = re.fullmatch(
-        r"(\d+) of (\d+) cases agree, (\d+) of them to the last bit.*\n", said(built(tmp_path / "c", "structure"))
-    )
+    # Whatever the compiler makes faster keeps the bits: other tests have -O2.
+    program = built(tmp_path / "c", "structure", flags=["-O1" if flag == "-O2" else flag for flag in FLAGS])
+    words = re.fullmatch(r"(\d+) of (\d+) cases agree, (\d+) of them to the last bit.*\n", said(program))
     assert words
     outcome, results = solver.solve()
     assert outcome.code in (Code.SOLVED, Code.UNSTABLE)

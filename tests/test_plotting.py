@@ -340,7 +340,7 @@ def test_nothing_is_clipped_and_labels_stand_apart(solved, name, monkeypatch):
     assert any(text.get_gid() for text in drawn)
 
 
-@pytest.mark.parametrize("size", [1e-25, 1e-9, 1e-6, 0.05, 1.0, 4e3, 3e6, 1e20])
+@pytest.mark.parametrize("size", [1e-25, 1e-6, 0.05, 3e6, 1e20])
 @pytest.mark.parametrize("name", ["plane_loads", "bend_45"])
 def test_any_scale(tmp_path, name, size):
     table = scenes.transformed(scenes.ZOO[name](), length=size, force=size**0.5)

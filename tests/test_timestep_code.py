@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -146,7 +147,14 @@ def test_unit_for_cosimulation(tmp_path):
     subprocess.run(["make", "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
     build = [sys.executable, "-m", "pythonfmu", "build", "-f", "motion_unit.py", "motion.py", "manifest.json"]
     subprocess.run([*build, "libmotion.so"], cwd=tmp_path / "c", check=True, capture_output=True)
-    run = subprocess.run([sys.executable, "-c", UNIT], cwd=tmp_path / "c", capture_output=True, text=True, check=True)
+    # A Python within a Python: what embeds it has aborted once in some 200 runs.
+    runs = (
+        subprocess.run([sys.executable, "-c", UNIT], cwd=tmp_path / "c", capture_output=True, text=True, check=False)
+        for _ in range(2)
+    )
+    run = next((run for run in runs if run.returncode != -signal.SIGABRT), None)
+    assert run is not None
+    assert run.returncode == 0, run.stderr
     time, y, angle = json.loads(run.stdout.splitlines()[-1])
     state, loads = made.begin, made.arguments.defaults.copy()
     loads[-1] = 3.0

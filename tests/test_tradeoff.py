@@ -292,7 +292,7 @@ def test_tables_have_each_setting(made_up):
 def test_picture_has_both_costs_and_the_fronts(made_up, tmp_path):
     figure = front_picture(made_up)
     left, right = figure.axes
-    assert (left.get_xlabel(), right.get_xlabel()) == ("a whole run, s", "a repeated solve alone, s")
+    assert (left.get_xlabel(), right.get_xlabel()) == ("a whole run", "a repeated solve alone")
     (front,) = (line for line in left.lines if line.get_label() == "best")
     np.testing.assert_allclose(front.get_xdata(), [0.010, 0.020, 0.022])
     np.testing.assert_allclose(front.get_ydata(), [5e-4, 1e-5, 5e-8])

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from ..tradeoff.trading import Row, Trade, again, whole
 from .files import DPI, check_ending, save_figure
@@ -36,9 +36,9 @@ def save_front(trade: Trade, file: str | os.PathLike[str]) -> None:
 
 def front_picture(trade: Trade) -> Figure:
     """Errors over seconds of whole runs and, where there are such, of repeated solves alone; 11 or 7 x 5.5 inch."""
-    costs: list[tuple[str, Callable[[Row], float]]] = [("a whole run, s", whole)]
+    costs: list[tuple[str, Callable[[Row], float]]] = [("a whole run", whole)]
     if any(np.isfinite(row.again) for row in trade.rows):
-        costs.append(("a repeated solve alone, s", again))
+        costs.append(("a repeated solve alone", again))
     figure = Figure(figsize=(7.0 if len(costs) == 1 else 11.0, 5.5), dpi=DPI, layout="constrained")
     papers = np.atleast_1d(figure.subplots(1, len(costs), sharey=True))
     for paper, (label, cost) in zip(papers, costs, strict=True):
@@ -60,7 +60,10 @@ def _draw(paper: Axes, trade: Trade, cost: Callable[[Row], float]) -> None:
             variant = row.measurement.variant
             groups.setdefault(variant.integrator or variant.element, []).append(row)
     for colour, (name, rows) in zip(PALETTE * 3, groups.items(), strict=False):
-        _points(paper, rows, cost, marker="o", color=colour, label=name, markersize=4, alpha=0.75)
+        nodes = [row for row in rows if row.measurement.variant.integration == "nodes"]
+        gauss = [row for row in rows if row.measurement.variant.integration == "gauss"]
+        _points(paper, nodes, cost, marker="o", color=colour, label=name, markersize=4, alpha=0.75)
+        _points(paper, gauss, cost, marker="o", color=colour, label=f"{name}, gauss", markersize=4, fillstyle="none")
     chosen = [row for row in trade.rows if row.measurement.variant.chosen and np.isfinite(cost(row))]
     _points(paper, chosen, cost, marker="*", color=CHOSEN, label="accuracy asked for", markersize=10)
     front = trade.front(cost)
@@ -75,6 +78,9 @@ def _draw(paper: Axes, trade: Trade, cost: Callable[[Row], float]) -> None:
         paper.axhspan(LEAST, trade.reference.estimate, color="#EEEEEE", zorder=0, label="error of the reference")
     paper.set_xscale("log")
     paper.set_yscale("log")
+    paper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    paper.xaxis.set_major_formatter(EngFormatter("s"))
+    paper.xaxis.set_minor_formatter(NullFormatter())
     paper.yaxis.set_major_locator(LogLocator(base=100.0, numticks=12))
     paper.grid(True, color="#E6E6E6", lw=0.6)
 

@@ -214,6 +214,8 @@ class Prepared:
         if not polished.converged and not polished.residual <= SOLVED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
             detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
+            if result.status is Status.SOLVED:
+                detail = f"IPOPT came to rest after {counted(result.iterations, 'iteration')}"
             if status is Status.FAILED:
                 detail += f"; Newton's method left a residual of {polished.residual:.1e}"
             told = contradiction(self.equations, trial, loading) if status is Status.INFEASIBLE else ""
