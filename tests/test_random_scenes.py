@@ -249,6 +249,27 @@ def test_a_column_that_leaves_the_plane_is_told():
     assert compared(step, variant("space", scene, step)) == "unstable in space"
 
 
+def test_a_support_takes_no_moment_of_another_beyond_a_rigid_member():
+    """The foot of a rigid post was told twice, at its clamped end and at the hinge at its top."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {
+                "A": {"position": [0, 0], "support": "clamped"},
+                "B": {"position": [0, 1], "support": "ball", "joint": "hinge"},
+                "C": {"position": [1, 1]},
+            },
+            "members": {"post": {"nodes": ["A", "B"], "type": "rigid"}, "beam": {"nodes": ["B", "C"], "section": "s"}},
+            "springs": {"knee": {"node": "B", "stiffness": 3.0, "between": ["post", "beam"]}},
+            "loads": {"tip": {"type": "force", "node": "C", "value": [0, -1]}},
+        }
+    )
+    step = solve(scene).last
+    # Moments are of order 1.
+    np.testing.assert_allclose(step.reaction("B")[1], 0.0, atol=1e-12)
+    assert not wrong(step)
+
+
 @pytest.mark.parametrize("support", ["clamped", "hinge"])
 def test_section_moments_of_a_rigid_arm_hinged_at_a_support(support):
     """In space the ground holds it across the axis: it took that for nothing, and what no joint gives for the arm's."""

@@ -153,8 +153,10 @@ class Balance:
             return []
         rotations = self.model.rotations
         turns = [rotations.ends[n][m.nodes.index(node)] for n, m in self.model.scene.members.items() if node in m.nodes]
-        # A member that is rigid up to another support is held there.
-        return [turn for turn in turns if turn not in rotations.node_turn.values()]
+        # A member that is rigid up to another support that holds it is held there.
+        nodes = self.model.scene.nodes
+        elsewhere = {turn for n, turn in rotations.node_turn.items() if nodes[n].turn not in ("free", "ball")}
+        return [turn for turn in turns if turn not in elsewhere]
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
