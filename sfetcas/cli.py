@@ -111,9 +111,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="COMMAND",
         help="another program, with {file} for the scene; it prints answers as run --json does, one a line",
     )
-    trading.add_argument("--repeats", type=int, default=Limits.repeats, help="whole runs of each setting")
-    trading.add_argument("--longest", type=float, default=Limits.longest, metavar="S", help="seconds of a setting")
-    trading.add_argument("--budget", type=float, default=Limits.budget, metavar="S", help="seconds of all")
+    trading.add_argument(
+        "--repeats", type=int, default=Limits.repeats, help="whole runs of each setting after the first, 0 to 1000 (5)"
+    )
+    trading.add_argument("--longest", type=float, default=Limits.longest, metavar="S", help="seconds of a setting (10)")
+    trading.add_argument(
+        "--budget", type=float, default=Limits.budget, metavar="S", help="seconds of all, and of each peer (300)"
+    )
     trading.set_defaults(command=_trade)
     code = commands.add_parser("export", help="write an equilibrium solver of the scene as C without dependencies")
     code.add_argument("file", type=Path)
@@ -308,7 +312,7 @@ def _trade(options: argparse.Namespace) -> int:
         found = _named(options.file, lambda: trade(scene, limits=limits, against=options.against, progress=progress))
         for command in options.peer:
             progress(f"peer, {command}")
-            found = with_peer(found, command, options.file)
+            found = with_peer(found, command, options.file, options.budget)
     for output in outputs:
         output.write(found)
     print(as_markdown(found, every=False), end="")

@@ -290,7 +290,7 @@ class ContactRun:
                 finer = self._onto(now.mesh.refined(), now, way)
                 difference, error = self.judge(now, finer, factor)
                 if self._all_fixed:
-                    error = difference
+                    error += difference
                     break
                 now = finer
                 if error <= self.accuracy:

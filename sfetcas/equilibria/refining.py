@@ -145,7 +145,7 @@ class Refining(Piloting):
         """What members contribute whose number of elements is asked for, and which the halving left as they were."""
         if not self.fixed:
             return 0.0
-        return self._difference(now, self._onto(now.prepared.model.mesh.refined(), now, factor), factor)[0]
+        return sum(self._difference(now, self._onto(now.prepared.model.mesh.refined(), now, factor), factor))
 
     def _halved(self, now: Found) -> Mesh:
         cuts = now.prepared.model.mesh.cuts
@@ -164,7 +164,8 @@ class Refining(Piloting):
             return self._answer(now, factor, difference * 2.0 / (4.0**mesh.order - 1.0), difference)
         now = pilot if self.pilot_mesh is mesh else self._onto_target(pilot, factor)
         finer = self._onto(mesh.refined(), now, factor)
-        error = self._difference(now, finer, factor)[0]
+        # The error before the halving is what that changes and what it leaves.
+        error = sum(self._difference(now, finer, factor))
         return self._answer(_with_coarse_moments(now, finer, factor), factor, error)
 
     def _onto_target(self, pilot: Found, factor: float) -> Found:
@@ -204,7 +205,7 @@ class Refining(Piloting):
             note = "left an equilibrium that is unstable on the fine mesh only"
             found = replace(found, corrected=corrected, stability=stability, notes=(*found.notes, note))
             # The error was that of the state that was left.
-            error, _ = self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor)
+            error = sum(self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor))
         return finished(
             prepared,
             found.corrected,

@@ -70,6 +70,8 @@ class Measurement:
     variant : Variant
     failure : str
         Why there is no answer; what follows is then as it was set.
+    refused : bool
+        The scene asks for what cannot be modelled.
     first : float
         Seconds of the first run in a process that has sfetcas loaded and nothing else done: element functions are
         derived, and compiled where that pays.
@@ -97,6 +99,7 @@ class Measurement:
 
     variant: Variant
     failure: str = ""
+    refused: bool = False
     first: float = np.nan
     whole: Timing | None = None
     model: float = np.nan
@@ -136,7 +139,7 @@ def measure(scene: Scene, variant: Variant, repeats: int = 5, longest: float = 2
     try:
         return _measured(scene, variant, repeats, longest)
     except (SceneError, SolveError) as error:
-        return Measurement(variant, failure=str(error))
+        return Measurement(variant, failure=str(error), refused=isinstance(error, SceneError))
     except (FloatingPointError, OverflowError, np.linalg.LinAlgError, MemoryError) as error:
         return Measurement(variant, failure=f"the numbers leave what can be computed ({type(error).__name__})")
 

@@ -54,11 +54,16 @@ def run_peer(command: str, file: Path, reference: Solution, longest: float) -> l
     SceneError
         It cannot be run, fails, or prints something else.
     """
-    words = [word.replace("{file}", str(file)) for word in shlex.split(command)]
+    try:
+        words = [word.replace("{file}", str(file)) for word in shlex.split(command)]
+    except ValueError as error:
+        raise SceneError(f"--peer: found {command!r}, accepted: a command ({error})") from None
+    if not words:
+        raise SceneError("--peer: found nothing, accepted: a command")
     begin = time.perf_counter()
     try:
-        told = subprocess.run(words, capture_output=True, text=True, timeout=longest, check=False)
-    except (OSError, ValueError, IndexError) as error:
+        told = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=longest, check=False)
+    except (OSError, ValueError) as error:
         raise SceneError(f"--peer: found {command!r}, which cannot be run: {error}") from None
     except subprocess.TimeoutExpired:
         raise SceneError(f"--peer: found {command!r}, which took more than {longest:g} s") from None
@@ -78,8 +83,8 @@ def _peer(command: str, number: int, line: str, seconds: float, reference: Solut
         label = str(answer.get("label") or f"{shlex.split(command)[0]} {number}")
         return Peer(label, seconds, None if again is None else float(again), error / reference.scene.size)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        message = f"found {line[:60]!r}, accepted: an answer in JSON with 'steps' ({type(error).__name__}: {error})"
-        raise SceneError(message, ("--peer", command, f"line {number}")) from None
+        message = f"--peer: line {number} of what {command!r} printed: found {line[:60]!r}, accepted: an answer in JSON"
+        raise SceneError(f"{message} with 'steps' that have 'nodes' with 'position'") from error
 
 
 def _apart(step: Any, rivals: list[Mapping[str, Any]]) -> float:

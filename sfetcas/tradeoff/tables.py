@@ -131,6 +131,9 @@ def as_markdown(trade: Trade, *, every: bool = True) -> str:
         *(line for line in (trade.verdict(target) for target in TARGETS) if line),
         *trade.notes,
         "",
+        "whole: a run with branch check and error bar, once everything is loaded (spread: quartiles), of it model and "
+        "solve; first: the first one in a new process; again: a repeated solve alone, on one mesh, without either.",
+        "",
         *markdown_table(
             HEADS,
             [_cells(row) for row in sorted(rows, key=lambda row: (not row.measurement.variant.chosen, row.seconds))],

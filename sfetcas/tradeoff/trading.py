@@ -51,9 +51,6 @@ ELSEWHERE = 0.02
 LITTLE = 1.25
 """Settings whose times differ by less than this are as good as each other: no machine measures better."""
 
-PATIENCE = 600.0
-"""Seconds that another program may take."""
-
 GAINED = 0.7
 """A finer mesh gains something where it leaves less than this share of the error."""
 
@@ -236,13 +233,15 @@ def trade(
 
     Raises
     ------
+    SceneError
+        The scene asks for what cannot be modelled.
     SolveError
         No reference could be had.
     """
     return _Trading(scene, limits or Limits(), against, progress or (lambda name: None)).trade()
 
 
-def with_peer(found: Trade, command: str, file: Path) -> Trade:
+def with_peer(found: Trade, command: str, file: Path, longest: float) -> Trade:
     """A trade with another program beside it, whose answers of statics are compared with the reference.
 
     Parameters
@@ -251,6 +250,8 @@ def with_peer(found: Trade, command: str, file: Path) -> Trade:
         See :mod:`~sfetcas.tradeoff.peers`.
     file : Path
         The scene file.
+    longest : float
+        Seconds that it may take.
 
     Raises
     ------
@@ -261,7 +262,7 @@ def with_peer(found: Trade, command: str, file: Path) -> Trade:
         raise SceneError(f"--peer: found type {found.scene.analysis.type!r}, accepted: 'static'")
     reference = solve(found.reference.variant.scene(found.scene), found.reference.variant.settings())
     assert isinstance(reference, Solution)
-    return replace(found, peers=(*found.peers, *run_peer(command, file, reference, PATIENCE)))
+    return replace(found, peers=(*found.peers, *run_peer(command, file, reference, longest)))
 
 
 @dataclass
@@ -315,6 +316,8 @@ class _Trading:
 
         Raises
         ------
+        SceneError
+            The scene asks for what cannot be modelled.
         SolveError
             None could.
         """
@@ -331,6 +334,8 @@ class _Trading:
                 continue
             if found.observation is not None:
                 return found
+            if found.refused:
+                raise SceneError(found.failure)
             failure = failure or found.failure
         raise SolveError(Status.FAILED, f"no reference could be had: {failure}")
 
@@ -406,7 +411,7 @@ class _Trading:
         if self.reference.expected is not None:
             worst, met, count = self.reference.expected
             told = f"the reference meets {met} of {count} expectations of the file"
-            notes.append(f"{told}; largest difference {worst:.1e}")
+            notes.append(f"{told}; largest relative difference {worst:.1e}")
         if self.left_out:
             notes.append(f"after {self.limits.budget:g} s {self.left_out} families or variants were left out")
         elsewhere = sum(row.remark == "another equilibrium" for row in self.rows)
