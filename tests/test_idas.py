@@ -72,7 +72,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["plane", "loop", "hinge in a loop", "springs", "space", "followers"])
 def test_same_motion_as_radau(name):
     table = dynamic(SCENES[name]())
     one, other = (

@@ -94,12 +94,15 @@ CASES = {
 }
 """Scene, what it is made of, and the factor at which all states are asked for."""
 
+SLOW = ("hinged arch near its limit", "hinged arch pulled up", "shallow hinged arch")
+"""Others of their kind say the same in less time."""
+
 
 def shape(step):
     return np.vstack([step.along(name, np.linspace(0.05, 0.95, 10))["position"] for name in step.model.scene.members])
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name for name in CASES if name not in SLOW])
 def test_all_finds_each_state_that_paths_pass(name):
     make, parts, factor = CASES[name]
     several = [shape(step) for step in solve(make(**parts, steps=[factor], equilibria="all")).steps]
