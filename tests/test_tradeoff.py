@@ -190,7 +190,10 @@ def test_trade_runs_all_and_finds_better_meshes_better(few):
     found = trade(load(BEND), limits=Limits(repeats=1, longest=60.0, budget=600.0), progress=told.append)
     names = [row.name for row in found.rows]
     assert names[:4] == ["accuracy 1e-03", "accuracy 1e-06", "SFET5 x 1", "SFET5 x 4"]
-    assert names[4:] == [f"{base}, newton" for base in names[2:] if f"{base}, newton" in names]
+    # Which of them come first depends on their times; the only one that is as near as 1e-6 is always there.
+    others = [f"{base}, newton" for base in names[2:] if f"{base}, newton" in names]
+    assert sorted(names[4:]) == others
+    assert "SFET5 x 4, newton" in others
     assert told[1:] == names
     rows = dict(zip(names, found.rows))
     assert rows["SFET5 x 4"].error < 1e-2 * rows["SFET5 x 1"].error < 1e-4

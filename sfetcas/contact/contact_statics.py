@@ -12,7 +12,7 @@ from ..description.scene import Scene
 from ..description.supports import along
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mechanics.accuracy import gained, largest_difference, remaining, roughness
+from ..mechanics.accuracy import halving, roughness
 from ..mechanics.balance import three
 from ..mechanics.fields import Fields
 from ..mechanics.mesh import Mesh, Touch
@@ -463,9 +463,7 @@ def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
 
 
 def _judge(one: Held, other: Held, factor: float) -> tuple[float, float]:
-    coarse, fine = one.touched.fields, other.touched.fields
-    difference = largest_difference(coarse, fine)
-    return difference, remaining(difference, gained(coarse, fine))
+    return halving(one.touched.fields, other.touched.fields)
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:

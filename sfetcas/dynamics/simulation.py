@@ -276,9 +276,8 @@ class Simulation:
         try:
             for one, other in zip(coarse.instants, fine.instants, strict=False):
                 a, b = quantity.value(one, self.measure), quantity.value(other, self.measure)
-                flip = -1.0 if quantity.name.endswith(".quaternion") and a @ b < 0.0 else 1.0
                 own.append(b)
-                apart = max(apart, float(np.linalg.norm(a - flip * b)) if one.time == other.time else 0.0)
+                apart = max(apart, quantity.apart(a, b) if one.time == other.time else 0.0)
         except SceneError as error:
             raise SceneError(str(error), WHERE) from None
         return apart / quantity.unit(fine.instants[0], own) / GAINED

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..description.scene import Scene
 from ..errors import SceneError
-from ..mechanics.accuracy import gained, largest_difference, remaining
+from ..mechanics.accuracy import gained, halving, remaining
 from ..mechanics.elements import ELEMENTS
 from ..mechanics.mesh import Mesh, first_mesh, uniform_mesh
 from ..mechanics.model import assemble
@@ -123,8 +123,7 @@ class Meshing:
             The scene has no such quantity.
         """
         if self.quantity is None:
-            difference, gain = largest_difference(coarse.fields, fine.fields), gained(coarse.fields, fine.fields)
-            return difference, remaining(difference, gain)
+            return halving(coarse.fields, fine.fields)
         try:
             difference = self.quantity.difference(coarse, fine)
         except SceneError as error:

@@ -179,6 +179,9 @@ class Quantity:
         a, b = self.value(one), self.value(other)
         if a.shape != b.shape:
             return np.inf
-        if self.name.endswith(".quaternion") and a @ b < 0.0:
-            b = -b
-        return float(np.linalg.norm(a - b)) / self.unit(other, [b])
+        return self.apart(a, b) / self.unit(other, [b])
+
+    def apart(self, a: Array, b: Array) -> float:
+        """Distance of two values, of quaternions whichever signs they have."""
+        opposite = self.name.endswith(".quaternion") and a @ b < 0.0
+        return float(np.linalg.norm(a + b if opposite else a - b))

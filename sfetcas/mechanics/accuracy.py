@@ -13,7 +13,7 @@ from ..mathematics import interpolation
 from ..mathematics.arrays import Array
 from .fields import Fields
 
-__all__ = ["every_other", "gained", "largest_difference", "remaining", "roughness"]
+__all__ = ["every_other", "gained", "halving", "largest_difference", "remaining", "roughness"]
 
 SAFETY = 4.0
 """Estimates are this many times what the order of the elements says of the error that is left."""
@@ -37,6 +37,12 @@ def largest_difference(coarse: Fields, fine: Fields) -> float:
         a, b = (side.positions(name, x) for side in (coarse, fine))
         largest = max(largest, float(np.linalg.norm(a - b, axis=1).max()))
     return largest / coarse.model.scene.size
+
+
+def halving(coarse: Fields, fine: Fields) -> tuple[float, float]:
+    """What the halving of all elements changed of the positions, and the estimated error that it left."""
+    difference = largest_difference(coarse, fine)
+    return difference, remaining(difference, gained(coarse, fine))
 
 
 def gained(coarse: Fields, fine: Fields, *, positions: bool = True) -> float:

@@ -12,11 +12,11 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from ..tradeoff.trading import Row, Trade, again, whole
 from .files import DPI, check_ending, save_figure
+from .looks import PALETTE
 from .sheet import title_of
 
 __all__ = ["front_picture", "save_front"]
 
-PALETTE = ("#C98A00", "#009E73", "#56B4E9", "#CC5FA0", "#7A5230", "#6B7A00", "#6A51A3", "#00808A")
 CHOSEN, FRONT, PEER = "#D55E00", "#222222", "#777777"
 LEAST = 1e-16
 """What is exact is drawn here."""

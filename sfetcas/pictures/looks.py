@@ -13,7 +13,7 @@ from ..equilibria.solution import Equilibrium, Solution
 from ..mathematics.arrays import Array
 from .sketch import Ink, Look, Sketch, in_short
 
-__all__ = ["dashes_of", "looks_of_equilibria", "looks_of_steps", "number_of"]
+__all__ = ["PALETTE", "dashes_of", "looks_of_equilibria", "looks_of_steps", "number_of"]
 
 MANY = 12
 """More thin lines than that have one legend for all of a kind."""
