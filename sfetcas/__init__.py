@@ -19,7 +19,6 @@ large motion, Part 1.
 from .analyses import solve
 from .checks import check
 from .codegen.derivatives import Derivatives
-from .codegen.equilibrium import EquilibriumSolver
 from .codegen.folder import export
 from .codegen.timestep import TimeStep
 from .description.contacts import Contact
@@ -36,6 +35,8 @@ from .errors import SceneError, SolveError, Status
 from .mathematics.nlp import NLP, Ipopt, NLPResult, Solver
 from .mechanics.mesh import Mesh, first_mesh, uniform_mesh
 from .mechanics.model import Model, assemble
+from .parametric.changing import changed
+from .parametric.equilibrium import EquilibriumSolver
 from .paths.path import Branch, Path, PathPoint
 from .paths.paths import switch
 from .solvers.open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
@@ -89,6 +90,7 @@ __all__ = [
     "Trajectory",
     "Until",
     "assemble",
+    "changed",
     "check",
     "dump",
     "equilibrium_nlp",

@@ -15,12 +15,12 @@ from scenes import cantilever, helix
 
 from sfetcas import Prepared, Scene, SceneError, Settings, assemble, export, load, solve, solve_model
 from sfetcas.benchmarks import code as benchmark_code
-from sfetcas.codegen.arguments import argument, default_arguments
 from sfetcas.codegen.derivatives import derivatives
-from sfetcas.codegen.equilibrium import equilibrium_solver
 from sfetcas.mathematics import kernels
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
+from sfetcas.parametric.arguments import argument, default_arguments
+from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
 
 PROBLEMS = Path(__file__).parent.parent / "problems"

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..codegen.equilibrium import EquilibriumSolver
 from ..codegen.folder import export
 from ..codegen.timestep import TimeStep
 from ..description.scene import Analysis, Load, Member, Node, Scene
 from ..description.sections import CrossSection
 from ..equilibria.settings import Settings
+from ..parametric.equilibrium import EquilibriumSolver
 
 __all__ = ["code"]
 

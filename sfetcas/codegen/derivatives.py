@@ -14,12 +14,12 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.nlp import NLP
 from ..mechanics.model import Model
+from ..parametric.arguments import Arguments, Asked
+from ..parametric.equilibrium import equilibrium_solver
+from ..parametric.results import Results
 from ..solvers.prepared import Prepared
 from ..solvers.problem import EquilibriumProblem
 from ..solvers.program import is_data
-from .arguments import Arguments, Asked
-from .equilibrium import equilibrium_solver
-from .results import Results
 
 __all__ = ["Derivatives", "derivatives"]
 
@@ -101,7 +101,7 @@ def derivatives(
     Parameters
     ----------
     scene, name, arguments, settings
-        As of :func:`~sfetcas.codegen.equilibrium.equilibrium_solver`; arguments are loads and motions.
+        As of :func:`~sfetcas.parametric.equilibrium.equilibrium_solver`; arguments are loads and motions.
 
     Raises
     ------

@@ -14,10 +14,10 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..files import write_folder
 from ..mathematics.kernels import interpreted
-from .arguments import Asked
+from ..parametric.arguments import Asked
+from ..parametric.equilibrium import EquilibriumSolver, Place, equilibrium_solver
 from .derivatives import Derivatives
 from .derivatives import derivatives as program_of
-from .equilibrium import EquilibriumSolver, Place, equilibrium_solver
 from .rendering import Writer
 from .timestep import TimeStep, time_step
 from .writing_derivatives import DerivativesWriter

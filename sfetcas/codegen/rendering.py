@@ -17,8 +17,8 @@ from ..description.scene import Scene
 from ..mathematics.arrays import Array
 from ..mathematics.source import functions_in_c, sizes_of
 from ..mechanics.model import Model
-from .arguments import Arguments
-from .results import Results
+from ..parametric.arguments import Arguments
+from ..parametric.results import Results
 
 __all__ = ["Status", "Writer", "enumerated", "filled", "identifiers", "numbers", "row", "rows", "template"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -20,27 +20,14 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
-from ..mechanics.expressions import Given
-from ..mechanics.masses import Masses, masses_of
+from ..mechanics.masses import masses_of
 from ..mechanics.model import Model, assemble
-from .arguments import Arguments, Asked, asked_for
-from .equilibrium import Place, chosen_places, refuse_search
-from .results import Results, default_motion_results
+from ..parametric.arguments import Arguments, Asked, asked_for
+from ..parametric.equilibrium import Place, chosen_places
+from ..parametric.moving import motion_of, parametric_stages
+from ..parametric.results import Results, default_motion_results
 
 __all__ = ["TimeStep", "time_step"]
-
-
-class _Argued(StageEquations):
-    """The equations of motion with numbers of the scene in the place of the factors of its loads."""
-
-    def __init__(self, arguments: Arguments, masses: Masses) -> None:
-        super().__init__(arguments.expressions.equations, masses, "interpreted")
-        self._arguments = arguments
-        self.layout = replace(self.layout, factors=len(arguments.defaults))
-
-    def given(self, factors: ca.MX) -> Given:
-        """What is given for the numbers."""
-        return self._arguments.program.given_by(self._arguments.given(factors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,16 +159,14 @@ def time_step(
     Parameters
     ----------
     scene, name, arguments, results, places, settings
-        As of :func:`~sfetcas.codegen.equilibrium.equilibrium_solver`.
+        As of :func:`~sfetcas.parametric.equilibrium.equilibrium_solver`.
 
     Raises
     ------
     SceneError
         A scene that cannot be exported, a number or a result that it does not have.
     """
-    refuse_search(scene)
-    settings = settings or Settings()
-    simulation = Simulation(scene, settings, _nothing, None)
+    simulation = motion_of(scene, settings or Settings())
     method = _method(simulation)
     scene = simulation.scene
     mesh = simulation.mesh if simulation.prescribed else simulation.mesh.refined()
@@ -190,27 +175,19 @@ def time_step(
     told = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
     known = Arguments(scene, base, asked_for(scene, arguments), told.rest, f"{name}_")
     own = StageEquations(Equations(base), masses_of(base), "interpreted")
-    masses = masses_of(known.model)
-    if not _same(own.masses, masses):
-        raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
+    system = parametric_stages(known, own.masses)
     begun, _ = simulation.begun(own)
-    system = _Argued(known, masses)
     rates = np.zeros((method.kept, len(begun.x)))
     rates[0] = begun.v
     state = begun.state
     memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.wound)
     if method.kept > 1:
         step = scene.analysis.step or scene.analysis.duration / 1000.0
-        memory = Stepper(own, method).refreshed(memory, step / masses.time)
+        memory = Stepper(own, method).refreshed(memory, step / own.masses.time)
     stages, layout = method.stages, system.layout
     still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
     moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.near]
-    return TimeStep(name, scene, known, told, system, method, masses.time, np.concatenate([*moved, np.zeros(1)]))
-
-
-def _nothing(*_: Any) -> float:
-    """Conditions that end a motion are not looked for."""
-    return 0.0
+    return TimeStep(name, scene, known, told, system, method, own.masses.time, np.concatenate([*moved, np.zeros(1)]))
 
 
 def _method(simulation: Simulation) -> Method:
@@ -222,12 +199,3 @@ def _method(simulation: Simulation) -> Method:
         message = f"found {simulation.name!r}, whose steps are a library's own, accepted for C: {accepted}"
         raise SceneError(message, ("analysis", "integrator"))
     return method
-
-
-def _same(one: Masses, other: Masses) -> bool:
-    """Whether two models have the same masses."""
-    pairs = [(one.inner, other.inner), (one.inner_drag, other.inner_drag), (one.place_drag, other.place_drag)]
-    pairs += [(one.places.value, other.places.value)]
-    pairs += [(a.mass, b.mass) for a, b in zip(one.observables, other.observables, strict=True)]
-    pairs += [(a.damping, b.damping) for a, b in zip(one.observables, other.observables, strict=True)]
-    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=0.0) for a, b in pairs)

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..description.records import counted
 from ..mathematics.source import sparsity_table, table
+from ..parametric.equilibrium import EquilibriumSolver
 from ..solvers.globalised import MEANINGS, Code
-from .equilibrium import EquilibriumSolver
 from .rendering import Status, Writer, filled, row, rows, template
 
 __all__ = ["EquilibriumWriter"]

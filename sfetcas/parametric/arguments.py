@@ -1,4 +1,4 @@
-"""Numbers of a scene that are arguments of the generated code, and what is given as a function of them."""
+"""Numbers of a scene as arguments, and what is given to the equations as a function of them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..mechanics.model import Model, assemble
 from ..solvers.program import Program, data_of, is_data
 from .dependence import Dependence, Number, found
 
-__all__ = ["FACTOR", "Argument", "Arguments", "Asked", "argument", "asked_for", "default_arguments"]
+__all__ = ["FACTOR", "Argument", "Arguments", "Asked", "argument", "asked_for", "default_arguments", "with_numbers"]
 
 FACTOR = "factor"
 """The argument that multiplies all loads and motions without a history."""
@@ -28,7 +28,7 @@ FACTOR = "factor"
 
 @dataclass(frozen=True)
 class Argument:
-    """One argument of the generated code: a number or a vector.
+    """One argument: a number or a vector of the scene.
 
     Attributes
     ----------
@@ -255,12 +255,9 @@ class Arguments:
         return values
 
     def _assembled(self, values: Sequence[float]) -> Model:
-        table = self._scene.to_dict()
-        table["dimension"] = self._scene.resolved_dimension
-        for i, value in zip(self._own, values, strict=True):
-            _put(self._scene, table, self._numbers[i].name.split("."), float(value))
+        names = [self._numbers[i].name for i in self._own]
         try:
-            scene = Scene.from_dict(table)
+            scene = with_numbers(self._scene, dict(zip(names, values, strict=True)))
             assembly: Any = self._base.assembly
             return assemble(scene, self._mesh, assembly=assembly, scales=self._base.scales)
         except SceneError as error:
@@ -371,6 +368,21 @@ class Arguments:
         """(arguments) -> given."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
+    """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; in the dimension that it has.
+
+    Raises
+    ------
+    SceneError
+        The changed scene is none.
+    """
+    table = scene.to_dict()
+    table["dimension"] = scene.resolved_dimension
+    for name, value in numbers.items():
+        _put(scene, table, name.split("."), float(value))
+    return Scene.from_dict(table)
 
 
 def _put(scene: Scene, table: dict[str, Any], path: Sequence[str], value: float) -> None:

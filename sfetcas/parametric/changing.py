@@ -1,0 +1,46 @@
+"""A scene with other numbers, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.scene import Scene
+from ..errors import SceneError
+from .arguments import FACTOR, argument, with_numbers
+
+__all__ = ["changed"]
+
+
+def changed(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
+    """The scene with other values of numbers, named as in the scene.
+
+    ``changed(scene, {"sections.strip.EI3": 2.0, "loads.tip.value": [0, 3], "factor": 0.5})``; a list takes a list of as
+    many numbers (in a plane scene those of the plane), or single ones by ``loads.tip.value.1``.  ``factor`` takes the
+    place of all steps.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such number, or accepts no such value.
+    """
+    single: dict[str, float] = {}
+    for name, value in values.items():
+        known = argument(scene, name)
+        given = np.asarray(value, dtype=float).ravel()
+        if len(given) != len(known.default) or not np.isfinite(given).all():
+            count = len(known.default)
+            accepted = "a finite number" if count == 1 else f"{count} finite numbers"
+            raise SceneError(f"{name}: found {value!r}, accepted: {accepted}")
+        single |= dict(zip(known.names, given.tolist(), strict=True))
+    factor = single.pop(FACTOR, None)
+    if any(name.startswith("histories.") and name.count(".") == 1 for name in single):
+        raise SceneError(
+            f"{', '.join(single)}: found a whole history, accepted: its numbers, as histories.NAME.value.0"
+        )
+    found = with_numbers(scene, single)
+    if factor is None:
+        return found
+    return found.model_copy(update={"analysis": found.analysis.model_copy(update={"steps": (factor,)})})

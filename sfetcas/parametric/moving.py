@@ -1,0 +1,74 @@
+"""The equations of motion with numbers of the scene in the place of the factors of its loads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.scene import Scene
+from ..dynamics.simulation import Simulation
+from ..dynamics.stages import StageEquations
+from ..equilibria.settings import Settings
+from ..errors import SceneError
+from ..mechanics.expressions import Given
+from ..mechanics.masses import Masses, masses_of
+from .arguments import Arguments
+from .equilibrium import refuse_search
+
+__all__ = ["ParametricStages", "motion_of", "parametric_stages"]
+
+
+class ParametricStages(StageEquations):
+    """The equations of motion whose ``factors`` are the numbers of some arguments."""
+
+    def __init__(self, arguments: Arguments, masses: Masses) -> None:
+        super().__init__(arguments.expressions.equations, masses, "interpreted")
+        self._arguments = arguments
+        self.layout = replace(self.layout, factors=len(arguments.defaults))
+
+    def given(self, factors: ca.MX) -> Given:
+        """What is given for the numbers."""
+        return self._arguments.program.given_by(self._arguments.given(factors))
+
+
+def motion_of(scene: Scene, settings: Settings) -> Simulation:
+    """The motion of a scene, not yet run.
+
+    Raises
+    ------
+    SceneError
+        It takes a search that has no derivatives, or cannot be modelled.
+    """
+    refuse_search(scene)
+    return Simulation(scene, settings, _nothing, None)
+
+
+def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
+    """The equations of motion for arguments, with the masses of their defaults.
+
+    Raises
+    ------
+    SceneError
+        Some argument changes masses.
+    """
+    found = masses_of(arguments.model)
+    if not _same(masses, found):
+        raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
+    return ParametricStages(arguments, found)
+
+
+def _nothing(*_: Any) -> float:
+    """Conditions that end a motion are not looked for."""
+    return 0.0
+
+
+def _same(one: Masses, other: Masses) -> bool:
+    """Whether two models have the same masses."""
+    pairs = [(one.inner, other.inner), (one.inner_drag, other.inner_drag), (one.place_drag, other.place_drag)]
+    pairs += [(one.places.value, other.places.value)]
+    pairs += [(a.mass, b.mass) for a, b in zip(one.observables, other.observables, strict=True)]
+    pairs += [(a.damping, b.damping) for a, b in zip(one.observables, other.observables, strict=True)]
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=0.0) for a, b in pairs)
