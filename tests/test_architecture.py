@@ -26,6 +26,8 @@ ORDER = [
     "mathematics.linear",
     "mathematics.constants",
     "mathematics.spectra",
+    "mathematics.pieces",
+    "mathematics.relations",
     "description",
     "description.records",
     "description.matrices",
