@@ -70,6 +70,20 @@ def test_answers_do_not_depend_on_units_and_are_those_of_the_whole():
         np.testing.assert_allclose(pieces.value(pieces.blocks["x"], result.x), np.array(wanted).ravel(), atol=1e-6)
 
 
+def test_an_unknown_may_stand_twice_in_an_instance():
+    pieces = Pieces("interpreted")
+    x = pieces.unknowns("x", [0.5, 2.0], unit=0.5)
+    w = ca.SX.sym("w", 3)
+    function = ca.Function("f", [w], [w[0] * w[1] * w[2] ** 2])
+    pieces.add_cost("f", function, np.array([[0, 1, 0]]))
+    nlp = pieces.nlp()
+    hessian = ca.Function("h", [nlp.x], [nlp.hessian(ca.MX(1), ca.MX(0, 1))])(nlp.guess)
+    a, b = 0.5, 2.0
+    wanted = 0.25 * np.array([[6 * a * b, 3 * a**2], [3 * a**2, 0.0]])
+    np.testing.assert_allclose(np.array(hessian), wanted, rtol=1e-14)
+    assert x.index.tolist() == [0, 1]
+
+
 def test_rows_have_names():
     names = chain().nlp().rows
     assert names[0] == "circle[0]"

@@ -24,7 +24,7 @@ from ..mechanics.masses import masses_of
 from ..mechanics.model import Model, assemble
 from ..parametric.arguments import Arguments, Asked, asked_for
 from ..parametric.equilibrium import Place, chosen_places
-from ..parametric.moving import motion_of, parametric_stages
+from ..parametric.moving import ParametricStages, answers_of_motion, motion_of, parametric_stages
 from ..parametric.results import Results, default_motion_results
 
 __all__ = ["TimeStep", "time_step"]
@@ -52,7 +52,7 @@ class TimeStep:
     scene: Scene
     arguments: Arguments
     results: Results
-    system: StageEquations
+    system: ParametricStages
     method: Method
     time: float
     begin: Array
@@ -107,16 +107,14 @@ class TimeStep:
     @functools.cached_property
     def tell(self) -> ca.Function:
         """(state, arguments) -> results."""
-        program, layout = self.arguments.program, self.system.layout
+        layout = self.system.layout
         state, p = ca.MX.sym("state", len(self.begin)), ca.MX.sym("arguments", layout.factors)
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
         parts = dict(zip(self.sizes, ca.vertsplit(state, bounds), strict=True))
         velocity = ca.reshape(parts["rates"], layout.x, self.method.kept)[:, 0]
-        places = ca.reshape(velocity[: self.system.axes * self.system.places], self.system.axes, self.system.places)
-        speeds = places * (self.arguments.model.scales.length / self.time)
-        told = self.results.expression(program, self.arguments.undeformed(p), speeds)
         still = ca.vertcat(parts["q"], parts["y"], parts["lam"], parts["near"])
-        as_given = ca.substitute([told], [program.state_symbol, program.symbol], [still, self.arguments.given(p)])[0]
+        told = answers_of_motion(self.results, self.arguments, self.system, self.time)
+        as_given = told(still, p, velocity)
         return ca.Function(
             f"{self.name}_results", [state, p], [ca.densify(as_given)], ["state", "arguments"], ["results"]
         )

@@ -138,7 +138,7 @@ class Pieces:
         Parameters
         ----------
         function : (w, c) -> rows; or (w) -> rows
-        index : (instances, w), places of the unknowns, none twice in an instance
+        index : (instances, w), places of the unknowns
         constants : (instances, c)
         low, high, unit : broadcast to (instances, rows)
         """
@@ -202,8 +202,6 @@ class Pieces:
         cost: float,
     ) -> None:
         index = np.asarray(index, dtype=np.intp)
-        if any(len(np.unique(row)) < len(row) for row in index[:1]):
-            raise ValueError(f"{name}: an unknown stands twice in an instance")
         given = np.zeros((len(index), 0)) if constants is None else np.asarray(constants, dtype=float)
         shape = (len(index), 0 if cost else function.numel_out(0))
         a, b, each = (np.broadcast_to(np.asarray(part, dtype=float), shape) for part in (low, high, unit))
@@ -247,6 +245,18 @@ class Pieces:
                 where = f"{piece.name}[{i}]" if many else piece.name
                 names += [f"{where}.{k}" if several else where for k in range(piece.rows)]
         return names
+
+    def violated(self, nlp: NLP, x: Array) -> list[tuple[str, float]]:
+        """Rows that ``x`` violates, by the names of their pieces, the worst first, over their units."""
+        values = np.array(ca.Function("rows", [nlp.x, nlp.p], [nlp.g])(x, nlp.p_value)).ravel()
+        off = np.maximum(np.maximum(nlp.lower - values, values - nlp.upper), 0.0)
+        off = np.where(np.isfinite(off), off, np.inf)
+        worst: dict[str, float] = {}
+        for name, amount in zip(nlp.rows, off.tolist(), strict=True):
+            piece = name.partition("[")[0]
+            if amount > FEASIBLE:
+                worst[piece] = max(worst.get(piece, 0.0), amount)
+        return sorted(worst.items(), key=lambda item: -item[1])
 
     # -- the program ----------------------------------------------------------------------------------
 
@@ -340,7 +350,9 @@ class Pieces:
             at = piece.index[:, a], piece.index[:, b]
             row.append(np.minimum(*at).ravel())
             column.append(np.maximum(*at).ravel())
-            value.append((self.units[at[0]] * self.units[at[1]]).ravel())
+            # What stands twice in an instance is met on the diagonal from both sides.
+            twice = 1.0 + ((at[0] == at[1]) & (a != b))
+            value.append((twice * self.units[at[0]] * self.units[at[1]]).ravel())
         upper = _summed(
             (self._size, self._size),
             np.concatenate(row),
@@ -349,6 +361,10 @@ class Pieces:
             ca.vertcat(ca.MX(0, 1), *parts),
         )
         return ca.triu2symm(upper)
+
+
+FEASIBLE = 1e-8
+"""By how much rows may miss their bounds, over their units."""
 
 
 def _summed(shape: tuple[int, int], row: Index, column: Index, weight: Array, entries: ca.MX) -> ca.MX:

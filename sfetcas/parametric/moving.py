@@ -17,8 +17,9 @@ from ..mechanics.expressions import Given
 from ..mechanics.masses import Masses, masses_of
 from .arguments import Arguments
 from .equilibrium import refuse_search
+from .results import Results
 
-__all__ = ["ParametricStages", "motion_of", "parametric_stages"]
+__all__ = ["ParametricStages", "answers_of_motion", "motion_of", "parametric_stages"]
 
 
 class ParametricStages(StageEquations):
@@ -58,6 +59,20 @@ def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
     if not _same(masses, found):
         raise SceneError("found numbers that change masses, accepted: loads, motions, stiffness", ("arguments",))
     return ParametricStages(arguments, found)
+
+
+def answers_of_motion(results: Results, arguments: Arguments, system: ParametricStages, time: float) -> ca.Function:
+    """(state, numbers, rates) -> results: of rotations, displacements, multipliers and counted angles as one vector.
+
+    ``rates`` are those of the quantities; time is the unit of time in s.
+    """
+    layout, program = system.layout, arguments.program
+    state, p, rates = ca.MX.sym("state", program.states), ca.MX.sym("numbers", layout.factors), ca.MX.sym("v", layout.x)
+    places = ca.reshape(rates[: system.axes * system.places], system.axes, system.places)
+    speeds = places * (arguments.model.scales.length / time)
+    told = results.expression(program, arguments.undeformed(p), speeds)
+    as_given = ca.substitute([told], [program.state_symbol, program.symbol], [state, arguments.given(p)])[0]
+    return ca.Function("answers", [state, p, rates], [ca.densify(as_given)], ["state", "numbers", "v"], ["results"])
 
 
 def _nothing(*_: Any) -> float:

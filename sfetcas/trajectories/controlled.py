@@ -1,0 +1,280 @@
+"""A scene as a controlled system: the equations of its motion at one time as a CasADi Function.
+
+They are those of :mod:`~sfetcas.dynamics.stages`: what is out of balance under forces of inertia and damping, and the
+quantities whose rates make these.  Written with quantities, rates and accelerations of their own,
+
+    0 = balance(d, v, a, numbers),    x = quantities(d, numbers),    x' = v,    v' = a,
+
+they know neither time nor a step, so that a transcription puts linear relations between x, v and a to them.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from ..description.scene import Scene
+from ..dynamics.stages import StageEquations
+from ..equilibria.settings import Settings
+from ..errors import SceneError
+from ..mathematics.arrays import Array, Index
+from ..mechanics.equations import Equations
+from ..mechanics.expressions import moved_by
+from ..mechanics.masses import masses_of
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import assemble
+from ..parametric.arguments import Arguments, argument
+from ..parametric.equilibrium import Place, chosen_places
+from ..parametric.moving import answers_of_motion, motion_of, parametric_stages
+from ..parametric.results import Result, Results
+from .statement import Control, Variable
+
+__all__ = ["ControlledSystem"]
+
+
+class ControlledSystem:
+    """One scene on one mesh with numbers that are controlled or looked for.
+
+    Parameters
+    ----------
+    scene : Scene
+    controls, variables : what changes with time, and what is looked for
+    answers : names of what is told
+    places : fractions of the lengths of members at which they are told of
+    settings : accuracy, elements
+    mesh : the mesh, of which the first of the scene's accuracy without
+
+    Attributes
+    ----------
+    total : int
+        Rotations, displacements and multipliers of a time.
+    quantities : int
+        Those whose rates make inertia and damping.
+    time : float
+        Unit of time, s.
+    begin : Begun
+        Where the motion begins.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        controls: Sequence[Control],
+        variables: Sequence[Variable],
+        answers: Sequence[str],
+        places: Place | None = None,
+        settings: Settings | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
+        simulation = motion_of(scene, settings or Settings())
+        self.scene = simulation.scene
+        base = assemble(self.scene, mesh or simulation.mesh, assembly="nodal")
+        members = [n for n, member in self.scene.members.items() if member.type == "flexible"]
+        known = [argument(self.scene, one.name) for one in controls]
+        # Where it is varied its range says where the model has to be known.
+        spans = [(one.low, one.high) if np.isfinite([one.low, one.high]).all() else None for one in variables]
+        known += [argument(self.scene, one.name, span) for one, span in zip(variables, spans, strict=True)]
+        for one in known:
+            if len(one.default) != 1:
+                accepted = ", ".join(one.names)
+                raise SceneError(f"{one.name}: found {len(one.default)} numbers, accepted: one of them, as {accepted}")
+        self.results = Results(base, list(answers), chosen_places(members, places or {}), motion=True)
+        self.arguments = Arguments(self.scene, base, known, self.results.rest)
+        own = masses_of(base)
+        self.system = parametric_stages(self.arguments, own)
+        self.model, self.time = self.arguments.model, own.time
+        self.begin, self.notes = simulation.begun(StageEquations(Equations(base), own, "interpreted"))
+        self.total, self.quantities = self.system.total, self.system.layout.x
+        self._refuse(controls, variables)
+
+    def _refuse(self, controls: Sequence[Control], variables: Sequence[Variable]) -> None:
+        scene, names = self.scene, [one.name for one in controls]
+        for name in names:
+            if not name.startswith(("loads.", "histories.")):
+                accepted = "a component of the value of a load, or histories.NAME of a load"
+                raise SceneError(f"found {name!r}, accepted: {accepted}", ("controls",))
+        used = {load.history for load in scene.loads.values() if load.history is not None}
+        for name in sorted(used):
+            if f"histories.{name}" not in names:
+                message = f"found the history {name!r}, accepted: loads that are constant or controlled"
+                raise SceneError(f"{message}, as controls {{'histories.{name}': (low, high)}}", ("histories",))
+        driven = [name for name, one in scene.motions.items() if one.history is not None]
+        if driven:
+            raise SceneError(f"found {driven[0]!r}, accepted: motions that stand still", ("motions",))
+        if variables and scene.analysis.initial == "equilibrium":
+            message = "found initial = 'equilibrium', which variables change, accepted: 'undeformed'"
+            raise SceneError(message, ("analysis",))
+
+    # -- numbers ----------------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the numbers: controls, then variables."""
+        return tuple(name for one in self.arguments.arguments for name in one.names)
+
+    @property
+    def reference(self) -> Array:
+        """The rotations of the begin and the angles that count turns there: what rotations are counted from."""
+        return self.referring(self.begin.state.q, self.begin.state.wound)
+
+    @staticmethod
+    def referring(q: Array, near: Array) -> Array:
+        """Rotations (rotations, components) and angles as one vector."""
+        return np.concatenate([q.ravel(), near])
+
+    @functools.cached_property
+    def start(self) -> Array:
+        """Displacements and multipliers of the begin in their places of ``d``; no rotation."""
+        state = self.begin.state
+        return np.concatenate([np.zeros(self.system.equations.turning_unknowns), state.y, state.lam])
+
+    def result(self, name: str) -> Result:
+        """What an answer of a name is.
+
+        Raises
+        ------
+        SceneError
+            A motion has no such answer.
+        """
+        return Results(self.model, [name], self.results.places, motion=True).results[0]
+
+    def picked_of(self, result: Result) -> Index:
+        """Its numbers that may change: in a plane scene z does not."""
+        every = np.arange(result.size, dtype=np.intp)
+        flat = not self.model.space and result.shape[-1:] == (3,)
+        return every[every % 3 < 2] if flat else every
+
+    @functools.cached_property
+    def picked(self) -> dict[str, Index]:
+        """Of each answer the numbers that may change."""
+        return {one.name: self.picked_of(one) for one in self.results.results}
+
+    def unit(self, name: str) -> float:
+        """What an answer is divided by: the size of the scene for lengths, and so on."""
+        scales = self.model.scales
+        known = next(one.unit for one in self.results.results if one.name == name)
+        units = {"m": scales.length, "N": scales.force, "N m": scales.moment, "m/s": scales.length / self.time}
+        return float(units.get(known, 1.0))
+
+    # -- functions --------------------------------------------------------------------------------------
+
+    def _state(self, d: ca.MX, reference: ca.MX, numbers: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
+        """Rotations, displacements, multipliers and counted angles."""
+        system, n = self.system, self.system.layout
+        q0, near = ca.vertsplit(reference, [0, n.components * n.rotations, reference.shape[0]])
+        q = system.held(ca.MX(ca.reshape(q0, n.components, n.rotations)), system.given(numbers))
+        equations = system.equations
+        bounds = [0, equations.turning_unknowns, equations.unknowns, system.total]
+        _, y, lam = ca.vertsplit(d, bounds)
+        return moved_by(system, q, system.spins(d)), y, lam, near
+
+    def _symbols(self) -> dict[str, ca.MX]:
+        n = self.system.layout
+        sizes = {"d": self.total, "v": n.x, "a": n.x, "numbers": n.factors}
+        return {name: ca.MX.sym(name, size) for name, size in sizes.items()} | {
+            "reference": ca.MX.sym("reference", n.components * n.rotations + n.near)
+        }
+
+    @functools.cached_property
+    def stage(self) -> ca.Function:
+        """(d, v, a, numbers, reference) -> balance (total,), quantities, answers.
+
+        ``d`` are rotation vectors from the reference, displacements and multipliers, dimensionless as v and a;
+        numbers and answers in their own units.
+        """
+        s, system = self._symbols(), self.system
+        q, y, lam, near = self._state(s["d"], s["reference"], s["numbers"])
+        found = system.stage(q, y, lam, system.forces(s["v"], s["a"]), s["numbers"], near)
+        quantities = system.moving(q, y, system.given(s["numbers"]), near)
+        told = answers_of_motion(self.results, self.arguments, self.system, self.time)
+        answers = told(ca.vertcat(ca.vec(q), y, lam, near), s["numbers"], s["v"])
+        results = [ca.densify(part) for part in (found.residual, quantities, answers)]
+        return ca.Function("stage", list(s.values()), results, list(s), ["balance", "quantities", "answers"])
+
+    @functools.cached_property
+    def turned(self) -> ca.Function:
+        """(d, numbers, reference) -> rotations, column by column, and angles that count turns."""
+        s = self._symbols()
+        q, _, _, near = self._state(s["d"], s["reference"], s["numbers"])
+        counted = self.arguments.program.counted(q, near)
+        names = ["d", "numbers", "reference"]
+        result = ca.densify(ca.vertcat(ca.vec(q), counted))
+        return ca.Function("turned", [s[name] for name in names], [result], names, ["rotations"])
+
+    @functools.cached_property
+    def rest(self) -> ca.Function:
+        """(d, v, reference, numbers, impulse, lam) -> momentum, balance: what has to vanish at rest, (unknowns,) each.
+
+        Rates of closed structures depend on each other: at rest all momenta vanish but those that closings take up,
+        by impulses (rows,).  The state is an equilibrium with multipliers lam (rows,).
+        """
+        s, system = self._symbols(), self.system
+        rows, free = system.layout.lam, slice(0, system.equations.unknowns)
+        impulse, lam = ca.MX.sym("impulse", rows), ca.MX.sym("lam", rows)
+        q, y, _, near = self._state(s["d"], s["reference"], s["numbers"])
+        zeros = ca.MX.zeros(system.layout.x)
+        momenta = system.forces(zeros, s["v"])
+        pushed = system.stage(q, y, impulse, momenta, s["numbers"], near).residual
+        without = system.stage(q, y, ca.MX.zeros(rows), zeros, s["numbers"], near).residual
+        still = system.stage(q, y, lam, zeros, s["numbers"], near).residual
+        symbols = {name: s[name] for name in ("d", "v", "reference", "numbers")} | {"impulse": impulse, "lam": lam}
+        results = [ca.densify((pushed - without)[free]), ca.densify(still[free])]
+        return ca.Function("rest", list(symbols.values()), results, list(symbols), ["momentum", "balance"])
+
+    def shapes(self, d: Array, reference: Array, numbers: Array) -> tuple[Array, Array, Array]:
+        """Small vibrations about a state at rest: circular frequencies, momenta and elastic forces of the shapes.
+
+        Returns
+        -------
+        omega : (shapes,)
+            Over the inverse unit of time, rising; infinite where a shape carries no mass.
+        momenta, forces : (unknowns, shapes)
+        """
+        free, still = self.system.equations.unknowns, np.zeros(self.quantities)
+        stiffness, pushed, moved = (np.array(part) for part in self._linear(d, still, still, numbers, reference))
+        mass = (pushed @ moved)[:free, :free]
+        basis = _null_space(stiffness[free:, :free])
+        k, m = (basis.T @ part @ basis for part in (stiffness[:free, :free], mass))
+        k, m = 0.5 * (k + k.T), 0.5 * (m + m.T)
+        shift, factor = _lifted(k, m)
+        inner = np.linalg.solve(factor, np.linalg.solve(factor, m).T)
+        values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+        values, vectors = values[::-1], vectors[:, ::-1]
+        shapes = basis @ np.linalg.solve(factor.T, vectors)
+        massive = values > 1e-12 * max(values.max(initial=0.0), 1e-300)
+        squares = np.where(massive, 1.0 / np.where(massive, values, 1.0) - shift, np.inf)
+        return np.sqrt(np.maximum(squares, 0.0)), mass @ shapes, stiffness[:free, :free] @ shapes
+
+    @functools.cached_property
+    def _linear(self) -> ca.Function:
+        """(d, v, a, numbers, reference) -> derivatives of the balance by d and by a, and of the quantities by d."""
+        s = self._symbols()
+        balance, quantities, _ = self.stage.call(list(s.values()))
+        found = [ca.jacobian(balance, s["d"]), ca.jacobian(balance, s["a"]), ca.jacobian(quantities, s["d"])]
+        return ca.Function("linear", list(s.values()), [ca.densify(part) for part in found])
+
+
+def _null_space(rows: Array) -> Array:
+    """An orthogonal basis of what rows do not see."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    _, sizes, right = np.linalg.svd(rows)
+    rank = int((sizes > 1e-10 * max(sizes.max(initial=0.0), 1e-300)).sum())
+    return np.asarray(right[rank:].T)
+
+
+def _lifted(k: Array, m: Array) -> tuple[float, Array]:
+    """A shift that makes ``k + shift m`` positive, and its lower Cholesky factor."""
+    size = np.abs(k).max(initial=0.0)
+    # Shapes without mass and stiffness, if there are any, are no shapes that could vibrate.
+    k = k + 1e-12 * size * np.eye(len(k))
+    shift = 1.0
+    for _ in range(20):
+        try:
+            return shift, np.linalg.cholesky(k + shift * m)
+        except np.linalg.LinAlgError:
+            shift *= 10.0
+    raise SceneError("the scene at the end: found shapes that neither mass nor stiffness resists, accepted: none")

@@ -1,0 +1,197 @@
+"""The answer of an optimal control problem: commands, the motion by name, and its check by a replay."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.loads import History
+from ..description.records import unknown
+from ..errors import SceneError, Status
+from ..mathematics.arrays import Array
+from ..parametric.changing import changed
+from .replay import Response, respond
+from .transcription import Course, Transcription
+
+if TYPE_CHECKING:
+    from ..description.scene import Scene
+
+__all__ = ["Check", "ControlledMotion"]
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """How far a trajectory is from its replay.
+
+    Attributes
+    ----------
+    response : Response
+        The replay, at the begin, the ends of the intervals, and after the end.
+    difference : float
+        Largest distance of nodes from where the trajectory has them, over the size of the scene.
+    error_estimate : float
+        That of the replay itself by its steps in time.
+    residual_vibration : float
+        Largest distance of nodes from their mean places after the end, m.
+    """
+
+    response: Response = field(repr=False)
+    difference: float
+    error_estimate: float
+    residual_vibration: float
+
+
+@dataclass(frozen=True, eq=False)
+class ControlledMotion:
+    """What :meth:`~sfetcas.trajectories.optimal_control.OptimalControl.solve` found.
+
+    Attributes
+    ----------
+    status : Status
+        Solved, or that of the last iterate of a failure, which is no answer.
+    scene : Scene
+        With what was found for its variables.
+    time : float
+        When the motion ends, s.
+    cost : float
+        As asked for, in its own unit.
+    variables : mapping of str to float
+    iterations : int
+        Of IPOPT, all rounds.
+    seconds : mapping
+        Time spent on the warm start, on building, solving and replaying.
+    notes : tuple of str
+    check : Check or None
+        The replay; None where it was not asked for.
+    """
+
+    status: Status
+    scene: Scene = field(repr=False)
+    time: float
+    cost: float
+    variables: Mapping[str, float]
+    iterations: int
+    seconds: Mapping[str, float]
+    notes: tuple[str, ...]
+    transcription: Transcription = field(repr=False)
+    x: Array = field(repr=False)
+    check: Check | None = None
+
+    # -- times ------------------------------------------------------------------------------------------
+
+    @property
+    def ends(self) -> Array:
+        """Begin and ends of the intervals, (intervals + 1,) s."""
+        shares = self.transcription.statement.shares
+        return self.time * np.append(0.0, np.cumsum(shares))
+
+    @property
+    def times(self) -> Array:
+        """Times at which answers are told: the begin and all stages, s."""
+        return self.time * np.append(0.0, self.transcription.fractions.ravel())
+
+    # -- what was found ---------------------------------------------------------------------------------
+
+    def control(self, name: str) -> Array:
+        """A control: in the intervals where it is constant there, else at their ends."""
+        names = [one.name for one in self.transcription.statement.controls]
+        if name not in names:
+            raise SceneError(f"control: {unknown(name, names, 'such controls')}")
+        return self.course.controls[:, names.index(name)]
+
+    def at_rest(self, name: str) -> float:
+        """The control that holds the scene where it has come to rest."""
+        rests = self.transcription.resting
+        if name not in rests:
+            raise SceneError(f"control at rest: {unknown(name, list(rests), 'such controls')}")
+        return float(self.transcription.pieces.value(rests[name], self.x).flat[0])
+
+    def answer(self, name: str) -> Array:
+        """An answer that the problem reads, at :attr:`times`, (times, numbers)."""
+        names = [one.name for one in self.transcription.system.results.results]
+        if name not in names:
+            raise SceneError(f"answer: {unknown(name, names, 'answers in the problem')}")
+        return self.transcription.answer(name, self.x)
+
+    @functools.cached_property
+    def course(self) -> Course:
+        """The motion on the grid, dimensionless: also where another search may begin."""
+        return self.transcription.course(self.x)
+
+    @property
+    def commands(self) -> dict[str, History]:
+        """Controls as histories, by their names; after the end what holds the scene at rest, else as it is."""
+        statement, found = self.transcription.statement, {}
+        defaults = self.transcription.system.arguments.defaults
+        ends = self.ends
+        for k, one in enumerate(statement.controls):
+            values = self.course.controls[:, k]
+            after = self.at_rest(one.name) if statement.resting else float(defaults[k])
+            pieces: list[tuple[float, ...]]
+            if statement.order:
+                pieces = [(float(a), float(b - a)) for a, b in zip(values[:-1], values[1:], strict=True)]
+            else:
+                pieces = [(float(a),) for a in values]
+            times = (*ends.tolist(), float(ends[-1] * 2.0 + 1.0))
+            found[one.name] = History(t=times, polynomial=(*pieces, (after,)))
+        return found
+
+    # -- check --------------------------------------------------------------------------------------------
+
+    def replayed(self, tail: float | None = None, accuracy: float = 1e-5, **more: Any) -> Check:
+        """Replay the commands through another integrator on a finer mesh.
+
+        Parameters
+        ----------
+        tail : how long to follow what is left after the end, s; as long as the motion without
+        accuracy : of the replay's own steps in time
+        more : as of :func:`~sfetcas.trajectories.replay.respond`
+        """
+        system = self.transcription.system
+        tail = self.time if tail is None else tail
+        later = self.time + np.linspace(0.0, tail, 101)[1:] if tail > 0.0 else np.zeros(0)
+        times = np.concatenate([self.ends, later])
+        given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "step": self.time / 400.0, **more}
+        response = respond(self.scene, self.commands, self.time, tail=tail, times=times, accuracy=accuracy, **given)
+        places = self._node_positions()
+        size, difference = system.scene.size, 0.0
+        for name, own in places.items():
+            other = response.positions(name)[: len(self.ends)]
+            difference = max(difference, float(np.linalg.norm(own - other, axis=1).max()) / size)
+        return Check(response, difference, response.error_estimate, response.residual_vibration())
+
+    def _node_positions(self) -> dict[str, Array]:
+        """Positions of all nodes at the begin and the ends of the intervals, (intervals + 1, 3) m."""
+        system, stages = self.transcription.system, self.transcription.stages
+        axes = system.system.axes
+        x = np.vstack([system.begin.x, self.course.x[stages - 1 :: stages]])
+        found = {}
+        for name in system.model.nodes:
+            place = system.model.segments.place(name)
+            rest = np.asarray(self.scene.nodes[name].position, dtype=float)
+            moved = np.zeros((len(x), 3))
+            moved[:, :axes] = x[:, axes * place : axes * (place + 1)] * system.model.scales.length
+            found[name] = rest + moved
+        return found
+
+    def positions(self, node: str) -> Array:
+        """Positions of a node at the begin and the ends of the intervals, (intervals + 1, 3) m."""
+        found = self._node_positions()
+        if node not in found:
+            raise SceneError(f"node: {unknown(node, list(found), 'nodes')}")
+        return found[node]
+
+    def with_variables(self, scene: Scene) -> Scene:
+        """A scene with what was found for the variables."""
+        return changed(scene, self.variables) if self.variables else scene
+
+
+def value_of(expression: ca.MX, transcription: Transcription, x: Array) -> float:
+    """An expression that does not change with time."""
+    function, index = transcription.expression("value", expression)
+    return float(function((x * transcription.pieces.units)[index[0]]))

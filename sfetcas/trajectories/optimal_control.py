@@ -1,0 +1,402 @@
+"""Motions as optimal control problems, in the words of that field: controls, costs, path and end constraints."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.scene import Scene
+from ..equilibria.settings import Settings
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.nlp import NLP, Ipopt, NLPResult
+from ..mathematics.threads import single_threaded
+from ..mechanics.mesh import Mesh
+from ..parametric.equilibrium import Place
+from .controlled import ControlledSystem
+from .controlled_motion import ControlledMotion, value_of
+from .statement import Statement, Variable, bounds_of, controls_of
+from .transcription import Course, Transcription
+from .warm import at_rest, carried_over, rigid
+
+__all__ = ["OptimalControl"]
+
+
+class OptimalControl:
+    """A motion of a scene that is looked for.
+
+    Parameters
+    ----------
+    scene : Scene
+        What moves; it begins as its ``analysis`` says (undeformed, or in the equilibrium of its loads).
+    controls : mapping of str to (low, high)
+        Numbers of the scene that change with time, and their limits: a component of the value of a load, as
+        ``loads.motor.value`` or ``loads.tip.value.1``, or ``histories.NAME`` of a load.
+    time : float or (float, float)
+        The time of the end, s, or the shortest and the longest one.
+    intervals : int or sequence of float
+        Their number, or their shares of the time.
+    order : int
+        Of the controls in an interval: 1 linear and continuous, 0 constant with jumps.
+    rates : mapping of str to float
+        Largest rates of controls, per s.
+    variables : mapping of str to (low, high)
+        Numbers of the scene that are looked for and do not change: stiffness, loads, not masses.
+    stages : int
+        Of Radau IIA in an interval, 3 (order 5) or 2 (order 3).
+    places : mapping of str to sequence of float
+        Fractions of the length at which answers along members are told.
+    settings : Settings
+        Accuracy or elements of the mesh.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such numbers, they cannot be controlled, or what is given contradicts itself.
+
+    Example
+    -------
+    >>> problem = OptimalControl(scene, {"loads.motor.value": (-5.0, 5.0)}, time=2.0)       # doctest: +SKIP
+    >>> torque, angle = problem.control("loads.motor.value"), problem.answer("nodes.hub.angle")  # doctest: +SKIP
+    >>> problem.minimise(problem.integral(torque**2))                                     # doctest: +SKIP
+    >>> problem.subject_to(problem.at_tf(angle) == 1.57)                                  # doctest: +SKIP
+    >>> problem.rest_at_end()                                                             # doctest: +SKIP
+    >>> motion = problem.solve()                                                          # doctest: +SKIP
+    >>> motion.check.difference, motion.check.residual_vibration                          # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        controls: Mapping[str, tuple[float, float]],
+        *,
+        time: float | tuple[float, float],
+        intervals: int | Sequence[float] = 60,
+        order: Literal[0, 1] = 1,
+        rates: Mapping[str, float] | None = None,
+        variables: Mapping[str, tuple[float, float]] | None = None,
+        stages: Literal[2, 3] = 3,
+        places: Place | None = None,
+        settings: Settings | None = None,
+    ) -> None:
+        duration = _duration(time)
+        known = [Variable(name, *bounds_of(name, pair)) for name, pair in (variables or {}).items()]
+        if not controls and not known:
+            raise SceneError("controls: found none, accepted: at least one number that changes the motion")
+        if order not in (0, 1) or stages not in (2, 3):
+            raise SceneError(f"found order {order} and {stages} stages, accepted: order 0 or 1, 2 or 3 stages")
+        if order == 0 and rates:
+            raise SceneError("rates: found rates of controls that jump, accepted: order = 1 with rates")
+        self.statement = Statement(
+            controls_of(controls, rates or {}), known, duration, _shares(intervals), order, stages
+        )
+        self._settings, self._places = settings or Settings(), places or {}
+        end = duration[1] if np.isfinite(duration[1]) else max(2.0 * duration[0], 1.0)
+        self.scene = _moving(scene, end)
+        # A mesh of its own for all that follows; it also says how many numbers answers have.
+        self._plain = self._system(self.scene, [])
+        self._mesh: Mesh = self._plain.model.mesh
+
+    def _system(self, scene: Scene, answers: Sequence[str], mesh: Mesh | None = None) -> ControlledSystem:
+        s = self.statement
+        return ControlledSystem(scene, s.controls, s.variables, answers, self._places, self._settings, mesh)
+
+    # -- what a problem is made of ------------------------------------------------------------------------
+
+    def control(self, name: str) -> ca.MX:
+        """A control along the motion."""
+        self.statement.control(name)
+        return self.statement.signal("control", name).along
+
+    def rate(self, name: str) -> ca.MX:
+        """The rate of a control, per s."""
+        self.statement.control(name)
+        if not self.statement.order:
+            raise SceneError(f"rate of {name!r}: found controls that jump, accepted: order = 1")
+        return self.statement.signal("rate", name).along
+
+    def variable(self, name: str) -> ca.MX:
+        """A variable."""
+        known = self.statement.constants
+        if name not in known:
+            raise SceneError(f"variable {name!r}: accepted: {', '.join(known) or 'none, as there are none'}")
+        return known[name]
+
+    def answer(self, name: str) -> ca.MX:
+        """An answer along the motion, as ``nodes.tip.position`` (3,), ``nodes.tip.velocity``, ``energy.elastic``.
+
+        Along a member (places, 3).
+        """
+        result = self._plain.result(name)
+        picked = self._plain.picked_of(result)
+        own = self.statement.signal("answer", name, len(picked)).along
+        whole = ca.MX(ca.Sparsity.dense(result.size, 1), 0.0)
+        for k, i in enumerate(picked.tolist()):
+            whole[i] = own[k]
+        if len(result.shape) == 2:
+            return ca.reshape(whole, result.shape[1], result.shape[0]).T
+        return whole
+
+    @property
+    def t(self) -> ca.MX:
+        """Time along the motion, s."""
+        return self.statement.signal("time", "t").along
+
+    @property
+    def time(self) -> ca.MX:
+        """Time of the end, s."""
+        return self.statement.end_time
+
+    def at_t0(self, expression: ca.MX) -> ca.MX:
+        """An expression at the begin."""
+        return self.statement.at(expression, "begin")
+
+    def at_tf(self, expression: ca.MX) -> ca.MX:
+        """An expression at the end."""
+        return self.statement.at(expression, "end")
+
+    def integral(self, expression: ca.MX) -> ca.MX:
+        """The integral of an expression over the time."""
+        return self.statement.integral(expression)
+
+    def rest_at_end(self) -> dict[str, ca.MX]:
+        """Ask for rest at the end: no velocity, and an equilibrium under controls that then stay; these by name.
+
+        Vibrations too fast for the intervals are left out of it: the replay tells what is left of them.
+        """
+        self.statement.resting = True
+        for one in self.statement.controls:
+            self.statement.rests.setdefault(one.name, ca.MX.sym(f"{one.name} at rest"))
+        return dict(self.statement.rests)
+
+    # -- what is asked ------------------------------------------------------------------------------------
+
+    def subject_to(self, relation: ca.MX, name: str = "") -> None:
+        """A constraint: a relation at all times, or once where nothing in it changes with time.
+
+        ``problem.subject_to(-1 <= (torque <= 1))``, ``problem.subject_to(problem.at_tf(angle) == 1.5)``.
+        """
+        self.statement.subject_to(relation, name or f"constraint {len(self.statement.rows) + 1}")
+
+    def minimise(self, cost: ca.MX) -> None:
+        """A term of the cost: of ``time``, ``integral(...)``, ``at_tf(...)``, variables."""
+        self.statement.minimise(cost)
+
+    # -- solution -----------------------------------------------------------------------------------------
+
+    @single_threaded
+    def solve(
+        self,
+        *,
+        guess: Literal["rigid", "rest"] | ControlledMotion = "rigid",
+        time: float | None = None,
+        values: Mapping[str, ArrayLike] | None = None,
+        replay: bool = True,
+        ipopt: Ipopt | None = None,
+    ) -> ControlledMotion:
+        """The best motion near where the search begins.
+
+        Parameters
+        ----------
+        guess : the motion of the scene with rigid members, which is looked for first; or the scene at rest; or
+            another answer
+        time : time of the end to begin with, s
+        values : of controls, evenly in time, and of variables, to begin with
+        replay : check the answer by a replay
+        ipopt : settings of IPOPT
+
+        Raises
+        ------
+        SceneError
+            The problem contradicts itself.
+        SolveError
+            IPOPT did not succeed: the sentence says what is violated; ``last`` is the last iterate, no answer.
+        """
+        solver = ipopt or Ipopt(1e-8, 400)
+        solver = replace(solver, extra={**EXTRA, **solver.extra})
+        names = [signal.name for signal in self.statement.signals.values() if signal.kind == "answer"]
+        run = _Run(self, solver, names)
+        course = run.begun(guess, time, values or {})
+        found = run.solved(self.scene, course)
+        if replay:
+            begin = clock.perf_counter()
+            check = found.replayed()
+            found = replace(found, check=check, seconds={**found.seconds, "replay": clock.perf_counter() - begin})
+        return found
+
+
+EXTRA = {"mumps_pivot_order": 5}
+"""Options of IPOPT: nested dissection leaves half the fill of MUMPS' own choice on these chains (measured)."""
+
+ROUNDS = 4
+"""Programs at most, each about the answer of the one before, until that stands."""
+
+TURNED = 1.0
+"""Rotations from the reference, rad, beyond which a program is made again about its answer."""
+
+MOVED = 0.2
+"""Rotations of the end since the guess, rad, beyond which its shapes of vibration are made again."""
+
+
+@dataclass
+class _Run:
+    """One search."""
+
+    problem: OptimalControl
+    solver: Ipopt
+    names: list[str]
+
+    def __post_init__(self) -> None:
+        self.seconds = {"warm start": 0.0, "build": 0.0, "solve": 0.0}
+        self.iterations = 0
+        self.notes: list[str] = []
+
+    # -- where it begins ----------------------------------------------------------------------------------
+
+    def begun(self, guess: Any, end: float | None, values: Mapping[str, ArrayLike]) -> Course:
+        """A course on the mesh of the scene."""
+        begin, problem = clock.perf_counter(), self.problem
+        statement = problem.statement
+        if isinstance(guess, ControlledMotion):
+            course = guess.course
+            if course.d.shape != (len(statement.shares) * statement.stages, problem._plain.total):
+                raise SceneError("guess: found another grid or mesh, accepted: an answer of the same")
+            return course
+        if guess not in ("rigid", "rest"):
+            raise SceneError(f"guess: found {guess!r}, accepted: 'rigid', 'rest', or an answer")
+        end = _clipped(statement.duration, end)
+        found = self._rigid(end, values) if guess == "rigid" else None
+        self.seconds["warm start"] = clock.perf_counter() - begin
+        return found or at_rest(statement, problem._plain, end, values)
+
+    def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> Course | None:
+        """The motion of the rigid scene, if it has one."""
+        problem, statement = self.problem, self.problem.statement
+        try:
+            scene = rigid(problem.scene)
+            if scene is None:
+                return None
+            stiff = problem._system(scene, self.names)
+            start = at_rest(statement, stiff, end, values)
+            transcription = Transcription(statement, stiff, start)
+            nlp = transcription.pieces.nlp()
+            result = self.solver.solve(nlp)
+        except SceneError as error:
+            self.notes.append(f"the search begins at rest, as the scene cannot move rigidly: {error}")
+            return None
+        if result.status is not Status.SOLVED:
+            self.notes.append("the search begins at rest, as no motion of the rigid scene was found")
+            return None
+        return carried_over(statement, stiff, transcription.course(result.x), problem._plain)
+
+    # -- rounds -------------------------------------------------------------------------------------------
+
+    def solved(self, scene: Scene, course: Course) -> ControlledMotion:
+        """The answer, made again about itself until it stands."""
+        problem = self.problem
+        system = problem._system(scene, self.names, problem._mesh)
+        for number in range(ROUNDS):
+            begin = clock.perf_counter()
+            transcription = Transcription(problem.statement, system, course)
+            nlp = transcription.pieces.nlp()
+            solve = self.solver.prepare(nlp)
+            built = clock.perf_counter()
+            result = solve()
+            self.seconds["build"] += built - begin
+            self.seconds["solve"] += clock.perf_counter() - built
+            self.iterations += result.iterations
+            found = self._motion(transcription, result)
+            if result.status is not Status.SOLVED:
+                raise SolveError(result.status, _why(transcription, nlp, result, problem.statement), found)
+            if self._stands(transcription, course, found.course) or number == ROUNDS - 1:
+                break
+            course = found.course
+        return found
+
+    def _stands(self, transcription: Transcription, before: Course, after: Course) -> bool:
+        turning = transcription.system.system.equations.turning_unknowns
+        turned = float(np.abs(after.d[:, :turning]).max(initial=0.0))
+        if transcription.system.model.space and turned > TURNED:
+            return False
+        end = float(np.abs(after.d[-1, :turning]).max(initial=0.0))
+        return not (transcription.statement.resting and end > MOVED)
+
+    def _motion(self, transcription: Transcription, result: NLPResult) -> ControlledMotion:
+        problem, statement = self.problem, self.problem.statement
+        pieces = transcription.pieces
+        values = [float(pieces.value(block, result.x).flat[0]) for block in transcription.variables]
+        variables = dict(zip([one.name for one in statement.variables], values, strict=True))
+        cost = sum((value_of(term, transcription, result.x) for term in statement.costs), 0.0)
+        bare = ControlledMotion(
+            status=result.status,
+            scene=problem.scene,
+            time=float(pieces.value(transcription.end, result.x)[0]),
+            cost=cost,
+            variables=variables,
+            iterations=self.iterations,
+            seconds=dict(self.seconds),
+            notes=(*transcription.system.notes, *self.notes),
+            transcription=transcription,
+            x=result.x,
+        )
+        return replace(bare, scene=bare.with_variables(problem.scene))
+
+
+def _why(transcription: Transcription, nlp: NLP, result: NLPResult, statement: Statement) -> str:
+    """What IPOPT reported, what is violated most, and what may help."""
+    worst = transcription.pieces.violated(nlp, result.x)
+    told = "; ".join(f"{name} by {amount:.3g}" for name, amount in worst[:3])
+    parts = [f"IPOPT: {result.message.replace('_', ' ')} after {result.iterations} iterations"]
+    if told:
+        parts.append(f"violated most, over their units: {told}")
+    if statement.duration[0] == statement.duration[1] or result.status is Status.INFEASIBLE:
+        high = statement.duration[1]
+        parts.append(f"the horizon of {high:.6g} s may be too short for the limits of the controls")
+    return ", ".join(parts)
+
+
+def _clipped(duration: tuple[float, float], given: float | None) -> float:
+    low, high = duration
+    middle = 0.5 * (low + high) if np.isfinite(high) else max(2.0 * low, 1.0)
+    return float(np.clip(middle if given is None else given, low, high))
+
+
+def _duration(given: Any) -> tuple[float, float]:
+    """Bounds of the time of the end."""
+    low, high = bounds_of("time", (given, given) if np.ndim(given) == 0 else given)
+    if not (high > 0.0 and low >= 0.0) or np.isinf(low):
+        raise SceneError(f"time: found {given!r} s, accepted: a positive time, or the shortest and the longest one")
+    if low == 0.0:
+        raise SceneError("time: found 0 s as shortest, accepted: a shortest time above zero")
+    return low, high
+
+
+def _shares(given: Any) -> Array:
+    """Shares of the intervals in the time."""
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
+        if given < 1:
+            raise SceneError(f"intervals: found {given}, accepted: at least 1")
+        return np.full(int(given), 1.0 / int(given))
+    shares = np.asarray(given, dtype=float).ravel()
+    if not len(shares) or not np.isfinite(shares).all() or (shares <= 0.0).any():
+        raise SceneError(f"intervals: found {given!r}, accepted: their number, or positive shares of the time")
+    return np.asarray(shares / shares.sum())
+
+
+def _moving(scene: Scene, end: float) -> Scene:
+    """The scene as one in motion."""
+    kept = ("accuracy", "initial", "cut", "release")
+    given = {key: getattr(scene.analysis, key) for key in kept if key in scene.analysis.model_fields_set}
+    if scene.analysis.type != "dynamic":
+        given = {key: value for key, value in given.items() if key == "accuracy"}
+    table = scene.to_dict()
+    table["dimension"] = scene.resolved_dimension
+    table["analysis"] = {**given, "type": "dynamic", "end": end}
+    table.pop("expect", None)
+    return Scene.from_dict(table)

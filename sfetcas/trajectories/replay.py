@@ -1,0 +1,240 @@
+"""A command run through an integrator of its own: what a trajectory is checked by, and what any command does.
+
+The integrator is none of collocation but the one that conserves energy and momenta, its mesh is finer, and its step is
+halved until the positions, extrapolated to no step at all, stand: what is left between them and a trajectory is the
+error of the trajectory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..description.loads import History
+from ..description.records import plain, unknown
+from ..description.scene import Scene
+from ..dynamics.motion import Instant
+from ..dynamics.simulation import Simulation
+from ..equilibria.settings import Settings
+from ..errors import SceneError, SolveError
+from ..mathematics.arrays import Array
+from ..mathematics.threads import single_threaded
+from ..mechanics.mesh import Mesh
+from ..parametric.arguments import argument
+
+__all__ = ["Response", "commanded", "respond"]
+
+ORDERS = {"conserving": 2, "radau-2": 3, "radau-3": 5, "generalised-alpha": 2}
+"""Orders of the integrators that take steps of equal length."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a command does to a scene.
+
+    Attributes
+    ----------
+    times : ndarray (times,)
+        s
+    places : mapping of str to ndarray (times, 3)
+        Positions of the nodes, m, extrapolated from two lengths of the steps.
+    instants : tuple of Instant
+        The states at these times, of the shorter steps.
+    end : float
+        When the command ends, s.
+    error_estimate : float
+        Of the positions by the steps in time, over the size of the scene.
+    count : int
+        Steps of the last run.
+    """
+
+    times: Array
+    places: Mapping[str, Array] = field(repr=False)
+    instants: tuple[Instant, ...] = field(repr=False)
+    end: float
+    error_estimate: float
+    count: int
+
+    def positions(self, node: str) -> Array:
+        """Positions of a node, (times, 3) m."""
+        if node not in self.places:
+            raise SceneError(f"node: {unknown(node, list(self.places), 'nodes')}")
+        return self.places[node]
+
+    def energies(self, kind: str = "total") -> Array:
+        """Energies, (times,) N m: kinetic, elastic, loads or total."""
+        return np.array([one.energy[kind] for one in self.instants])
+
+    @property
+    def after(self) -> Array:
+        """Which times come after the end, (times,) bool."""
+        return np.asarray(self.times >= self.end * (1.0 - 1e-12))
+
+    def residual_vibration(self, node: str | None = None) -> float:
+        """Largest distance from their mean place that nodes, or one, have after the end, m."""
+        names = list(self.places) if node is None else [node]
+        after = self.after
+        found = 0.0
+        for name in names:
+            places = self.positions(name)[after]
+            found = max(found, float(np.linalg.norm(places - places.mean(axis=0), axis=1).max(initial=0.0)))
+        return found
+
+    def residual_energy(self) -> float:
+        """Largest kinetic energy after the end, N m."""
+        return float(self.energies("kinetic")[self.after].max(initial=0.0))
+
+
+class _Timed(Simulation):
+    """A motion told at given times."""
+
+    wanted: Array
+
+    @property
+    def times(self) -> Array:
+        """The given times."""
+        return self.wanted
+
+
+def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
+    """The scene with histories in the place of numbers: components of loads, or histories that loads have.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such number.
+    """
+    table = scene.to_dict()
+    table["dimension"] = scene.resolved_dimension
+    histories, loads = table.setdefault("histories", {}), table.setdefault("loads", {})
+    for name, history in commands.items():
+        argument(scene, name)
+        path = name.split(".")
+        if path[0] == "histories":
+            histories[path[1]] = _table(history)
+            continue
+        load = path[1]
+        own = f"{load} {'.'.join(path[2:])}"
+        histories[own] = _table(history)
+        value = plain(scene.loads[load].value)
+        index = int(path[3]) if len(path) > 3 else None
+        unit: Any = 1.0 if index is None else [float(i == index) for i in range(len(value))]
+        loads[own] = {**loads[load], "value": unit, "history": own}
+        if index is None:
+            loads[load]["value"] = 0.0
+        else:
+            loads[load]["value"] = [0.0 if i == index else x for i, x in enumerate(plain(loads[load]["value"]))]
+    return Scene.from_dict(table)
+
+
+def _table(history: History) -> dict[str, Any]:
+    found: dict[str, Any] = {"t": plain(history.t)}
+    key = "value" if history.value is not None else "polynomial"
+    return found | {key: plain(getattr(history, key))}
+
+
+@single_threaded
+def respond(
+    scene: Scene,
+    commands: Mapping[str, History],
+    end: float,
+    *,
+    tail: float = 0.0,
+    times: Array | None = None,
+    step: float | None = None,
+    mesh: Mesh | None = None,
+    accuracy: float = 1e-5,
+    integrator: str = "conserving",
+    settings: Settings | None = None,
+) -> Response:
+    """What a scene does under commands, and for a while after them.
+
+    Parameters
+    ----------
+    scene : Scene
+    commands : histories by the names of numbers: ``{"loads.motor.value": History(t=[0, 1], value=[2, 0])}``
+    end : when the command ends, s
+    tail : how long to follow it after that, s
+    times : when it is told, s; a hundred times before the end and in the tail without
+    step : first step of the integrator, s; it is halved until the positions stand
+    mesh : that of the scene's accuracy, refined, without
+    accuracy : by which positions over the size of the scene may still change when the step is halved
+    integrator : conserving (not with loads that follow), radau-2, radau-3 or generalised-alpha
+
+    Raises
+    ------
+    SceneError
+        There is no such number or integrator.
+    SolveError
+        A step does not converge.
+    """
+    if integrator not in ORDERS:
+        raise SceneError(f"integrator: {unknown(integrator, list(ORDERS), 'integrators')}")
+    if times is None:
+        inner, later = np.linspace(0.0, end, 101), end + np.linspace(0.0, tail, 101)[1:]
+        times = np.concatenate([inner, later if tail > 0.0 else []])
+    replays = _Replays(commanded(scene, commands), end + tail, np.asarray(times, dtype=float), integrator)
+    replays.mesh, replays.settings = mesh, settings or Settings()
+    step, gain = step or end / 200.0, 2.0 ** ORDERS[integrator] - 1.0
+    run = replays.run(step)
+    coarse = replays.places(run)
+    best, error = coarse, np.inf
+    for _ in range(HALVINGS):
+        step *= 0.5
+        run = replays.run(step)
+        fine = replays.places(run)
+        better = {name: one + (one - coarse[name]) / gain for name, one in fine.items()}
+        # Of the first extrapolation only what it changed is known.
+        change = _apart(better, best) if np.isfinite(error) else _apart(better, fine)
+        best, coarse, error = better, fine, change / scene.size
+        if error <= accuracy:
+            break
+    return Response(replays.times, best, tuple(run.instants), end, error, run.count)
+
+
+@dataclass
+class _Replays:
+    """Runs of one scene with steps of several lengths."""
+
+    scene: Scene
+    end: float
+    times: Array
+    integrator: str
+    mesh: Mesh | None = None
+    settings: Settings = field(default_factory=Settings)
+
+    def run(self, step: float) -> Any:
+        """One run."""
+        analysis = self.scene.analysis
+        kept = {key: getattr(analysis, key) for key in ("initial", "cut", "release") if analysis.type == "dynamic"}
+        given = {"type": "dynamic", "end": self.end, "step": step, "integrator": self.integrator, **kept}
+        one = self.scene.model_copy(update={"analysis": type(analysis)(**given), "expect": ()})
+        simulation = _Timed(one, self.settings, _nothing, None)
+        simulation.wanted = self.times
+        run = simulation.run(self.mesh or simulation.mesh.refined(), 0)
+        if run.failure is not None:
+            raise SolveError(run.failure.status, f"replay: {run.failure.detail}", run)
+        return run
+
+    @staticmethod
+    def places(run: Any) -> dict[str, Array]:
+        """Positions of all nodes."""
+        nodes = list(run.instants[0].model.nodes)
+        return {name: np.array([one.position(name) for one in run.instants]) for name in nodes}
+
+
+HALVINGS = 7
+"""Of the step at most."""
+
+
+def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float:
+    """Largest distance of nodes."""
+    return max(float(np.linalg.norm(one[name] - other[name], axis=1).max()) for name in one)
+
+
+def _nothing(*_: Any) -> float:
+    """Nothing ends a replay early."""
+    return 0.0

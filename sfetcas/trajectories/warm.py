@@ -1,0 +1,162 @@
+"""Where a search for a controlled motion begins: at rest, or with the motion of the scene as if it were rigid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import unknown
+from ..description.scene import Scene
+from ..dynamics.methods import RADAU
+from ..errors import SceneError
+from ..mathematics.arrays import Array, Index
+from ..mathematics.constants import constant
+from ..mathematics.interpolation import differentiation
+from .controlled import ControlledSystem
+from .statement import Statement
+from .transcription import Course
+
+__all__ = ["at_rest", "carried_over", "rigid"]
+
+
+def rigid(scene: Scene) -> Scene | None:
+    """The scene with rigid members in the place of flexible ones; None where no member is flexible."""
+    flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
+    if not flexible:
+        return None
+    table = scene.to_dict()
+    table["dimension"] = scene.resolved_dimension
+    for name in flexible:
+        member = table["members"][name]
+        member["type"] = "rigid"
+        for key in ("element", "elements", "spin"):
+            member.pop(key, None)
+    table.pop("expect", None)
+    return Scene.from_dict(table)
+
+
+def at_rest(statement: Statement, system: ControlledSystem, end: float, controls: Mapping[str, ArrayLike]) -> Course:
+    """The scene as it begins, at all times.
+
+    Parameters
+    ----------
+    end : time at the end, s
+    controls : values of controls at times that share the time evenly, those of the scene without; and of variables
+
+    Raises
+    ------
+    SceneError
+        There is no such control.
+    """
+    n, begin = len(statement.shares) * statement.stages, system.begin
+    known = [*(one.name for one in statement.controls), *(one.name for one in statement.variables)]
+    for name in controls:
+        if name not in known:
+            raise SceneError(f"guess: {unknown(name, known, 'such controls')}")
+    ends = np.append(0.0, np.cumsum(statement.shares))
+    at = ends if statement.order else 0.5 * (ends[:-1] + ends[1:])
+    defaults = system.arguments.defaults
+    columns = []
+    for k, one in enumerate(statement.controls):
+        values = np.atleast_1d(np.asarray(controls.get(one.name, defaults[k]), dtype=float)).ravel()
+        spread = np.linspace(0.0, 1.0, len(values)) if len(values) > 1 else np.zeros(1)
+        columns.append(np.clip(np.interp(at, spread, values), one.low, one.high))
+    rest = defaults[len(statement.controls) :]
+    variables = [float(np.ravel(controls.get(v.name, x))[0]) for v, x in zip(statement.variables, rest, strict=True)]
+    still = np.zeros((n, system.quantities))
+    return Course(
+        end=end,
+        q=np.tile(begin.state.q, (n, 1, 1)),
+        d=np.tile(system.start, (n, 1)),
+        x=np.tile(begin.x, (n, 1)),
+        v=still,
+        a=still,
+        near=np.tile(begin.state.wound, (n, 1)),
+        controls=np.stack(columns, axis=1) if columns else np.zeros((len(at), 0)),
+        variables=np.array(variables),
+    )
+
+
+def carried_over(statement: Statement, stiff: ControlledSystem, course: Course, system: ControlledSystem) -> Course:
+    """The motion of the rigid scene as one of the flexible scene, whose members stay as they were made."""
+    source = _sources(stiff, system)
+    q = np.stack(
+        [
+            course.q[:, k] if k >= 0 else np.tile(system.begin.state.q[i], (len(course.q), 1))
+            for i, k in enumerate(source)
+        ],
+        axis=1,
+    )
+    near = np.tile(system.begin.state.wound, (len(q), 1))
+    numbers = _numbers(statement, course)
+    y, x = _placed(system, q, near, numbers)
+    d = np.zeros((len(q), system.total))
+    equations = system.system.equations
+    d[:, equations.turning_unknowns : equations.unknowns] = y
+    v = _rates(statement, course.end / system.time, x, system.begin.x)
+    a = _rates(statement, course.end / system.time, v, system.begin.v)
+    return Course(course.end, q, d, x, v, a, near, course.controls, course.variables)
+
+
+def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
+    """For each rotation of the flexible scene that of the rigid one which it follows, -1 where it has none."""
+    mine, its = system.model.rotations, stiff.model.rotations
+    source = np.full(len(mine.kind), -1, dtype=np.intp)
+    for node, number in mine.node_turn.items():
+        other = its.node_turn.get(node)
+        if number is not None and other is not None:
+            source[number] = other
+    for name, ends in mine.ends.items():
+        for number, other in zip(ends, its.ends[name], strict=True):
+            source[number] = other
+    for name, member in system.scene.members.items():
+        if member.type == "flexible":
+            inner = np.setdiff1d(mine.turns[system.model.elements_of(name)].ravel(), mine.ends[name])
+            source[inner] = its.ends[name][0]
+    return source
+
+
+def _numbers(statement: Statement, course: Course) -> Array:
+    """Controls and variables at all stages, (stages, numbers)."""
+    places, n = RADAU[statement.stages], len(statement.shares)
+    if statement.order:
+        first, second = course.controls[:-1, None], course.controls[1:, None]
+        controls = first + (second - first) * places[None, :, None]
+    else:
+        controls = np.repeat(course.controls[:, None], len(places), axis=1)
+    flat = controls.reshape(n * len(places), -1)
+    return np.hstack([flat, np.tile(course.variables, (len(flat), 1))])
+
+
+def _placed(system: ControlledSystem, q: Array, near: Array, numbers: Array) -> tuple[Array, Array]:
+    """Displacements that close the members as well as they can, and quantities, of all stages."""
+    own, n = system.system, system.system.layout
+    s = [ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("near", n.near), ca.MX.sym("numbers", n.factors)]
+    y = ca.MX.sym("y", n.y)
+    given = own.given(s[2])
+    held = own.held(ca.MX(s[0]), given)
+    closings = len(own.model.positions.rows)
+    open_ = ca.Function("open", s, [own.gaps(held, ca.MX.zeros(n.y), given, s[1])[:closings]])
+    moved = ca.Function("moved", [*s, y], [own.moving(held, y, given, s[1])])
+    # Closings are linear in displacements.
+    back = -np.linalg.pinv(np.array(constant(own.model.positions.W).full()).reshape(closings, n.y))
+    ys, xs = [], []
+    for one, angles, values in zip(q, near, numbers, strict=True):
+        found = back @ np.array(open_(one.T, angles, values)).ravel() if n.y else np.zeros(0)
+        ys.append(found)
+        xs.append(np.array(moved(one.T, angles, values, found)).ravel())
+    return np.array(ys), np.array(xs)
+
+
+def _rates(statement: Statement, span: float, values: Array, begin: Array) -> Array:
+    """Derivatives of the collocation polynomials at all stages."""
+    slopes = differentiation(np.append(0.0, RADAU[statement.stages]))[1:]
+    n, s = len(statement.shares), statement.stages
+    inside = values.reshape(n, s, -1)
+    before = np.concatenate([begin[None, :], inside[:-1, -1]])
+    whole = np.concatenate([before[:, None], inside], axis=1)
+    found = np.einsum("ij,kjm->kim", slopes, whole) / (span * statement.shares)[:, None, None]
+    return found.reshape(n * s, -1)
