@@ -11,15 +11,18 @@ from numpy.typing import ArrayLike
 from ..description.records import unknown
 from ..description.scene import Scene
 from ..dynamics.methods import RADAU
-from ..errors import SceneError
+from ..errors import SceneError, Status
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import constant
 from ..mathematics.interpolation import differentiation
+from ..mathematics.nlp import Ipopt
+from ..mathematics.pieces import Pieces
+from ..mechanics.expressions import moved_by
 from .controlled import ControlledSystem
 from .statement import Statement
 from .transcription import Course
 
-__all__ = ["at_rest", "carried_over", "rigid"]
+__all__ = ["at_rest", "carried_over", "rigid", "straight"]
 
 
 def rigid(scene: Scene) -> Scene | None:
@@ -80,6 +83,71 @@ def at_rest(statement: Statement, system: ControlledSystem, end: float, controls
     )
 
 
+def straight(statement: Statement, system: ControlledSystem, start: Course) -> Course:
+    """A motion that turns evenly from the begin to a shape that meets what is asked of answers at the end.
+
+    It is the shape nearest to the begin, and obeys joints and closings only; without one, or where nothing is asked,
+    the start itself.
+    """
+    turned = _end_shape(statement, system)
+    if turned is None:
+        return start
+    fractions = _fractions(statement)
+    own = system.system
+    phi, q0 = ca.MX.sym("phi", len(turned)), ca.DM(system.begin.state.q.T)
+    moved = ca.Function("moved", [phi], [moved_by(own, ca.MX(q0), own.spins(phi))])
+    q = np.stack([np.array(moved(share * turned)).T for share in fractions])
+    return _still(statement, system, start, q)
+
+
+def _fractions(statement: Statement) -> Array:
+    shares = statement.shares
+    before = np.cumsum(shares) - shares
+    return np.asarray((before[:, None] + shares[:, None] * RADAU[statement.stages]).ravel())
+
+
+def _end_shape(statement: Statement, system: ControlledSystem) -> Array | None:
+    """Rotation vectors from the begin to the nearest shape that meets what is asked of answers at the end."""
+    ends = {s.end.__hash__(): s for s in statement.signals.values() if s.kind == "answer"}
+    rows = [r for _, r in statement.rows if all(s.__hash__() in ends for s in ca.symvar(r.expression))]
+    rows = [r for r in rows if ca.symvar(r.expression)]
+    if not rows:
+        return None
+    n, equations = system.quantities, system.system.equations
+    free, turning = equations.unknowns, equations.turning_unknowns
+    pieces = Pieces("interpreted")
+    d = pieces.unknowns("d", system.start[:free])
+    still = ca.DM.zeros(n)
+    whole = ca.vertcat(d.symbol, ca.DM(system.start[free:]))
+    balance, _, told = system.stage(whole, still, still, system.arguments.defaults, system.reference)
+    bounds = np.cumsum([0, *(one.size for one in system.results.results)]).tolist()
+    parts = dict(zip([one.name for one in system.results.results], ca.vertsplit(told, bounds), strict=True))
+    symbols = list(ends.values())
+    values = [parts[s.name][system.picked[s.name].tolist()] for s in symbols]
+    if free < system.total:
+        pieces.add_expression("closings", balance[free:])
+    for row in rows:
+        expression = ca.substitute([row.expression], [s.end for s in symbols], values)[0]
+        used = np.unique(np.array(ca.jacobian_sparsity(expression, d.symbol).row(), dtype=np.intp))
+        if len(used):
+            pieces.add_expression("end", expression[used.tolist()], row.low[used], row.high[used])
+    pieces.add_term("turns", ca.sumsqr(d.symbol[:turning]))
+    result = Ipopt(1e-6, 100).solve(pieces.nlp())
+    return pieces.value(d, result.x)[:turning] if result.status is Status.SOLVED else None
+
+
+def _still(statement: Statement, system: ControlledSystem, start: Course, q: Array) -> Course:
+    """A motion through rotations (stages, rotations, components), with controls and variables of a start."""
+    near = np.tile(system.begin.state.wound, (len(q), 1))
+    y, x = _placed(system, q, near, _numbers(statement, start))
+    d = np.zeros((len(q), system.total))
+    equations = system.system.equations
+    d[:, equations.turning_unknowns : equations.unknowns] = y
+    v = _rates(statement, start.end / system.time, x, system.begin.x)
+    a = _rates(statement, start.end / system.time, v, system.begin.v)
+    return Course(start.end, q, d, x, v, a, near, start.controls, start.variables)
+
+
 def carried_over(statement: Statement, stiff: ControlledSystem, course: Course, system: ControlledSystem) -> Course:
     """The motion of the rigid scene as one of the flexible scene, whose members stay as they were made."""
     source = _sources(stiff, system)
@@ -90,15 +158,7 @@ def carried_over(statement: Statement, stiff: ControlledSystem, course: Course, 
         ],
         axis=1,
     )
-    near = np.tile(system.begin.state.wound, (len(q), 1))
-    numbers = _numbers(statement, course)
-    y, x = _placed(system, q, near, numbers)
-    d = np.zeros((len(q), system.total))
-    equations = system.system.equations
-    d[:, equations.turning_unknowns : equations.unknowns] = y
-    v = _rates(statement, course.end / system.time, x, system.begin.x)
-    a = _rates(statement, course.end / system.time, v, system.begin.v)
-    return Course(course.end, q, d, x, v, a, near, course.controls, course.variables)
+    return _still(statement, system, course, q)
 
 
 def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
