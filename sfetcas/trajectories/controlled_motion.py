@@ -12,10 +12,10 @@ import numpy as np
 
 from ..description.loads import History
 from ..description.records import unknown
-from ..errors import SceneError, Status
+from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..parametric.changing import changed
-from .replay import Response, respond
+from .replay import HALVINGS, Response, respond
 from .transcription import Course, Transcription
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ class Check:
         Largest distance of nodes from where the trajectory has them, over the size of the scene.
     error_estimate : float
         That of the replay itself by its steps in time.
+    integrator : str
+        What it was replayed by.
     residual_vibration : float
         Largest distance of nodes from their mean places after the end, m.
     """
@@ -43,6 +45,7 @@ class Check:
     response: Response = field(repr=False)
     difference: float
     error_estimate: float
+    integrator: str
     residual_vibration: float
 
 
@@ -143,27 +146,43 @@ class ControlledMotion:
 
     # -- check --------------------------------------------------------------------------------------------
 
-    def replayed(self, tail: float | None = None, accuracy: float = 1e-5, **more: Any) -> Check:
+    def replayed(
+        self, tail: float | None = None, accuracy: float = 1e-5, integrator: str | None = None, **more: Any
+    ) -> Check:
         """Replay the commands through another integrator on a finer mesh.
 
         Parameters
         ----------
         tail : how long to follow what is left after the end, s; as long as the motion without
         accuracy : of the replay's own steps in time
+        integrator : that which conserves energy and momenta without, or where this refuses or its order is too low
+            for the accuracy, radau-3
         more : as of :func:`~sfetcas.trajectories.replay.respond`
         """
         system = self.transcription.system
         tail = self.time if tail is None else tail
         later = self.time + np.linspace(0.0, tail, 101)[1:] if tail > 0.0 else np.zeros(0)
         times = np.concatenate([self.ends, later])
-        given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "step": self.time / 400.0, **more}
-        response = respond(self.scene, self.commands, self.time, tail=tail, times=times, accuracy=accuracy, **given)
+        given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "tail": tail, "times": times, **more}
+        response, name = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
         places = self._node_positions()
         size, difference = system.scene.size, 0.0
         for name, own in places.items():
             other = response.positions(name)[: len(self.ends)]
             difference = max(difference, float(np.linalg.norm(own - other, axis=1).max()) / size)
-        return Check(response, difference, response.error_estimate, response.residual_vibration())
+        return Check(response, difference, response.error_estimate, name, response.residual_vibration())
+
+    def _responded(self, integrator: str | None, given: Mapping[str, Any]) -> tuple[Response, str]:
+        for name, halvings in ((integrator, HALVINGS),) if integrator else (("conserving", 4), ("radau-3", HALVINGS)):
+            try:
+                found = respond(self.scene, self.commands, self.time, integrator=name, halvings=halvings, **given)
+            except (SceneError, SolveError):
+                if name == (integrator or "radau-3"):
+                    raise
+                continue
+            if integrator or name == "radau-3" or found.error_estimate <= given["accuracy"]:
+                break
+        return found, name
 
     def _node_positions(self) -> dict[str, Array]:
         """Positions of all nodes at the begin and the ends of the intervals, (intervals + 1, 3) m."""

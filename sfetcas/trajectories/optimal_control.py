@@ -231,7 +231,7 @@ class OptimalControl:
         return found
 
 
-EXTRA = {"mumps_pivot_order": 5, "mumps_pivtol": 1e-4}
+EXTRA = {"mumps_pivot_order": 5, "mumps_pivtol": 1e-2}
 """Options of IPOPT (measured): nested dissection leaves half the fill of MUMPS' own choice on these chains, and larger
 pivots keep the signs right that IPOPT counts: 5 iterations in the place of 24."""
 

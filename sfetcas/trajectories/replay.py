@@ -31,6 +31,10 @@ ORDERS = {"conserving": 2, "radau-2": 3, "radau-3": 5, "generalised-alpha": 2}
 """Orders of the integrators that take steps of equal length."""
 
 
+HALVINGS = 7
+"""Of the step at most."""
+
+
 @dataclass(frozen=True, eq=False)
 class Response:
     """What a command does to a scene.
@@ -148,6 +152,7 @@ def respond(
     mesh: Mesh | None = None,
     accuracy: float = 1e-5,
     integrator: str = "conserving",
+    halvings: int = HALVINGS,
     settings: Settings | None = None,
 ) -> Response:
     """What a scene does under commands, and for a while after them.
@@ -163,6 +168,7 @@ def respond(
     mesh : that of the scene's accuracy, refined, without
     accuracy : by which positions over the size of the scene may still change when the step is halved
     integrator : conserving (not with loads that follow), radau-2, radau-3 or generalised-alpha
+    halvings : of the step at most
 
     Raises
     ------
@@ -182,7 +188,7 @@ def respond(
     run = replays.run(step)
     coarse = replays.places(run)
     best, error = coarse, np.inf
-    for _ in range(HALVINGS):
+    for _ in range(halvings):
         step *= 0.5
         run = replays.run(step)
         fine = replays.places(run)
@@ -224,10 +230,6 @@ class _Replays:
         """Positions of all nodes."""
         nodes = list(run.instants[0].model.nodes)
         return {name: np.array([one.position(name) for one in run.instants]) for name in nodes}
-
-
-HALVINGS = 7
-"""Of the step at most."""
 
 
 def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float:
