@@ -110,7 +110,9 @@ def grid(values: Mapping[str, Sequence[ArrayLike] | Array]) -> Cases:
     SceneError
         As :class:`Cases`, or there would be too many.
     """
-    lists = {name: column for name, values in values.items() for name, column in Cases({name: values}).columns.items()}
+    lists = {
+        name: column for name, values in values.items() for name, column in cases_from({name: values}).columns.items()
+    }
     count = float(np.prod([float(len(column)) for column in lists.values()]))
     if count > MOST:
         raise SceneError(f"found {count:.3g} combinations, accepted: {MOST} at most", ("cases",))
@@ -224,7 +226,9 @@ def _column(name: str, values: Any) -> Array:
         raise SceneError(f"found {say(values)}, accepted: {accepted}", ("cases", name))
     bad = np.flatnonzero(~np.isfinite(found.astype(float)).reshape(len(found), -1).all(axis=1))
     if len(bad):
-        raise SceneError(f"found {say(found[bad[0]])} in case {bad[0]}, accepted: finite numbers", ("cases", name))
+        raise SceneError(
+            f"found {say(found[bad[0]].tolist())} in case {bad[0]}, accepted: finite numbers", ("cases", name)
+        )
     column = found.astype(float)
     column.flags.writeable = False
     return column

@@ -16,8 +16,8 @@ from .workers import Workers
 __all__ = ["chunk_of", "fed"]
 
 CHUNKS, LARGEST = 256, 16
-"""A sweep is cut into about so many chunks, of so many cases at most: few enough to cost nothing, and enough for all who
-work to end at the same time."""
+"""A sweep is cut into about so many chunks, of so many cases at most: few enough to cost nothing, and enough for all
+who work to end at the same time."""
 
 ROOM = 1024
 """Chunks that an executor has at once."""

@@ -1,7 +1,7 @@
 """What is kept of each answer of a sweep: quantities by their names, as numbers.
 
-Names are those of the answer, ``nodes.tip.position``; along members with a place, ``members.beam.moment at 0.5``; of one
-of several answers with its key as in ``expect``: ``nodes.tip.position step 2``, ``nodes.tip.velocity time 0.5``,
+Names are those of the answer, ``nodes.tip.position``; along members with a place, ``members.beam.moment at 0.5``; of
+one of several answers with its key as in ``expect``: ``nodes.tip.position step 2``, ``nodes.tip.velocity time 0.5``,
 ``factor limit_point 1``.
 """
 

@@ -171,10 +171,13 @@ class Sweep:
         SceneError
             The ending is another one, or the file could not be written.
         """
-        path = Path(path)
-        check_table(path)
+        check_table(Path(path))
+        write_file(Path(path), self.write)
+
+    def write(self, path: Path) -> None:
+        """Write the table to a new file of one of ENDINGS; :meth:`save` leaves nothing half-written."""
         writers = {".csv": self._write_csv, ".json": self._write_json, ".npz": self._write_npz}
-        write_file(path, writers[path.suffix])
+        writers[path.suffix](path)
 
     def _write_csv(self, path: Path) -> None:
         columns = [_plain(column) for column in self.table.values()]

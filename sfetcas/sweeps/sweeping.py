@@ -78,7 +78,9 @@ def sweep(
     """
     if executor is not None and (not isinstance(executor, Executor) or workers is not None):
         found = say(executor) if workers is None else "an executor and a number of workers"
-        raise SceneError(f"found {found}, accepted: a concurrent.futures.Executor, or a number of workers", ("executor",))
+        raise SceneError(
+            f"found {found}, accepted: a concurrent.futures.Executor, or a number of workers", ("executor",)
+        )
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1):
         raise SceneError(f"found {say(chunk)}, accepted: a number of cases from 1", ("chunk",))
     single = cases_from(cases).single(scene)
