@@ -39,17 +39,15 @@ def bar(dimension: str) -> Scene:
 
 def many() -> None:
     """Wall time of a thousand equilibria, drawn at random, against the sum of their solves."""
-    print(
-        f"Sweeps of {CASES} equilibria by {cores()} processes, those of this library started within; those of Dask before\n"
-    )
+    print(f"Sweeps of {CASES} equilibria by {cores()} processes, whose start counts (that of Dask's does not)\n")
     cases = sampled(CASES, {"sections.unit.EI3": Normal(1.0, 0.05), "loads.tip.value.1": Uniform(0.0, 10.0)})
     rows = []
     for dimension in ("plane", "space"):
         first: Sweep | None = None
-        for name, made in {"processes": contextlib.nullcontext, "Dask": _dask}.items():
+        for name in ("processes", "Dask"):
             if name == "Dask" and importlib.util.find_spec("distributed") is None:
                 continue
-            with made() as executor:
+            with contextlib.nullcontext() if name == "processes" else _dask() as executor:
                 found = sweep(bar(dimension), cases, QUANTITIES, executor=executor)
             rows.append((dimension, name, *_cells(found, first or found)))
             first = first or found

@@ -394,7 +394,8 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
 def _with(here: Any, tree: Any) -> Any:
     """A record, table or list with other entries; of records only those are validated that change."""
     if not isinstance(tree, dict):
-        return tree
+        # What counts, as elements, is a whole number.
+        return int(tree) if type(here) is int and isinstance(tree, float) and tree.is_integer() else tree
     entries: Any
     if isinstance(here, Record):
         entries = {key: getattr(here, key) for key in tree}

@@ -21,9 +21,9 @@ from ..parametric.arguments import argument
 from ..parametric.changing import changed
 from .distributions import Distribution
 
-__all__ = ["Cases", "cases_from", "grid", "read_cases", "sampled"]
+__all__ = ["MOST_CASES", "Cases", "cases_from", "grid", "read_cases", "sampled"]
 
-MOST = 10_000_000
+MOST_CASES = 10_000_000
 """Cases at most."""
 
 
@@ -114,8 +114,8 @@ def grid(values: Mapping[str, Sequence[ArrayLike] | Array]) -> Cases:
         name: column for name, values in values.items() for name, column in cases_from({name: values}).columns.items()
     }
     count = float(np.prod([float(len(column)) for column in lists.values()]))
-    if count > MOST:
-        raise SceneError(f"found {count:.3g} combinations, accepted: {MOST} at most", ("cases",))
+    if count > MOST_CASES:
+        raise SceneError(f"found {count:.3g} combinations, accepted: {MOST_CASES} at most", ("cases",))
     rows = list(itertools.product(*(range(len(column)) for column in lists.values())))
     chosen = np.array(rows, dtype=np.intp).reshape(len(rows), len(lists))
     return Cases({name: column[chosen[:, i]] for i, (name, column) in enumerate(lists.items())})
@@ -147,8 +147,8 @@ def sampled(
     SceneError
         Anything that is not accepted.
     """
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= MOST:
-        raise SceneError(f"found {say(count)}, accepted: a number of cases from 1 to {MOST}", ("count",))
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= MOST_CASES:
+        raise SceneError(f"found {say(count)}, accepted: a number of cases from 1 to {MOST_CASES}", ("count",))
     if method not in ("random", "latin"):
         raise SceneError(f"found {say(method)}, accepted: 'random' or 'latin'", ("method",))
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:

@@ -11,7 +11,7 @@ import numpy as np
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from .cases import MOST, Cases, grid, read_cases, sampled
+from .cases import MOST_CASES, Cases, grid, read_cases, sampled
 from .distributions import Distribution, LogNormal, Normal, Uniform
 
 __all__ = ["cases_in_words", "usual_quantities"]
@@ -87,8 +87,8 @@ def _varied(text: str) -> tuple[str, Array]:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:
         raise SceneError(f"--vary: found {text!r}, accepted: NAME=LOW:HIGH:COUNT or NAME=VALUE,VALUE,...") from None
-    if not 1 <= count <= MOST or (count > 1 and low == high):
-        raise SceneError(f"--vary: found {text!r}, accepted: 1 to {MOST} values between two bounds that differ")
+    if not 1 <= count <= MOST_CASES or (count > 1 and low == high):
+        raise SceneError(f"--vary: found {text!r}, accepted: 1 to {MOST_CASES} values between two bounds that differ")
     return name, np.linspace(low, high, count)
 
 

@@ -2,8 +2,8 @@
 
 Where a process of a usual pool dies, all that it had still to do is lost, and which piece of work it was is not told.
 Here each process is a pool of its own: only what it was at is affected, which is the oldest piece it had, and another
-one takes its place.  Processes are never made by copying this one, whose libraries have threads: a server process imports
-what is needed once and copies itself (``forkserver``), where the system can; elsewhere each imports for itself.
+one takes its place.  Processes are never made by copying this one, whose libraries have threads: a server process
+imports what is needed once and copies itself (``forkserver``), where the system can; elsewhere each imports for itself.
 """
 
 from __future__ import annotations
