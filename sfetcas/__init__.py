@@ -8,6 +8,8 @@ The flow, in the order of the names below:
    follows other branches from its bifurcations; :class:`Modes` has frequencies and shapes, a :class:`Trajectory` the
    states of a motion, each an :class:`Instant`.
 
+:func:`sweep` does this for many cases of a scene at once, from a :func:`grid` or :func:`sampled`.
+
 Underneath: :func:`assemble` makes the :class:`Model` of a scene on a :class:`Mesh`; :class:`Prepared` keeps its
 solvers for repeated solves by :func:`solve_model`; :func:`equilibrium_nlp` opens the problem as a CasADi program
 that takes further terms, rows and bounds; :func:`export` writes a solver of its own as C.
@@ -41,6 +43,10 @@ from .paths.path import Branch, Path, PathPoint
 from .paths.paths import switch
 from .solvers.open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
 from .solvers.prepared import Prepared
+from .sweeps.cases import Cases, grid, sampled
+from .sweeps.distributions import LogNormal, Normal, Uniform
+from .sweeps.result import Sweep
+from .sweeps.sweeping import sweep
 
 __version__ = "0.1.0"
 
@@ -49,6 +55,7 @@ __all__ = [
     "Analysis",
     "Arc",
     "Branch",
+    "Cases",
     "Certificate",
     "Contact",
     "CrossSection",
@@ -62,6 +69,7 @@ __all__ = [
     "Instant",
     "Ipopt",
     "Load",
+    "LogNormal",
     "Member",
     "Mesh",
     "Model",
@@ -69,6 +77,7 @@ __all__ = [
     "Motion",
     "NLPResult",
     "Node",
+    "Normal",
     "OpenAnswer",
     "OpenProblem",
     "Path",
@@ -85,9 +94,11 @@ __all__ = [
     "Spring",
     "Status",
     "Straight",
+    "Sweep",
     "Table",
     "TimeStep",
     "Trajectory",
+    "Uniform",
     "Until",
     "assemble",
     "changed",
@@ -96,9 +107,12 @@ __all__ = [
     "equilibrium_nlp",
     "export",
     "first_mesh",
+    "grid",
     "load",
+    "sampled",
     "solve",
     "solve_model",
+    "sweep",
     "switch",
     "uniform_mesh",
 ]

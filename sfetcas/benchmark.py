@@ -27,6 +27,7 @@ import numpy as np
 from .benchmarks.accuracy import knob
 from .benchmarks.code import code
 from .benchmarks.extremes import extremes
+from .benchmarks.many import many
 from .benchmarks.motion import motion, step_cost
 from .benchmarks.pieces import pieces
 from .benchmarks.random_run import random_scenes
@@ -409,7 +410,7 @@ def main(names: list[str]) -> None:
     """Run the benchmarks of these names, all by default."""
     known = {"order": order, "loads": loads, "size": size, "repeated": repeated}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
-    known |= {"accuracy": knob, "pieces": pieces, "start": start, "extremes": extremes}
+    known |= {"accuracy": knob, "pieces": pieces, "sweep": many, "start": start, "extremes": extremes}
     if names[:1] == ["random"]:
         random_scenes(names[1:])
         return

@@ -18,7 +18,7 @@ from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
 from .paths.path import FlutterPoint, Path
 
-__all__ = ["Answer", "Check", "check", "look_up"]
+__all__ = ["Answer", "Check", "asked", "check", "look_up"]
 
 
 Answer = Solution | Path | Trajectory | Modes
@@ -74,6 +74,21 @@ def check(scene: Scene, solution: Answer) -> list[Check]:
             message = f"found {say(expect.value)}, accepted: numbers as in the answer, {say(value)}"
             raise SceneError(message, ("expect", str(i), "value")) from None
     return checks
+
+
+def asked(solution: Answer, expect: Expect) -> Any:
+    """What an answer says of the quantity that an expectation names, whatever it expects.
+
+    Where a search listed several equilibria it is the default one.
+
+    Raises
+    ------
+    SceneError
+        The answer does not have it.
+    """
+    if isinstance(solution, Solution) and expect.step is None:
+        expect = expect.model_copy(update={"step": solution.last.factor})
+    return _value(solution, _entry_of(solution, expect), expect)
 
 
 def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | Instant:

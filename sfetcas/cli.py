@@ -1,4 +1,4 @@
-"""The command line: run, check, info, trade, export."""
+"""The command line: run, check, info, sweep, trade, export."""
 
 from __future__ import annotations
 
@@ -28,9 +28,11 @@ from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
-from .outputs import outputs_of, outputs_of_trade
-from .reports import flexible, print_checks, report
+from .outputs import outputs_of, outputs_of_sweep, outputs_of_trade
+from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
+from .sweeps.sweeping import sweep
+from .sweeps.texts import cases_in_words, usual_quantities
 from .tradeoff.tables import as_markdown
 from .tradeoff.trading import Limits, trade, with_peer
 
@@ -119,6 +121,38 @@ def _parser() -> argparse.ArgumentParser:
         "--budget", type=float, default=Limits.budget, metavar="S", help="seconds of all, and of each peer (300)"
     )
     trading.set_defaults(command=_trade)
+    many = commands.add_parser("sweep", help="solve many cases of a scene at once, each with other numbers")
+    many.add_argument("file", type=Path)
+    many.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=LOW:HIGH:COUNT",
+        help="values of a number, as loads.tip.value.1=0:10:101 or sections.strip.EI3=1,2,5; of several all",
+    )
+    many.add_argument(
+        "--sample",
+        action="append",
+        default=[],
+        metavar="NAME=KIND:A:B",
+        help="a number at random: normal:MEAN:DEVIATION, lognormal:MEAN:DEVIATION, uniform:LOW:HIGH",
+    )
+    many.add_argument("--cases", type=Path, metavar="TABLE.csv", help="a column for each number, a line for each case")
+    many.add_argument("--count", type=int, default=100, help="number of samples (100)")
+    many.add_argument("--seed", type=int, default=0, help="of samples (0)")
+    many.add_argument("--latin", action="store_true", help="samples as a Latin hypercube")
+    many.add_argument(
+        "--quantity",
+        action="append",
+        metavar="NAME",
+        help="what is kept, as nodes.tip.position or 'members.beam.moment at 0'; else positions of nodes",
+    )
+    many.add_argument(
+        "--out", type=Path, action="append", default=[], metavar="TABLE", help="write all cases: .csv, .json or .npz"
+    )
+    many.add_argument("--workers", type=int, metavar="N", help="processes; as many as processors without it")
+    _add_overrides(many)
+    many.set_defaults(command=_sweep)
     code = commands.add_parser("export", help="write an equilibrium solver of the scene as C without dependencies")
     code.add_argument("file", type=Path)
     code.add_argument("folder", type=Path, metavar="DIR", help="a new folder")
@@ -317,6 +351,46 @@ def _trade(options: argparse.Namespace) -> int:
         output.write(found)
     print(as_markdown(found, every=False), end="")
     return SOLVED
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    cases = cases_in_words(
+        options.vary,
+        options.sample,
+        options.cases,
+        options.count,
+        options.seed,
+        "latin" if options.latin else "random",
+    )
+    scene, outputs = load(options.file), outputs_of_sweep(options)
+    quantities, settings = options.quantity or usual_quantities(scene), _settings(options)
+    with _counted_progress(len(cases)) as progress:
+        found = _named(
+            options.file,
+            lambda: sweep(scene, cases, quantities, workers=options.workers, settings=settings, progress=progress),
+        )
+    for output in outputs:
+        output.write(found)
+    report_sweep(found)
+    if found.interrupted:
+        print("sfetcas: interrupted: what was solved before is kept", file=sys.stderr)
+        return INTERRUPTED
+    if not found.solved.any():
+        print(f"sfetcas: no solution: none of {counted(len(found), 'case')} was solved", file=sys.stderr)
+        return NO_SOLUTION
+    return SOLVED if all(outcome.status == "solved" for outcome in found.outcomes) else SHORT
+
+
+@contextlib.contextmanager
+def _counted_progress(count: int) -> Iterator[Callable[[int], object] | None]:
+    """A bar that shows how many cases are done, for somebody who looks at a terminal; it is wiped away at the end."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=count, unit=" cases", leave=False, file=sys.stderr) as bar:
+        yield bar.update
 
 
 @contextlib.contextmanager

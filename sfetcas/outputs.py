@@ -15,10 +15,11 @@ from typing import Any
 from .description.scene import Scene
 from .errors import SceneError
 from .files import write_file, write_folder
+from .sweeps.result import check_table
 from .tradeoff.tables import as_csv, as_json, as_markdown
 from .tradeoff.trading import Trade
 
-__all__ = ["Output", "outputs_of", "outputs_of_trade"]
+__all__ = ["Output", "outputs_of", "outputs_of_sweep", "outputs_of_trade"]
 
 Writer = Callable[[Any, Path], Any]
 """What writes an answer to a file."""
@@ -108,6 +109,26 @@ def outputs_of_trade(options: argparse.Namespace) -> list[Output]:
             raise SceneError(f"{path}: found twice, accepted: different files")
         writer = _front(path) if key == "plot" else _text(texts[key])
         found.append(Output(f"--{key}", path, writer))
+    return found
+
+
+def outputs_of_sweep(options: argparse.Namespace) -> list[Output]:
+    """The tables of a sweep that the options ask for, before anything is run.
+
+    Raises
+    ------
+    SceneError
+        They cannot be written.
+    """
+    found: list[Output] = []
+    for path in options.out:
+        check_table(path)
+        _check_writable(path)
+        if path.exists() and any(other is not None and path.samefile(other) for other in (options.file, options.cases)):
+            raise SceneError(f"{path}: is what is read, accepted: another file")
+        if any(other.path.resolve() == path.resolve() for other in found):
+            raise SceneError(f"{path}: found twice, accepted: different files")
+        found.append(Output("--out", path, lambda answer, there: answer.write(there)))
     return found
 
 

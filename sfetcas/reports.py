@@ -15,8 +15,9 @@ from .equilibria.solution import Equilibrium
 from .mechanics.model import Model
 from .paths.path import Branch, FlutterPoint
 from .paths.path import Path as Course
+from .sweeps.result import Sweep
 
-__all__ = ["flexible", "print_checks", "report"]
+__all__ = ["flexible", "print_checks", "report", "report_sweep"]
 
 WAYS = ("way out", "ways out")
 """Negative eigenvalues in words."""
@@ -274,6 +275,58 @@ def print_checks(checks: Sequence[Check]) -> None:
     head = ("quantity", "value", "reference", "error", "tolerance", "")
     rows = [head, *(_row(c) for c in checks)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    for row in rows:
+        print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def report_sweep(found: Sweep) -> None:
+    """Print what became of the cases of a sweep: how many, failures, and of each quantity what it comes to."""
+    print(found.scene.title or "untitled scene")
+    solved = int(found.solved.sum())
+    print(f"  {counted(len(found), 'case')} of {', '.join(found.cases.columns)}: {solved} solved")
+    _report_statuses(found)
+    _report_failures(found)
+    if solved:
+        _report_quantities(found)
+    spent = np.nansum(found.table["seconds"])
+    print(f"{counted(len(found), 'case')} in {found.wall:.3f} s; {spent:.3f} s of solving")
+
+
+def _report_statuses(found: Sweep) -> None:
+    short = sum(outcome.status == "short" for outcome in found.outcomes)
+    if short:
+        print(f"  {short} of these not to the accuracy asked for")
+    noted = sum(bool(outcome.notes) for outcome in found.outcomes)
+    if noted:
+        print(f"  notes with {counted(noted, 'answer')}, see --out")
+
+
+MOST_FAILURES = 5
+"""Failures that are told one by one."""
+
+
+def _report_failures(found: Sweep) -> None:
+    failures = found.failures
+    for failure in failures[:MOST_FAILURES]:
+        values = ", ".join(f"{name} = {value:.9g}" for name, value in failure.values.items())
+        print(f"  case {failure.case} ({values}): {failure.status}: {failure.reason}")
+    if len(failures) > MOST_FAILURES:
+        print(f"  ... and {len(failures) - MOST_FAILURES} more without an answer, see --out")
+
+
+def _report_quantities(found: Sweep) -> None:
+    """Least, quartiles and largest, mean and deviation of each number over the solved cases."""
+    heads = ("", "least", "quarter", "median", "three quarters", "largest", "mean", "deviation")
+    rows: list[tuple[str, ...]] = [heads]
+    names = [name for name in found.table if name not in found.cases.columns]
+    for name in names[: names.index("status")]:
+        numbers = found.table[name][found.solved]
+        numbers = numbers[np.isfinite(numbers)]
+        if len(numbers):
+            told = [*np.quantile(numbers, [0.0, 0.25, 0.5, 0.75, 1.0]), numbers.mean()]
+            spread = f"{numbers.std(ddof=1):.4g}" if len(numbers) > 1 else ""
+            rows.append((name, *(f"{value + 0.0:.9g}" for value in told), spread))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(heads))]
     for row in rows:
         print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 

@@ -1,16 +1,19 @@
 """The measurements run and print what they say; times are not judged."""
 
+import contextlib
 import re
 
 import numpy as np
 import pytest
 
 from sfetcas import benchmark
+from sfetcas.benchmarks import many as benchmark_many
 from sfetcas.benchmarks import motion as benchmark_motion
 from sfetcas.benchmarks import random_run as benchmark_random
 from sfetcas.checks import check
 from sfetcas.description.scene import Analysis, Expect
 from sfetcas.equilibria.statics import solve
+from sfetcas.sweeps.workers import cores
 
 
 @pytest.fixture
@@ -26,9 +29,23 @@ def rows(printed):
 
 
 def test_benchmark_of_another_name_is_refused():
-    accepted = "net, path, motion, steps, code, accuracy, pieces, start, extremes, or random"
+    accepted = "net, path, motion, steps, code, accuracy, pieces, sweep, start, extremes, or random"
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         benchmark.main(["nets"])
+
+
+def test_sweeps_are_measured_against_their_solves(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark_many, "CASES", 4)
+    monkeypatch.setattr(benchmark_many, "_dask", contextlib.nullcontext)
+    benchmark.main(["sweep"])
+    lines = [line.split("|")[1:-1] for line in capsys.readouterr().out.strip().splitlines()[4:]]
+    assert [(row[0].strip(), row[-1].strip()) for row in lines] == 2 * [("plane", "the same")] + 2 * [
+        ("space", "the same")
+    ]
+    for row in lines:
+        wall, solves, overhead = float(row[2]), float(row[3]), float(row[5].strip(" %"))
+        # printed with two digits, of which a tenth of a second of solves is off by a twentieth
+        assert cores() * wall / solves - 1.0 == pytest.approx(overhead / 100.0, rel=0.1)
 
 
 def test_start_is_measured(capsys, once):

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..description.records import plain, unknown
+from ..description.records import Record, plain, unknown
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
@@ -378,24 +378,34 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     SceneError
         The changed scene is none.
     """
-    table = scene.to_dict()
-    table["dimension"] = scene.resolved_dimension
+    tree: dict[str, Any] = {}
     for name, value in numbers.items():
-        _put(scene, table, name.split("."), float(value))
-    return Scene.from_dict(table)
+        *path, last = name.split(".")
+        branch = tree
+        for key in path:
+            branch = branch.setdefault(key, {})
+        branch[last] = float(value)
+    tree["dimension"] = scene.resolved_dimension
+    found = _with(scene, tree)
+    assert isinstance(found, Scene)
+    return found
 
 
-def _put(scene: Scene, table: dict[str, Any], path: Sequence[str], value: float) -> None:
-    """Put a number to its place in a table of the scene."""
-    here: Any = table
-    record: Any = scene
-    for key in path[:-1]:
-        record = record[key] if isinstance(record, Mapping) else getattr(record, key)
-        if key not in here:
-            here[key] = plain(record)
-        here = here[key]
-    last = path[-1]
-    if isinstance(here, list):
-        here[int(last)] = value
+def _with(here: Any, tree: Any) -> Any:
+    """A record, table or list with other entries; of records only those are validated that change."""
+    if not isinstance(tree, dict):
+        # What counts, as elements, is a whole number.
+        return int(tree) if type(here) is int and isinstance(tree, float) and tree.is_integer() else tree
+    entries: Any
+    if isinstance(here, Record):
+        entries = {key: getattr(here, key) for key in tree}
     else:
-        here[last] = value
+        entries = dict(here) if isinstance(here, Mapping) else plain(here)
+    listed = isinstance(entries, list)
+    for key, branch in tree.items():
+        place = int(key) if listed else key
+        try:
+            entries[place] = _with(entries[place], branch)
+        except SceneError as error:
+            raise error.within(key) from None
+    return here.replace(**entries) if isinstance(here, Record) else entries

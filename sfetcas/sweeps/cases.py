@@ -1,0 +1,234 @@
+"""The cases of a sweep: which numbers of a scene have which values; given, all combinations, or drawn at random."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import counted, say
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..parametric.arguments import argument
+from ..parametric.changing import changed
+from .distributions import Distribution
+
+__all__ = ["MOST_CASES", "Cases", "cases_from", "grid", "read_cases", "sampled"]
+
+MOST_CASES = 10_000_000
+"""Cases at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """A table of named numbers, a row for each case.
+
+    Attributes
+    ----------
+    columns : mapping of ndarray
+        By the names of :func:`~sfetcas.parametric.changing.changed`: (cases,) of a number, (cases, k) of a list of k.
+    random : bool
+        Drawn at random: means and deviations over the cases say something.
+
+    Raises
+    ------
+    SceneError
+        There is no column or no case, columns are of unlike length, or an entry is no finite number.
+    """
+
+    columns: Mapping[str, Array]
+    random: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.columns, Mapping) or not self.columns:
+            raise SceneError(f"found {say(self.columns)}, accepted: a table of at least one named column", ("cases",))
+        found = {_name(name): _column(name, values) for name, values in self.columns.items()}
+        lengths = {name: len(column) for name, column in found.items()}
+        (first, length), *others = lengths.items()
+        for name, other in others:
+            if other != length:
+                told = f"found {other} in {name} and {length} in {first}"
+                raise SceneError(f"{told}, accepted: columns of the same length", ("cases",))
+        object.__setattr__(self, "columns", MappingProxyType(found))
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def single(self, scene: Scene) -> Cases:
+        """The same with a column for each number: those of ``loads.tip.value`` by ``loads.tip.value.0``, ...
+
+        Raises
+        ------
+        SceneError
+            The scene has no such numbers, or not as many.
+        """
+        found: dict[str, Array] = {}
+        for name, column in self.columns.items():
+            try:
+                known = argument(scene, name)
+                # What is accepted by name alone shows with the scene's own numbers.
+                changed(scene, {name: known.default})
+            except SceneError as error:
+                raise SceneError(error.bare, ("cases", name)) from None
+            rows = column.reshape(len(column), -1)
+            if rows.shape[1] != len(known.names):
+                told = f"found {counted(rows.shape[1], 'number')} a case"
+                raise SceneError(f"{told}, accepted: {len(known.names)}, {', '.join(known.names)}", ("cases", name))
+            for single, values in zip(known.names, rows.T, strict=True):
+                if single in found:
+                    raise SceneError(f"found {single} more than once, accepted: each number once", ("cases",))
+                found[single] = values
+        return Cases(found, self.random)
+
+
+def cases_from(table: Any) -> Cases:
+    """Cases as they are, or from a table of columns.
+
+    Raises
+    ------
+    SceneError
+        It is none.
+    """
+    return table if isinstance(table, Cases) else Cases(table)
+
+
+def grid(values: Mapping[str, Sequence[ArrayLike] | Array]) -> Cases:
+    """All combinations of values, the last name running fastest.
+
+    ``grid({"loads.tip.value.1": [0, 5, 10], "sections.strip.EI3": [1, 2]})`` has six cases.
+
+    Raises
+    ------
+    SceneError
+        As :class:`Cases`, or there would be too many.
+    """
+    lists = {
+        name: column for name, values in values.items() for name, column in cases_from({name: values}).columns.items()
+    }
+    count = float(np.prod([float(len(column)) for column in lists.values()]))
+    if count > MOST_CASES:
+        raise SceneError(f"found {count:.3g} combinations, accepted: {MOST_CASES} at most", ("cases",))
+    rows = list(itertools.product(*(range(len(column)) for column in lists.values())))
+    chosen = np.array(rows, dtype=np.intp).reshape(len(rows), len(lists))
+    return Cases({name: column[chosen[:, i]] for i, (name, column) in enumerate(lists.items())})
+
+
+def sampled(
+    count: int,
+    distributions: Mapping[str, Distribution],
+    *,
+    seed: int = 0,
+    method: Literal["random", "latin"] = "random",
+) -> Cases:
+    """Cases drawn at random, the same for the same seed.
+
+    Parameters
+    ----------
+    count : int
+        Number of cases.
+    distributions : mapping
+        ``{"sections.strip.EI3": Normal(1.0, 0.05), "loads.tip.value.1": Uniform(9, 11)}``; each number is drawn by
+        itself.
+    seed : int, optional
+    method : str, optional
+        ``random``: each case by itself, the first ones of a larger ``count`` the same.  ``latin``: a Latin hypercube,
+        where each of ``count`` equally probable intervals of each number has one case; means are nearer then.
+
+    Raises
+    ------
+    SceneError
+        Anything that is not accepted.
+    """
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= MOST_CASES:
+        raise SceneError(f"found {say(count)}, accepted: a number of cases from 1 to {MOST_CASES}", ("count",))
+    if method not in ("random", "latin"):
+        raise SceneError(f"found {say(method)}, accepted: 'random' or 'latin'", ("method",))
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise SceneError(f"found {say(seed)}, accepted: a whole number from 0", ("seed",))
+    if not isinstance(distributions, Mapping) or not distributions:
+        raise SceneError(f"found {say(distributions)}, accepted: a table of at least one distribution", ("cases",))
+    for name, one in distributions.items():
+        if not isinstance(one, Distribution):
+            accepted = "Normal(mean, deviation), LogNormal(mean, deviation) or Uniform(low, high)"
+            raise SceneError(f"found {say(one)}, accepted: {accepted}", ("cases", str(name)))
+    random = np.random.default_rng(seed)
+    places = random.random((count, len(distributions)))
+    if method == "latin":
+        strata = random.permuted(np.tile(np.arange(count), (len(distributions), 1)), axis=1).T
+        places = (strata + places) / count
+    # Zero and one are no probabilities of what has no bounds.
+    inside = np.clip(places, np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
+    return Cases({name: one.at(inside[:, i]) for i, (name, one) in enumerate(distributions.items())}, random=True)
+
+
+def read_cases(path: Path) -> Cases:
+    """Cases from a CSV file, with the names of numbers in its first line.
+
+    Raises
+    ------
+    SceneError
+        There is no such file, or something else in it.
+    """
+    where = (str(path),)
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            lines = [line for line in csv.reader(file, strict=True) if line]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise SceneError(f"could not be read as a CSV table: {error}", where) from None
+    if len(lines) < 2:
+        accepted = "a line of names and a line of numbers for each case"
+        raise SceneError(f"found {counted(len(lines), 'line')}, accepted: {accepted}", where)
+    names = [name.strip() for name in lines[0]]
+    if len(set(names)) < len(names):
+        raise SceneError("found a name twice in the first line, accepted: each once", where)
+    columns: dict[str, list[float]] = {name: [] for name in names}
+    for number, line in enumerate(lines[1:], start=1):
+        if len(line) != len(names):
+            told = f"found {counted(len(line), 'cell')} in case {number} and {len(names)} in the first line"
+            raise SceneError(f"{told}, accepted: as many", where)
+        for name, cell in zip(names, line, strict=True):
+            columns[name].append(_cell(cell, (*where, f"case {number}", name)))
+    try:
+        return Cases({name: np.array(column) for name, column in columns.items()})
+    except SceneError as error:
+        raise error.within(*where) from None
+
+
+def _cell(text: str, where: tuple[str, ...]) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise SceneError(f"found {text!r}, accepted: a number", where) from None
+
+
+def _name(name: object) -> str:
+    if not isinstance(name, str):
+        raise SceneError(f"found {say(name)}, accepted: names of numbers, as 'loads.tip.value.1'", ("cases",))
+    return name
+
+
+def _column(name: str, values: Any) -> Array:
+    """A column as a read-only array of finite numbers."""
+    accepted = "a list of finite numbers, or of lists of as many"
+    try:
+        found = np.array(values)
+    except (TypeError, ValueError):
+        raise SceneError(f"found {say(values)}, accepted: {accepted}", ("cases", name)) from None
+    if found.dtype.kind not in "iuf" or found.ndim not in (1, 2) or not found.size:
+        raise SceneError(f"found {say(values)}, accepted: {accepted}", ("cases", name))
+    bad = np.flatnonzero(~np.isfinite(found.astype(float)).reshape(len(found), -1).all(axis=1))
+    if len(bad):
+        raise SceneError(
+            f"found {say(found[bad[0]].tolist())} in case {bad[0]}, accepted: finite numbers", ("cases", name)
+        )
+    column = found.astype(float)
+    column.flags.writeable = False
+    return column

@@ -1,0 +1,241 @@
+"""What a sweep gives: a table with a row for each case, its failures, its statistics and its files."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import counted, say, unknown
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..files import write_file
+from ..mathematics.arrays import Array
+from .cases import Cases
+from .quantities import Wanted
+from .work import SHORT, SOLVED, Outcome
+
+__all__ = ["ENDINGS", "Failure", "Sweep", "check_table", "gathered"]
+
+ENDINGS = (".csv", ".json", ".npz")
+"""Kinds of table files."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A case without an answer.
+
+    Attributes
+    ----------
+    case : int
+        Its row, from 0.
+    values : mapping
+        Its numbers by name.
+    status, reason : str
+        ``refused``, ``failed`` or ``not run``, and why in a sentence.
+    """
+
+    case: int
+    values: Mapping[str, float]
+    status: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The cases of a sweep and what became of them, in their order.
+
+    Attributes
+    ----------
+    scene : Scene
+        Before its numbers were changed.
+    cases : Cases
+        A column for each number.
+    quantities : mapping of ndarray
+        By the names that were asked for, (cases, k); not a number where there is no answer.
+    outcomes : tuple of Outcome
+    wall : float
+        Seconds from the first to the last.
+    interrupted : bool
+        The rest of the cases was not run.
+    """
+
+    scene: Scene = field(repr=False)
+    cases: Cases = field(repr=False)
+    quantities: Mapping[str, Array] = field(repr=False)
+    outcomes: tuple[Outcome, ...] = field(repr=False)
+    wall: float
+    interrupted: bool = False
+
+    def __len__(self) -> int:
+        return len(self.outcomes)
+
+    @property
+    def solved(self) -> Array:
+        """Which cases have an answer, (cases,)."""
+        return np.array([outcome.status in (SOLVED, SHORT) for outcome in self.outcomes], dtype=bool)
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """The others."""
+        columns = self.cases.columns
+        return tuple(
+            Failure(i, {name: float(column[i]) for name, column in columns.items()}, outcome.status, outcome.reason)
+            for i, outcome in enumerate(self.outcomes)
+            if outcome.status not in (SOLVED, SHORT)
+        )
+
+    @cached_property
+    def table(self) -> Mapping[str, Array]:
+        """Columns (cases,): numbers that change, quantities (vectors as ``nodes.tip.position.0``), what became of each.
+
+        A column of a quantity that has the name of a number that changes, as where places of nodes do, begins with
+        ``answer.``.  Texts are in ``status``, ``reason`` and ``notes``; ``error_estimate`` is the largest of an answer,
+        ``seconds`` are those of its solve.
+        """
+        found: dict[str, Array] = dict(self.cases.columns)
+        for name, values in self.quantities.items():
+            names = [name] if values.shape[1] == 1 else [f"{name}.{i}" for i in range(values.shape[1])]
+            for column, numbers in zip(names, values.T, strict=True):
+                found[f"answer.{column}" if column in self.cases.columns else column] = numbers
+        for key in ("status", "reason", "notes"):
+            found[key] = np.array([getattr(outcome, key) for outcome in self.outcomes], dtype=str)
+        for key in ("error_estimate", "seconds"):
+            found[key] = np.array([getattr(outcome, key) for outcome in self.outcomes])
+        return MappingProxyType(found)
+
+    def values(self, name: str) -> Array:
+        """A quantity as it was asked for, (cases,) of a number and (cases, k) of k, or a column of the table.
+
+        Raises
+        ------
+        SceneError
+            There is none of this name.
+        """
+        if name in self.quantities:
+            found = self.quantities[name]
+            return found[:, 0] if found.shape[1] == 1 else found
+        if name not in self.table:
+            raise SceneError(unknown(name, [*self.quantities, *self.table], "columns"))
+        return self.table[name]
+
+    def mean(self, name: str) -> Any:
+        """Mean of a quantity over the solved cases, a number or (k,)."""
+        return self._solved(name, 1).mean(axis=0)
+
+    def deviation(self, name: str) -> Any:
+        """Standard deviation over the solved cases, of one case less."""
+        return self._solved(name, 2).std(axis=0, ddof=1)
+
+    def standard_error(self, name: str) -> Any:
+        """Standard error of the mean of cases drawn at random; of a Latin hypercube it is smaller than this says."""
+        return self.deviation(name) / np.sqrt(self.solved.sum())
+
+    def quantiles(self, name: str, probabilities: ArrayLike) -> Array:
+        """Quantiles over the solved cases, linear between them: (probabilities,) or (probabilities, k).
+
+        Raises
+        ------
+        SceneError
+            A probability is not between 0 and 1.
+        """
+        wanted = np.atleast_1d(np.asarray(probabilities, dtype=float))
+        if not ((wanted >= 0.0) & (wanted <= 1.0)).all():
+            raise SceneError(f"found {say(wanted.tolist())}, accepted: from 0 to 1", ("probabilities",))
+        return np.quantile(self._solved(name, 1), wanted, axis=0)
+
+    def _solved(self, name: str, least: int) -> Array:
+        found = self.values(name)
+        if found.dtype.kind != "f":
+            raise SceneError(f"found the column {name!r}, accepted: one of numbers")
+        chosen = found[self.solved]
+        if len(chosen) < least:
+            raise SceneError(f"found {counted(len(chosen), 'solved case')}, accepted: {least} at least")
+        return chosen
+
+    def save(self, path: str | Path) -> None:
+        """Write the table, whole or not at all: ``.csv``, ``.json`` or ``.npz``.
+
+        In CSV what is no number is an empty cell, in JSON null; all digits are kept.
+
+        Raises
+        ------
+        SceneError
+            The ending is another one, or the file could not be written.
+        """
+        check_table(Path(path))
+        write_file(Path(path), self.write)
+
+    def write(self, path: Path) -> None:
+        """Write the table to a new file of one of ENDINGS; :meth:`save` leaves nothing half-written."""
+        writers = {".csv": self._write_csv, ".json": self._write_json, ".npz": self._write_npz}
+        writers[path.suffix](path)
+
+    def _write_csv(self, path: Path) -> None:
+        columns = [_plain(column) for column in self.table.values()]
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(self.table)
+            writer.writerows(["" if cell is None else cell for cell in row] for row in zip(*columns, strict=True))
+
+    def _write_json(self, path: Path) -> None:
+        answer = {
+            "title": self.scene.title,
+            "cases": len(self),
+            "solved": int(self.solved.sum()),
+            "interrupted": self.interrupted,
+            "seconds": self.wall,
+            "columns": {name: _plain(column) for name, column in self.table.items()},
+        }
+        path.write_text(json.dumps(answer, allow_nan=False, indent=1) + "\n", encoding="utf-8")
+
+    def _write_npz(self, path: Path) -> None:
+        columns: dict[str, Any] = dict(self.table)
+        np.savez(path, **columns)
+
+
+def _plain(column: Array) -> list[Any]:
+    """A column as texts and numbers; None where it has none."""
+    if column.dtype.kind != "f":
+        return column.tolist()
+    return [value if np.isfinite(value) else None for value in column.tolist()]
+
+
+def check_table(path: Path) -> None:
+    """Refuse a table file of another kind.
+
+    Raises
+    ------
+    SceneError
+        Its ending is not one of ENDINGS.
+    """
+    if path.suffix not in ENDINGS:
+        raise SceneError(f"found the ending {path.suffix!r}, accepted: {', '.join(ENDINGS)}", (str(path),))
+
+
+def gathered(
+    scene: Scene,
+    cases: Cases,
+    wanted: Sequence[Wanted],
+    outcomes: Sequence[Outcome],
+    wall: float,
+    interrupted: bool,
+) -> Sweep:
+    """The sweep of what became of its cases."""
+    quantities = {}
+    for k, one in enumerate(wanted):
+        rows = [outcome.numbers[k] if outcome.numbers else np.zeros(0) for outcome in outcomes]
+        found = np.full((len(rows), max([1, *map(len, rows)])), np.nan)
+        for i, row in enumerate(rows):
+            found[i, : len(row)] = row
+        found.flags.writeable = False
+        quantities[one.text] = found
+    return Sweep(scene, cases, MappingProxyType(quantities), tuple(outcomes), wall, interrupted)

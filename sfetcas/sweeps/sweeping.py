@@ -1,0 +1,122 @@
+"""The sweep of a scene over cases: each solved by itself, wherever an executor has it done."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import say
+from ..description.scene import Scene
+from ..equilibria.settings import Settings
+from ..errors import SceneError
+from .cases import Cases, cases_from
+from .feeding import chunk_of, fed
+from .quantities import Wanted, wanted_of
+from .result import Sweep, gathered
+from .work import Job
+from .workers import Workers, cores
+
+__all__ = ["sweep"]
+
+
+def sweep(
+    scene: Scene,
+    cases: Cases | Mapping[str, ArrayLike],
+    quantities: Sequence[str],
+    *,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    settings: Settings | None = None,
+    chunk: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Sweep:
+    """Solve a scene with other numbers in each of many cases.
+
+    Each case is ``solve(changed(scene, case), settings)`` by itself, so that numbers are the same to the last bit
+    whoever solves it and after whatever else.  What fails is kept with its reason.  A script that calls this without an
+    executor does so below ``if __name__ == "__main__":``, as processes are started.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of any analysis; what it expects plays no part.
+    cases : Cases or mapping
+        Columns of numbers by name; see :func:`~sfetcas.sweeps.cases.grid`, :func:`~sfetcas.sweeps.cases.sampled`.
+    quantities : sequence of str
+        What is kept of each answer: ``nodes.tip.position``, ``members.beam.moment at 0.5``, ``reactions.A.force``,
+        ``modes.omega``, ``factor limit_point 1``, ``nodes.tip.velocity time 0.5``.
+    executor : Executor, optional
+        Any with the interface of :mod:`concurrent.futures`, as ``Client(...).get_executor()`` of Dask or
+        ``mpi4py.futures.MPIPoolExecutor()``; it is not shut down.  Without one processes of this machine.
+    workers : int, optional
+        How many of these; as many as there are processors.
+    settings : Settings, optional
+        How to solve.
+    chunk : int, optional
+        Cases that are handed over together.
+    progress : callable, optional
+        Told how many more cases are done, as ``tqdm.tqdm(total=len(cases)).update`` is.
+
+    Returns
+    -------
+    Sweep
+        Rows in the order of the cases.  After KeyboardInterrupt with what was ready.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such numbers, its answers no such quantities, or anything else is not accepted.
+
+    Example
+    -------
+    >>> found = sweep(scene, {"loads.tip.value.1": [0, 5, 10]}, ["nodes.tip.position"])  # doctest: +SKIP
+    >>> found.values("nodes.tip.position")  # doctest: +SKIP
+    """
+    if executor is not None and (not isinstance(executor, Executor) or workers is not None):
+        found = say(executor) if workers is None else "an executor and a number of workers"
+        raise SceneError(
+            f"found {found}, accepted: a concurrent.futures.Executor, or a number of workers", ("executor",)
+        )
+    if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1):
+        raise SceneError(f"found {say(chunk)}, accepted: a number of cases from 1", ("chunk",))
+    single = cases_from(cases).single(scene)
+    wanted = wanted_of(scene, quantities)
+    _check_together(single, wanted)
+    job = Job(_expecting(scene, wanted), settings or Settings(), tuple(single.columns), wanted)
+    values = np.column_stack(list(single.columns.values())).tolist()
+    size = chunk or chunk_of(len(values))
+    begin = time.perf_counter()
+    if executor is not None:
+        outcomes, interrupted = fed(executor, job, values, size, progress or _silent)
+    else:
+        with _own(workers, len(values)) as own:
+            outcomes, interrupted = fed(own, job, values, size, progress or _silent)
+            if interrupted:
+                own.kill()
+    return gathered(scene, single, wanted, outcomes, time.perf_counter() - begin, interrupted)
+
+
+def _silent(more: int) -> None:
+    """Told how far it is, by nobody."""
+
+
+def _own(workers: int | None, count: int) -> Workers:
+    return Workers(min(cores(), count) if workers is None else workers)
+
+
+def _expecting(scene: Scene, wanted: Sequence[Wanted]) -> Scene:
+    """The scene that expects just what is wanted: times of these are among the answers of a motion, as its own are."""
+    own = [expect for expect in scene.expect if expect.time is not None]
+    return scene.replace(expect=(*(one.expect for one in wanted), *own))
+
+
+def _check_together(cases: Cases, wanted: Sequence[Wanted]) -> None:
+    """Refuse quantities of a factor that the cases replace."""
+    for one in wanted:
+        if "factor" in cases.columns and one.expect.step is not None:
+            message = "found 'step' where the cases say the factor, accepted: the quantity without it"
+            raise SceneError(message, ("quantities", one.text))

@@ -1,0 +1,150 @@
+"""What is done where the cases are solved: in other processes, on other machines."""
+
+from __future__ import annotations
+
+import functools
+import pickle
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..analyses import solve
+from ..checks import Answer
+from ..description.scene import Scene
+from ..dynamics.modes import Modes
+from ..dynamics.motion import Trajectory
+from ..equilibria.settings import Settings
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..parametric.changing import changed
+from ..paths.path import Path
+from .quantities import Wanted
+
+__all__ = ["FAILED", "NOT_RUN", "REFUSED", "SHORT", "SOLVED", "UNANSWERED", "Job", "Outcome", "solve_chunk"]
+
+SOLVED, SHORT, REFUSED, FAILED, NOT_RUN = "solved", "short", "refused", "failed", "not run"
+"""What may become of a case; of the first two there are numbers."""
+
+UNANSWERED = "unanswered"
+"""It was solved, but the answer has no such quantity."""
+
+ONE_AT_A_TIME = threading.Lock()
+"""Solvers are not made for threads: where several share a process they take turns."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is the same for all cases.
+
+    Attributes
+    ----------
+    scene : Scene
+    settings : Settings
+    names : tuple of str
+        Of the numbers that change.
+    wanted : tuple of Wanted
+    """
+
+    scene: Scene
+    settings: Settings
+    names: tuple[str, ...]
+    wanted: tuple[Wanted, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a case.
+
+    Attributes
+    ----------
+    status, reason : str
+        The reason is a sentence; empty where there is nothing to say.
+    numbers : tuple of ndarray
+        Of each quantity; empty without an answer.
+    notes : str
+        Those of the answer.
+    error_estimate : float
+        The largest of its estimates; not a number where there is none.
+    seconds : float
+        Of the solve.
+    """
+
+    status: str
+    reason: str = ""
+    numbers: tuple[Array, ...] = ()
+    notes: str = ""
+    error_estimate: float = np.nan
+    seconds: float = np.nan
+
+
+@functools.lru_cache(maxsize=2)
+def _job(data: bytes) -> Job:
+    found = pickle.loads(data)
+    assert isinstance(found, Job)
+    return found
+
+
+def solve_chunk(data: bytes, values: Sequence[Sequence[float]]) -> list[Outcome]:
+    """What becomes of some cases, none of which depends on another.
+
+    Parameters
+    ----------
+    data : bytes
+        The pickled job, which a process unpacks once.
+    values : sequence
+        Of each case.
+    """
+    with ONE_AT_A_TIME:
+        return [_outcome(_job(data), case) for case in values]
+
+
+def _outcome(job: Job, values: Sequence[float]) -> Outcome:
+    begin = time.perf_counter()
+    try:
+        with np.errstate(over="raise"):
+            scene = changed(job.scene, dict(zip(job.names, values, strict=True)))
+            begin = time.perf_counter()
+            answer = solve(scene, job.settings)
+            seconds = time.perf_counter() - begin
+    except SceneError as error:
+        return Outcome(REFUSED, str(error), seconds=time.perf_counter() - begin)
+    except SolveError as error:
+        return Outcome(FAILED, str(error), seconds=time.perf_counter() - begin)
+    except (FloatingPointError, OverflowError, np.linalg.LinAlgError) as error:
+        told = f"the numbers of this case leave what can be computed ({error})"
+        return Outcome(FAILED, told, seconds=time.perf_counter() - begin)
+    except MemoryError:
+        return Outcome(FAILED, "the case needs more memory than there is", seconds=time.perf_counter() - begin)
+    return _answered(job, answer, seconds)
+
+
+def _answered(job: Job, answer: Answer, seconds: float) -> Outcome:
+    try:
+        numbers = tuple(one.numbers(answer) for one in job.wanted)
+    except SceneError as error:
+        return Outcome(UNANSWERED, str(error), seconds=seconds)
+    solved = answer.status is Status.SOLVED
+    return Outcome(
+        SOLVED if solved else SHORT,
+        "" if solved else answer.status.value,
+        numbers,
+        "; ".join(_notes(answer)),
+        _error_estimate(answer),
+        seconds,
+    )
+
+
+def _notes(answer: Answer) -> list[str]:
+    own = [] if isinstance(answer, Trajectory) else [note for step in answer.steps for note in step.notes]
+    return list(dict.fromkeys([*own, *getattr(answer, "notes", ())]))
+
+
+def _error_estimate(answer: Answer) -> float:
+    if isinstance(answer, (Path, Trajectory, Modes)):
+        found = [answer.error_estimate]
+    else:
+        found = [step.certificate.error_estimate for step in answer.steps]
+    return max((estimate for estimate in found if estimate is not None), default=np.nan)

@@ -1,0 +1,150 @@
+"""Processes of this machine as an executor that outlives each of them.
+
+Where a process of a usual pool dies, all that it had still to do is lost, and which piece of work it was is not told.
+Here each process is a pool of its own: only what it was at is affected, which is the oldest piece it had, and another
+one takes its place.  Processes are never made by copying this one, whose libraries have threads: a server process
+imports what is needed once and copies itself (``forkserver``), where the system can; elsewhere each imports for itself.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from multiprocessing.connection import Connection
+from typing import Any, ParamSpec, TypeVar
+
+from ..errors import SceneError
+
+__all__ = ["Workers", "cores"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+PRELOADED = ["sfetcas.sweeps.work"]
+
+AHEAD = 2
+"""Pieces of work that a process has at once: it does not wait for the next one."""
+
+MOST = 10_000
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class _Lane:
+    """One process, and the next one after it died."""
+
+    def __init__(self, make: Callable[[], ProcessPoolExecutor]) -> None:
+        self._make, self._pool, self._flying = make, make(), list[Future[Any]]()
+        self._blamed = False
+        self.culprits: set[Future[Any]] = set()
+
+    @property
+    def load(self) -> int:
+        """Pieces of work that it has."""
+        self._flying = [future for future in self._flying if not future.done()]
+        return len(self._flying)
+
+    def submit(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> Future[T]:
+        """Have a piece of work done."""
+        try:
+            future = self._pool.submit(function, *args, **kwargs)
+        except BrokenExecutor:
+            self._pool.shutdown()
+            self._pool, self._blamed = self._make(), False
+            future = self._pool.submit(function, *args, **kwargs)
+        self._flying.append(future)
+        future.add_done_callback(self._done)
+        return future
+
+    def _done(self, future: Future[Any]) -> None:
+        # What is lost is told in the order in which it was handed over: the process was at the first.
+        lost = not future.cancelled() and isinstance(future.exception(), BrokenExecutor)
+        if lost and not self._blamed:
+            self._blamed = True
+            self.culprits.add(future)
+
+    def shutdown(self, wait: bool, cancel_futures: bool) -> None:
+        """Let the process end."""
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+
+class Workers(Executor):
+    """So many processes of this machine.
+
+    Parameters
+    ----------
+    count : int
+        Number of processes; started as they are needed.
+
+    Raises
+    ------
+    SceneError
+        They cannot start, as where a script starts them while it is imported.
+    """
+
+    def __init__(self, count: int) -> None:
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
+            raise SceneError(f"found {count!r}, accepted: a number of processes from 1 to {MOST}", ("workers",))
+        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+        self._context: Any = multiprocessing.get_context(method)
+        if method == "forkserver":
+            self._context.set_forkserver_preload(PRELOADED)
+        self.room = AHEAD * count
+        self._reader, self._writer = self._context.Pipe(duplex=False)
+        self._lanes = [_Lane(self._pool) for _ in range(count)]
+        try:
+            self._lanes[0].submit(_ready).result()
+        except BrokenExecutor:
+            self.kill()
+            accepted = "a call below if __name__ == '__main__': in a script that can be imported"
+            raise SceneError(f"the processes of a sweep could not start, accepted: {accepted}") from None
+
+    def _pool(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(1, self._context, initializer=_begin, initargs=(self._reader,))
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Have a piece of work done by the process that has least to do."""
+        return min(self._lanes, key=lambda lane: lane.load).submit(fn, *args, **kwargs)
+
+    def guilty(self, future: Future[Any]) -> bool:
+        """Whether a process was at this when it died; what only waited for it is not."""
+        return any(future in lane.culprits for lane in self._lanes)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Let all processes end after what they have to do."""
+        for lane in self._lanes:
+            lane.shutdown(wait, cancel_futures)
+        if wait:
+            self._writer.close()
+            self._reader.close()
+
+    def kill(self) -> None:
+        """End all processes at once."""
+        self._writer.close()
+        self.shutdown(cancel_futures=True)
+
+
+def _ready() -> None:
+    """Nothing, by which is seen that processes start."""
+
+
+def _begin(reader: Connection) -> None:
+    """Leave interrupts to the process that started this one, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(reader,), daemon=True).start()
+
+
+def _end_with(reader: Connection) -> None:
+    try:
+        reader.recv_bytes()
+    except (EOFError, OSError):
+        os._exit(1)
