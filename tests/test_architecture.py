@@ -169,6 +169,7 @@ ORDER = [
     "trajectories.replay",
     "trajectories.controlled_motion",
     "trajectories.optimal_control",
+    "trajectories.functions",
     "sweeps",
     "sweeps.distributions",
     "sweeps.cases",

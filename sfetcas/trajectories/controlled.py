@@ -189,10 +189,14 @@ class ControlledSystem:
         q, y, lam, near = self._state(s["d"], s["reference"], s["numbers"])
         found = system.stage(q, y, lam, system.forces(s["v"], s["a"]), s["numbers"], near)
         quantities = system.moving(q, y, system.given(s["numbers"]), near)
-        told = answers_of_motion(self.results, self.arguments, self.system, self.time)
-        answers = told(ca.vertcat(ca.vec(q), y, lam, near), s["numbers"], s["v"])
+        answers = self.told(ca.vertcat(ca.vec(q), y, lam, near), s["numbers"], s["v"])
         results = [ca.densify(part) for part in (found.residual, quantities, answers)]
         return ca.Function("stage", list(s.values()), results, list(s), ["balance", "quantities", "answers"])
+
+    @functools.cached_property
+    def told(self) -> ca.Function:
+        """(state, numbers, v) -> answers: of rotations, displacements, multipliers and counted angles as one vector."""
+        return answers_of_motion(self.results, self.arguments, self.system, self.time)
 
     @functools.cached_property
     def turned(self) -> ca.Function:

@@ -25,7 +25,7 @@ from .statement import Statement, Variable, bounds_of, controls_of
 from .transcription import Course, Transcription
 from .warm import at_rest, carried_over, rigid, straight
 
-__all__ = ["OptimalControl"]
+__all__ = ["OptimalControl", "moving"]
 
 
 class OptimalControl:
@@ -98,7 +98,7 @@ class OptimalControl:
         )
         self._settings, self._places = settings or Settings(), places or {}
         end = duration[1] if np.isfinite(duration[1]) else max(2.0 * duration[0], 1.0)
-        self.scene = _moving(scene, end)
+        self.scene = moving(scene, end)
         # A mesh of its own for all that follows; it also says how many numbers answers have.
         self._plain = self._system(self.scene, [])
         self._mesh: Mesh = self._plain.model.mesh
@@ -390,7 +390,7 @@ def _shares(given: Any) -> Array:
     return np.asarray(shares / shares.sum())
 
 
-def _moving(scene: Scene, end: float) -> Scene:
+def moving(scene: Scene, end: float) -> Scene:
     """The scene as one in motion."""
     kept = ("accuracy", "initial", "cut", "release")
     given = {key: getattr(scene.analysis, key) for key in kept if key in scene.analysis.model_fields_set}

@@ -121,7 +121,7 @@ def commanded(scene: Scene, commands: Mapping[str, History]) -> Scene:
             histories[path[1]] = _table(history)
             continue
         load = path[1]
-        own = f"{load} {'.'.join(path[2:])}"
+        own = f"{load} {' '.join(path[2:])}"
         histories[own] = _table(history)
         value = plain(scene.loads[load].value)
         index = int(path[3]) if len(path) > 3 else None

@@ -1,0 +1,277 @@
+"""A scene in motion as plain CasADi Functions with named inputs and outputs, for anyone's own optimal control.
+
+    x' = ode(x, z, u, p),      0 = alg(x, z, u, p),      y = outputs(x, u, p)
+
+of index 1, in SI units and seconds, differentiable as often as wanted: what rockit, do-mpc, acados and Opti take.
+States are rotations (quaternions or angles), displacements, their rates (angular velocities about the fixed axes), and
+angles that count turns; algebraic ones are accelerations and multipliers.  Closings and their rates are invariants:
+they hold if they hold at the begin, up to the error of the integration.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+
+from ..description.scene import Scene
+from ..dynamics.index_one import LINEAR, IndexOne
+from ..equilibria.settings import Settings
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..parametric.equilibrium import Place
+from .controlled import ControlledSystem
+from .optimal_control import moving
+from .statement import Control, Variable
+
+__all__ = ["MotionFunctions", "motion_functions"]
+
+
+class _Differentiable(IndexOne):
+    """The same equations without a Jacobian of their own: CasADi differentiates them, exactly."""
+
+    @functools.cached_property
+    def balance(self) -> ca.Function:
+        """(q, y, w, near, a, lam, f, f1, f2) -> what is out of balance, then accelerations of the closings."""
+        system, n = self.system, self.system.layout
+        names = ["q", "y", "w", "near", "a", "lam", "f", "f1", "f2"]
+        sizes = [*self.states, *self.algebraic, *[n.factors] * 3]
+        symbols = [ca.MX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
+        q, y, w, near, a, lam, f, f1, f2 = symbols
+        spin, faster = self._curve(q, w, a)
+        moved = slice(system.equations.turning_unknowns, self.unknowns)
+        seen = self._seen(ca.vertcat(q, y, f), ca.vertcat(spin, w[moved], f1), ca.vertcat(faster, a[moved], f2), near)
+        forces = system.forces(seen[1][: n.x], seen[2][: n.x])
+        stage = system.stage(self._full(q, f), y, lam, forces, f, near)
+        out = ca.vertcat(stage.residual[: self.unknowns], seen[2][n.x :])
+        return ca.Function("balance", symbols, [out], names, ["missed"])
+
+
+@dataclass(frozen=True, eq=False)
+class MotionFunctions:
+    """The functions of one scene on one mesh.
+
+    Attributes
+    ----------
+    inputs, parameters, outputs : tuple of str
+        Names of the numbers of the scene in ``u`` and ``p``, and of the answers in ``y``, in this order.
+    begin : ndarray (states,)
+        Where the motion begins.
+    sizes : mapping of str to int
+        Of ``x``, ``z``, ``u``, ``p`` and ``y``.
+    parts : mapping of str to slice
+        Of the states: ``q``, ``y``, ``w`` and ``near``; of the algebraic ones ``a`` and ``lam``.
+    default : mapping of str to ndarray
+        ``u`` and ``p`` as the scene has them.
+    shapes : mapping of str to tuple of int
+        Of the outputs, which stand in ``y`` row by row.
+    dae : Function
+        (x, z, u, p) -> ode, alg
+    outputs_of : Function
+        (x, u, p) -> y
+    """
+
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
+    begin: Array
+    sizes: Mapping[str, int]
+    parts: Mapping[str, slice]
+    default: Mapping[str, Array]
+    shapes: Mapping[str, tuple[int, ...]]
+    dae: ca.Function = field(repr=False)
+    outputs_of: ca.Function = field(repr=False)
+    invariants: ca.Function = field(repr=False)
+
+    def _symbols(self) -> list[ca.MX]:
+        return [ca.MX.sym(name, self.sizes[name]) for name in ("x", "z", "u", "p")]
+
+    @functools.cached_property
+    def ode(self) -> ca.Function:
+        """(x, z, u, p) -> x', per s."""
+        s = self._symbols()
+        return ca.Function("ode", s, [self.dae(*s)[0]], ["x", "z", "u", "p"], ["ode"])
+
+    @functools.cached_property
+    def alg(self) -> ca.Function:
+        """(x, z, u, p) -> what is out of balance, and accelerations of the closings; dimensionless."""
+        s = self._symbols()
+        return ca.Function("alg", s, [self.dae(*s)[1]], ["x", "z", "u", "p"], ["alg"])
+
+    @functools.cached_property
+    def implicit(self) -> ca.Function:
+        """(xdot, x, z, u, p) -> x' - ode and alg: the residual of an implicit equation."""
+        rate, s = ca.MX.sym("xdot", self.sizes["x"]), self._symbols()
+        ode, alg = self.dae(*s)
+        return ca.Function("implicit", [rate, *s], [ca.vertcat(rate - ode, alg)], ["xdot", "x", "z", "u", "p"], ["f"])
+
+    @functools.cached_property
+    def explicit(self) -> ca.Function:
+        """(x, u, p) -> x', per s, and z: the algebraic equations, which are linear in z, solved."""
+        x, z, u, p = self._symbols()
+        missed = self.alg(x, z, u, p)
+        matrix = ca.substitute(ca.jacobian(missed, z), z, ca.MX.zeros(z.shape))
+        without = self.alg(x, ca.MX.zeros(z.shape), u, p)
+        found = -ca.solve(matrix, without, LINEAR, {"eps": 1e-300}) if self.sizes["z"] else ca.MX(0, 1)
+        return ca.Function("explicit", [x, u, p], [self.ode(x, found, u, p), found], ["x", "u", "p"], ["ode", "z"])
+
+    @functools.cached_property
+    def jacobians(self) -> ca.Function:
+        """(x, z, u, p) -> derivatives of ode and alg by x, z, u: ``ode_x``, ``ode_z``, ``ode_u``, ``alg_x``, ..."""
+        s = self._symbols()
+        results = dict(zip(("ode", "alg"), self.dae(*s), strict=True))
+        by = dict(zip(("x", "z", "u"), s, strict=False))
+        found = {f"{name}_{key}": ca.jacobian(e, w) for name, e in results.items() for key, w in by.items()}
+        return ca.Function("jacobians", s, list(found.values()), ["x", "z", "u", "p"], list(found))
+
+
+def motion_functions(
+    scene: Scene,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    *,
+    parameters: Mapping[str, tuple[float, float]] | Sequence[str] = (),
+    places: Place | None = None,
+    settings: Settings | None = None,
+) -> MotionFunctions:
+    """The motion of a scene as plain CasADi Functions.
+
+    Parameters
+    ----------
+    scene : Scene
+    inputs : numbers of the scene that change with time: components of loads, or ``histories.NAME``
+    outputs : names of answers: positions, velocities, angles, springs, ``energy.elastic``
+    parameters : further numbers of the scene, with ranges where the model is no power of them; not masses
+    places : fractions of the length at which outputs along members are told
+    settings : accuracy or elements of the mesh
+
+    Raises
+    ------
+    SceneError
+        The scene has no such numbers or answers, or something in it turns without inertia.
+    """
+    spans = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, (-np.inf, np.inf))
+    variables = [Variable(name, low, high) for name, (low, high) in spans.items()]
+    controls = [Control(name) for name in inputs]
+    system = ControlledSystem(moving(scene, 1.0), controls, variables, list(outputs), places, settings)
+    return _Made(system, tuple(inputs), tuple(spans), tuple(outputs)).functions()
+
+
+class _Made:
+    """What puts the functions of a system together."""
+
+    def __init__(
+        self, system: ControlledSystem, inputs: tuple[str, ...], parameters: tuple[str, ...], outputs: tuple[str, ...]
+    ) -> None:
+        self.system, self.inputs, self.parameters, self.outputs = system, inputs, parameters, outputs
+        self.form = _Differentiable(system.system, 0)
+        length, time, force = system.model.scales.length, system.time, system.model.scales.force
+        n, turning = system.system.layout, system.system.equations.turning_unknowns
+        shifts = self.form.unknowns - turning
+        rates = np.repeat([1.0 / time, length / time], [turning, shifts])
+        self.x_unit = np.concatenate([np.ones(self.form.q_size), np.full(n.y, length), rates, np.ones(n.near)])
+        self.z_unit = np.concatenate([rates / time, np.full(n.lam, force)])
+        self.names = ["x", "z", "u", "p"]
+        self.bounds = np.cumsum([0, *self.form.states]).tolist()
+
+    def functions(self) -> MotionFunctions:
+        """The functions."""
+        sizes = {"x": len(self.x_unit), "z": len(self.z_unit), "u": len(self.inputs), "p": len(self.parameters)}
+        sizes["y"] = sum(one.size for one in self.system.results.results)
+        symbols = [ca.MX.sym(name, sizes[name]) for name in self.names]
+        x, z, u, p = symbols
+        states, own = x / ca.DM(self.x_unit), ca.vertcat(1.0, u, p)
+        problem = self.form.problem
+        terms = [problem[name] for name in ("x", "z", "t", "p")]
+        equations = ca.Function("equations", terms, [problem["ode"], problem["alg"]])
+        ode, alg = equations(states, z / ca.DM(self.z_unit), 0.0, own)
+        dae = ca.Function(
+            "dae", symbols, [ca.DM(self.x_unit) * ode / self.system.time, alg], self.names, ["ode", "alg"]
+        )
+        dae = dae.expand("dae")
+        seen = ca.Function("outputs", [x, u, p], [self._told(states, ca.vertcat(u, p))], ["x", "u", "p"], ["y"])
+        kept = ca.Function("invariants", [x, u, p], self._kept(states, ca.vertcat(u, p)), ["x", "u", "p"], KEPT)
+        found = MotionFunctions(
+            inputs=self.inputs,
+            parameters=self.parameters,
+            outputs=self.outputs,
+            begin=self._begin(),
+            sizes=sizes,
+            parts=self._parts(),
+            default=dict(zip(("u", "p"), np.split(self.system.arguments.defaults, [len(self.inputs)]), strict=True)),
+            shapes={one.name: one.shape for one in self.system.results.results},
+            dae=dae,
+            outputs_of=seen.expand("outputs"),
+            invariants=kept.expand("invariants"),
+        )
+        self._check(found)
+        return found
+
+    def _parts(self) -> dict[str, slice]:
+        states = [slice(a, b) for a, b in zip(self.bounds, self.bounds[1:], strict=False)]
+        n, lam = self.form.unknowns, self.system.system.layout.lam
+        return dict(zip(("q", "y", "w", "near"), states, strict=True)) | {"a": slice(0, n), "lam": slice(n, n + lam)}
+
+    def _split(self, states: ca.MX) -> list[ca.MX]:
+        return list(ca.vertsplit(states, self.bounds))
+
+    def _seen(self, states: ca.MX, numbers: ca.MX) -> list[ca.MX]:
+        """Quantities with gaps, and their rates."""
+        form = self.form
+        q, y, w, near = self._split(states)
+        spin, _ = form._curve(q, w, ca.MX.zeros(form.unknowns))
+        still = ca.MX.zeros(numbers.shape)
+        moved = slice(self.system.system.equations.turning_unknowns, form.unknowns)
+        at, rate = ca.vertcat(q, y, numbers), ca.vertcat(spin, w[moved], still)
+        return list(form._seen(at, rate, ca.MX.zeros(at.shape), near))
+
+    def _told(self, states: ca.MX, numbers: ca.MX) -> ca.MX:
+        q, y, _, near = self._split(states)
+        system = self.system
+        full = self.form._full(q, numbers)
+        zeros = ca.MX.zeros(system.system.layout.lam)
+        rates = self._seen(states, numbers)[1][: system.quantities]
+        return system.told(ca.vertcat(ca.vec(full), y, zeros, near), numbers, rates)
+
+    def _kept(self, states: ca.MX, numbers: ca.MX) -> list[ca.MX]:
+        """Gaps of the closings, their rates, and squared lengths of quaternions less one."""
+        system, n = self.system, self.system.system.layout
+        seen = self._seen(states, numbers)
+        q = ca.reshape(self._split(states)[0], n.components, len(self.form.turning))
+        norms = ca.sum1(q**2).T - 1.0 if system.model.space else ca.MX(0, 1)
+        return [seen[0][n.x :], seen[1][n.x :], norms]
+
+    def _begin(self) -> Array:
+        begin = self.system.begin
+        q = begin.state.q[self.form.turning].ravel()
+        return np.concatenate([q, begin.state.y, begin.rates[: self.form.unknowns], begin.state.wound]) * self.x_unit
+
+    def _check(self, found: MotionFunctions) -> None:
+        """Refuse what has no accelerations.
+
+        Raises
+        ------
+        SceneError
+            Something turns without inertia.
+        """
+        default = found.default
+        if not found.sizes["z"]:
+            return
+        slopes = found.jacobians(found.begin, np.zeros(found.sizes["z"]), default["u"], default["p"])[4]
+        scaled = np.array(slopes) * self.z_unit
+        sizes = np.linalg.svd(scaled, compute_uv=False)
+        if sizes[-1] < SINGULAR * sizes[0]:
+            accepted = "rhoI of sections, or inertia at nodes, in motion_functions"
+            raise SceneError(
+                f"found rotations without inertia, or closings that depend on each other, accepted: {accepted}"
+            )
+
+
+KEPT = ["gaps", "rates", "norms"]
+"""Results of the invariants."""
+
+SINGULAR = 1e-13
+"""Share of the largest singular value below which the matrix of accelerations and multipliers has no inverse."""
