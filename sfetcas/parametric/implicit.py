@@ -14,6 +14,7 @@ Source: Hinze, Pinnau, Ulbrich and Ulbrich 2009, section 1.6 (sensitivities and 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -21,6 +22,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseSolver
 from .arguments import Arguments
 from .results import Results
@@ -28,20 +30,23 @@ from .results import Results
 __all__ = ["Implicit", "Slopes"]
 
 SINGULAR = 1e-5
-"""Eigenvalues of the weighted matrix, usually of the size of one, below which an equilibrium is taken for singular.
+"""Eigenvalues of the weighted matrix, usually of the size of one, below which an equilibrium may be singular.
 
-Rounding of 1e-13 in the equations leaves as much over the eigenvalue in the state, which the matrix depends on: of
+Rounding of 1e-13 in the equations leaves that over the eigenvalue in the state, which the matrix depends on: of the
 derivatives no more than three digits are left.
 """
 
-ALONG = 1e-7
-"""Share of what numbers do that may act along a neutral direction, and be rounding."""
-
-PROXIMAL = 1e-10
-"""Weight on the diagonal of rotations that makes neutral directions harmless."""
+PROXIMAL = (1e-10, 1e-7)
+"""Weights on the diagonal that make neutral directions harmless: where numbers act along one both differ."""
 
 DUAL = 1e-12
 """Softness of closings that depend on each other."""
+
+EXPANDED = 600
+"""Up to this many unknowns functions are expanded to scalar operations: with more that takes longer than it gains."""
+
+APART = 1e-3
+"""Share by which the derivatives of both may differ."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +59,14 @@ class Slopes:
         Of the step by the numbers.
     answers : ndarray (answers,)
     jacobian : ndarray (answers, numbers)
-    matrix : ndarray
-        Entries of Newton's matrix.
+    entries : ndarray
+        Of Newton's matrix.
     """
 
     steps: Array
     answers: Array
     jacobian: Array
-    matrix: Array
+    entries: Array
 
 
 class Implicit:
@@ -83,6 +88,7 @@ class Implicit:
         self._weight, self._unique = weight, unique
         self._total, self._count = arguments.expressions.total, len(arguments.defaults)
         self._symmetric = self._program.model.has_potential
+        self._batches: dict[str, Batch] = {}
 
     # -- functions ----------------------------------------------------------------------------------
 
@@ -125,9 +131,31 @@ class Implicit:
         """(x, state) -> derivative of the equations by the numbers, and the entries of the matrix."""
         x, state = self._symbols
         residual = self._at(self._program.forces.residual, moved=False)
-        by_p = ca.jtimes(residual, x, self._directions(ca.DM(self._total, self._count)))
         entries = self._at(self._program.matrix.nz[:], moved=False)
+        x, state, (residual, entries) = self._expanded(residual, entries) or (x, state, (residual, entries))
+        by_p = ca.jtimes(residual, x, self._directions(ca.DM(self._total, self._count)))
         return ca.Function("equations", [x, state], [ca.densify(by_p), entries])
+
+    def _expanded(self, *results: ca.MX) -> tuple[ca.SX, ca.SX, Sequence[ca.SX]] | None:
+        """Functions of x and state as scalar operations, which are ten times as fast; None where these are too many."""
+        if self._total > EXPANDED:
+            return None
+        try:
+            function = ca.Function("whole", list(self._symbols), list(results)).expand()
+        except RuntimeError:
+            # What solves linear systems.
+            return None
+        x, state = (ca.SX.sym(symbol.name(), symbol.shape[0]) for symbol in self._symbols)
+        return x, state, function.call([x, state])
+
+    @functools.cached_property
+    def _by_all(self) -> ca.Function | None:
+        """(x, state) -> the answers, and their derivatives by x, sparse; None where :attr:`_along` is meant for it."""
+        found = self._expanded(self._told)
+        if found is None:
+            return None
+        x, state, (told,) = found
+        return ca.Function("by_all", [x, state], [told, ca.jacobian(told, x)])
 
     @functools.cached_property
     def _along(self) -> ca.Function:
@@ -169,18 +197,45 @@ class Implicit:
         SolveError
             The equilibrium is singular.
         """
-        by_p, entries = self._equations(self._x(p), state)
-        matrix, right = np.array(entries).ravel(), -np.array(by_p).reshape(self._total, self._count)
-        steps = self._solved(matrix, right)
-        answers, found = self._along(self._x(p), state, steps)
-        return Slopes(steps, np.array(answers).ravel(), np.array(found).reshape(-1, self._count), matrix)
+        by_p, entries = self._called("_equations", self._x(p), state)
+        right = -by_p.reshape(self._count, self._total).T
+        steps = self._solved(entries, right)
+        if steps is None:
+            return self._softened(p, state, entries, right)
+        return self._slopes(p, state, entries, steps)
+
+    def _slopes(self, p: Array, state: Array, entries: Array, steps: Array) -> Slopes:
+        if self._by_all is None:
+            answers, jacobian = self._called("_along", self._x(p), state, steps.T)
+            return Slopes(steps, answers, jacobian.reshape(self._count, -1).T.copy(), entries)
+        answers, values = self._called("_by_all", self._x(p), state)
+        whole = np.zeros((len(answers), self._total + self._count))
+        whole[self._filled] = values
+        return Slopes(steps, answers, whole[:, : self._total] @ steps + whole[:, self._total :], entries)
+
+    @functools.cached_property
+    def _filled(self) -> tuple[Array, Array]:
+        """Places of the derivatives of the answers by x."""
+        assert self._by_all is not None
+        row, column = self._by_all.sparsity_out(1).get_triplet()
+        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
 
     def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
-        """Second derivatives (numbers, numbers) of the answers, each times its weight."""
-        right = -np.array(self._by_step(self._x(p), state, weights)).ravel()
-        multipliers = self._transposed(slopes.matrix, right)
-        found = np.array(self._curved(self._x(p), state, weights, multipliers, slopes.steps))
+        """Second derivatives (numbers, numbers) of the answers, each times its weight and added up."""
+        (right,) = self._called("_by_step", self._x(p), state, weights)
+        multipliers = self._transposed(slopes.entries, -right)
+        (found,) = self._called("_curved", self._x(p), state, weights, multipliers, slopes.steps.T)
+        found = found.reshape(self._count, self._count)
         return 0.5 * (found + found.T)
+
+    def _called(self, name: str, *given: Array) -> list[Array]:
+        """Results of one of the functions, flat, without copies between NumPy and CasADi on the way in."""
+        if name not in self._batches:
+            self._batches[name] = Batch(getattr(self, name), 1)
+        batch = self._batches[name]
+        for i, values in enumerate(given):
+            batch.set(i, values)
+        return [found.ravel().copy() for found in batch()]
 
     # -- the linear system --------------------------------------------------------------------------
 
@@ -189,36 +244,63 @@ class Implicit:
         row, column = (np.array(part, dtype=np.intp) for part in self._program.sparsity.get_triplet())
         return row, column
 
-    def _solver(self, *, transposed: bool = False) -> SparseSolver:
-        row, column = self._places
-        rows = self._program.equations.rows
-        if not transposed:
-            return SparseSolver(self._total, row, column, rows, symmetric=self._symmetric)
-        order = np.lexsort((column, row))
-        return SparseSolver(self._total, column[order], row[order], rows, symmetric=self._symmetric)
-
     @functools.cached_property
     def _straight(self) -> SparseSolver:
-        return self._solver()
-
-    def _solved(self, matrix: Array, right: Array) -> Array:
-        """Solution for the right sides, with a look for what is singular."""
-        probe = self._weight * self._generic
-        self._straight.factor(matrix)
-        found = self._straight.solve(np.column_stack([right, probe]))
-        steps, soft = found[:, :-1], found[:, -1]
-        return steps
-
-    @functools.cached_property
-    def _generic(self) -> Array:
-        return 1.0 + 0.5 * np.sin(1.0 + np.arange(self._total))
+        row, column = self._places
+        return SparseSolver(self._total, row, column, self._rows, symmetric=self._symmetric)
 
     @functools.cached_property
     def _across(self) -> tuple[SparseSolver, Array]:
+        """That of the transposed matrix, and the order of its entries."""
         row, column = self._places
-        return self._solver(transposed=True), np.lexsort((column, row))
+        order = np.lexsort((column, row))
+        solver = SparseSolver(self._total, column[order], row[order], self._rows, symmetric=self._symmetric)
+        return solver, order
 
-    def _transposed(self, matrix: Array, right: Array) -> Array:
+    @property
+    def _rows(self) -> int:
+        return self._program.equations.rows
+
+    @functools.cached_property
+    def _generic(self) -> Array:
+        """A shape that no symmetry makes orthogonal to a neutral one."""
+        return 1.0 + 0.5 * np.sin(1.0 + np.arange(self._total))
+
+    def _solved(self, entries: Array, right: Array) -> Array | None:
+        """Solution for the right sides; None where the matrix may be singular."""
+        if not self._unique or not self._total:
+            return None if self._total else right
+        weight, generic = self._weight, self._generic
+        try:
+            self._straight.factor(entries)
+            found = self._straight.solve(np.column_stack([right, weight * generic]))
+        except np.linalg.LinAlgError:
+            return None
+        # An inverse iteration: what is soft grows by as much.
+        size, grown = (float(np.sqrt(weight @ shape**2)) for shape in (generic, found[:, -1]))
+        return found[:, :-1] if np.isfinite(found).all() and grown * SINGULAR <= size else None
+
+    def _soft(self, entries: Array, proximal: float) -> Array:
+        entries = entries.copy()
+        row, column = self._places
+        diagonal = np.flatnonzero(row == column)
+        entries[diagonal] += proximal * self._weight
+        entries[diagonal[self._total - self._rows :]] -= DUAL
+        return entries
+
+    def _softened(self, p: Array, state: Array, entries: Array, right: Array) -> Slopes:
+        """Derivatives with a little softness in all neutral directions, if none of the numbers acts along these."""
+        found = []
+        for proximal in PROXIMAL:
+            soft = self._soft(entries, proximal)
+            self._straight.factor(soft)
+            found.append(self._slopes(p, state, soft, self._straight.solve(right)))
+        one, other = (slopes.jacobian for slopes in found)
+        if not np.abs(one - other).max(initial=0.0) <= APART * np.abs(one).max(initial=0.0):
+            raise SolveError(Status.SINGULAR, "a limit point, a bifurcation, or what nothing resists")
+        return found[0]
+
+    def _transposed(self, entries: Array, right: Array) -> Array:
         solver, order = self._across
-        solver.factor(matrix[order])
+        solver.factor(entries[order])
         return solver.solve(right)
