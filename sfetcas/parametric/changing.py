@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.scene import Scene
 from ..errors import SceneError
-from .arguments import FACTOR, argument, with_numbers
+from .arguments import FACTOR, single_numbers, with_numbers
 
 __all__ = ["changed"]
 
@@ -26,15 +25,7 @@ def changed(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
     SceneError
         The scene has no such number, or accepts no such value.
     """
-    single: dict[str, float] = {}
-    for name, value in values.items():
-        known = argument(scene, name)
-        given = np.asarray(value, dtype=float).ravel()
-        if len(given) != len(known.default) or not np.isfinite(given).all():
-            count = len(known.default)
-            accepted = "a finite number" if count == 1 else f"{count} finite numbers"
-            raise SceneError(f"{name}: found {value!r}, accepted: {accepted}")
-        single |= dict(zip(known.names, given.tolist(), strict=True))
+    single = single_numbers(scene, values)
     factor = single.pop(FACTOR, None)
     if any(name.startswith("histories.") and name.count(".") == 1 for name in single):
         raise SceneError(

@@ -291,8 +291,9 @@ class _Probing:
     def _solved(self, group: tuple[int, ...], degrees: tuple[int, ...], rows: Array, values: Array) -> _Together:
         """Coefficients by what the basis is at some probes, and what data gain there."""
         entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, 1e-300)).any(axis=0))
-        coefficients = np.linalg.lstsq(rows, values[:, entries], rcond=None)[0].T
         largest = np.abs(rows).max(axis=0)
+        # Of one size, as moduli and widths are not.
+        coefficients = (np.linalg.lstsq(rows / largest, values[:, entries], rcond=None)[0] / largest[:, None]).T
         coefficients[np.abs(coefficients) * largest < 1e-3 * EXACT * self.unit[entries, None]] = 0.0
         return _Together(group, degrees, entries, coefficients)
 
