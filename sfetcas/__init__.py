@@ -6,7 +6,9 @@ The flow, in the order of the names below:
 2. :func:`solve` finds its equilibria, each with a certificate, its vibrations or its motion, to the accuracy asked for;
 3. a :class:`Solution` answers by the names of the scene; a :class:`Path` does so along a path, and :func:`switch`
    follows other branches from its bifurcations; :class:`Modes` has frequencies and shapes, a :class:`Trajectory` the
-   states of a motion, each an :class:`Instant`.
+   states of a motion, each an :class:`Instant`;
+4. :func:`parametric` makes equilibria a function of numbers of the scene, with exact first and second derivatives;
+   :func:`fit` finds such numbers from measurements, with bounds of confidence.
 
 Underneath: :func:`assemble` makes the :class:`Model` of a scene on a :class:`Mesh`; :class:`Prepared` keeps its
 solvers for repeated solves by :func:`solve_model`; :func:`equilibrium_nlp` opens the problem as a CasADi program
@@ -35,8 +37,11 @@ from .errors import SceneError, SolveError, Status
 from .mathematics.nlp import NLP, Ipopt, NLPResult, Solver
 from .mechanics.mesh import Mesh, first_mesh, uniform_mesh
 from .mechanics.model import Model, assemble
+from .parametric.arguments import Parameter
 from .parametric.changing import changed
 from .parametric.equilibrium import EquilibriumSolver
+from .parametric.fitting import Fit, Fitting, Measurement, fit, fitting
+from .parametric.solving import ParametricAnswer, ParametricEquilibrium, parametric
 from .paths.path import Branch, Path, PathPoint
 from .paths.paths import switch
 from .solvers.open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
@@ -57,11 +62,14 @@ __all__ = [
     "Equilibrium",
     "EquilibriumSolver",
     "Expect",
+    "Fit",
+    "Fitting",
     "Helix",
     "History",
     "Instant",
     "Ipopt",
     "Load",
+    "Measurement",
     "Member",
     "Mesh",
     "Model",
@@ -71,6 +79,9 @@ __all__ = [
     "Node",
     "OpenAnswer",
     "OpenProblem",
+    "Parameter",
+    "ParametricAnswer",
+    "ParametricEquilibrium",
     "Path",
     "PathPoint",
     "Polynomial",
@@ -96,7 +107,10 @@ __all__ = [
     "equilibrium_nlp",
     "export",
     "first_mesh",
+    "fit",
+    "fitting",
     "load",
+    "parametric",
     "solve",
     "solve_model",
     "switch",

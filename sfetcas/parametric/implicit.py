@@ -24,6 +24,7 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseSolver
+from ..mathematics.threads import single_threaded
 from .arguments import Arguments
 from .results import Results
 
@@ -42,7 +43,7 @@ PROXIMAL = (1e-10, 1e-7)
 DUAL = 1e-12
 """Softness of closings that depend on each other."""
 
-EXPANDED = 600
+EXPANDED = 1000
 """Up to this many unknowns functions are expanded to scalar operations: with more that takes longer than it gains."""
 
 APART = 1e-3
@@ -189,6 +190,7 @@ class Implicit:
     def _x(self, p: Array) -> Array:
         return np.concatenate([np.zeros(self._total), p])
 
+    @single_threaded
     def slopes(self, p: Array, state: Array) -> Slopes:
         """First derivatives at the equilibrium of the numbers.
 
@@ -220,6 +222,7 @@ class Implicit:
         row, column = self._by_all.sparsity_out(1).get_triplet()
         return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
 
+    @single_threaded
     def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
         """Second derivatives (numbers, numbers) of the answers, each times its weight and added up."""
         (right,) = self._called("_by_step", self._x(p), state, weights)
