@@ -108,7 +108,7 @@ class Argument:
 
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
-"""Names of numbers, or these with their ranges; None for the usual ones.  Also names of one's own, each with what it is."""
+"""Names of numbers, or these with their ranges, and names of one's own with what they are; None for the usual ones."""
 
 
 def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
@@ -209,7 +209,9 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
     value = _value(scene, path, name)
     if isinstance(value, (list, tuple)):
         count = len(value)
-        if scene.resolved_dimension == "plane" and count == 3 and path[-1] in VECTORS:
+        # Values along a member or over time are no vector, even where they are three.
+        vector = path[-1] in VECTORS and (path[-1] != "value" or (path[0] == "loads" and len(path) == 3))
+        if scene.resolved_dimension == "plane" and count == 3 and vector:
             # What is out of the plane is no number of a plane scene; moments and rotations are about z.
             about = path[-1] == "rotation" or (path[0] == "loads" and scene.loads[path[1]].type == "moment")
             chosen = [2] if about else [0, 1]

@@ -1,9 +1,9 @@
 """Parameters of a scene from what was measured of it: estimates with bounds of confidence.
 
 The sum of squares of all residuals over their standard deviations is least (for normal noise the likelihood is
-greatest).  With the derivatives ``J`` of the residuals there the covariance is ``(J^T J)^-1``, or, as second derivatives
-are exact, ``(J^T J + sum r r'')^-1``: both agree where residuals are small or the model is nearly linear.  Unknown
-deviations are taken as one, estimated from the residuals; bounds are then Student's.
+greatest).  With the derivatives ``J`` of the residuals there the covariance is ``(J^T J)^-1``, or, as second
+derivatives are exact, ``(J^T J + sum r r'')^-1``: both agree where residuals are small or the model is nearly linear.
+Deviations that are not known are taken as one, estimated from the residuals; bounds are then Student's.
 
 Source: Seber and Wild 2003, sections 2.1, 2.8 and 5.1 (estimation, confidence regions, intervals).
 """
@@ -219,7 +219,8 @@ class Fitting:
 
     def _columns(self) -> list[int]:
         """Of all numbers of the equilibrium those that are fitted."""
-        first, own = 0, []
+        first = 0
+        own: list[int] = []
         for one in self.equilibrium.parameters:
             own += range(first, first + len(one.default)) if one.name in self.parameters else []
             first += len(one.default)
@@ -341,7 +342,7 @@ def _refuse_undetermined(found: Minimum, names: tuple[str, ...]) -> None:
     if values[-1] > UNDETERMINED * values[0]:
         return
     shares = np.abs(vectors[-1])
-    taking = [names[free[i]] for i in np.argsort(-shares) if shares[i] > 0.1 * shares.max()]
+    taking = [names[free[i]] for i in np.flatnonzero(shares > 0.1 * shares.max())]
     said = f"nothing that was measured depends on {taking[0]}"
     if len(taking) > 1:
         said = f"{', '.join(taking[:-1])} and {taking[-1]} may change together so that nothing that was measured does"
@@ -406,7 +407,9 @@ class Fit:
         found = []
         for name, held in zip(self.of.numbers, self.minimum.held, strict=True):
             if held:
-                found.append(f"{name} is at an end of its range: it has no bounds, and those of others take it as known")
+                found.append(
+                    f"{name} is at an end of its range: it has no bounds, and those of others take it as known"
+                )
         if self.probability is not None and self.probability < UNLIKELY:
             share = self.chi_square / self.freedom
             found.append(f"residuals are {np.sqrt(share):.3g} times as large as their deviations say")
@@ -416,7 +419,7 @@ class Fit:
 
     @property
     def covariance(self) -> Array:
-        """Of the numbers, (numbers, numbers), from first derivatives; not a number of those at an end of their range."""
+        """Of the numbers, (numbers, numbers), from first derivatives; not a number where a range ends."""
         return self._inverse(self.minimum.jacobian.T @ self.minimum.jacobian)
 
     @functools.cached_property

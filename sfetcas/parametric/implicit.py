@@ -16,6 +16,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -130,12 +131,12 @@ class Implicit:
     @functools.cached_property
     def _equations(self) -> ca.Function:
         """(x, state) -> derivative of the equations by the numbers, and the entries of the matrix."""
-        x, state = self._symbols
         residual = self._at(self._program.forces.residual, moved=False)
         entries = self._at(self._program.matrix.nz[:], moved=False)
-        x, state, (residual, entries) = self._expanded(residual, entries) or (x, state, (residual, entries))
-        by_p = ca.jtimes(residual, x, self._directions(ca.DM(self._total, self._count)))
-        return ca.Function("equations", [x, state], [ca.densify(by_p), entries])
+        found: Any = self._expanded(residual, entries) or (*self._symbols, (residual, entries))
+        x, state, (balance, stiff) = found
+        by_p = ca.jtimes(balance, x, self._directions(ca.DM(self._total, self._count)))
+        return ca.Function("equations", [x, state], [ca.densify(by_p), stiff])
 
     def _expanded(self, *results: ca.MX) -> tuple[ca.SX, ca.SX, Sequence[ca.SX]] | None:
         """Functions of x and state as scalar operations, which are ten times as fast; None where these are too many."""

@@ -243,9 +243,7 @@ class Results:
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.places.items()]
         return np.concatenate([*nodes, *(part.ravel() for part in along)])
 
-    def expression(
-        self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False
-    ) -> ca.MX:
+    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
         """All results one after the other, rows before columns, in SI units.
 
         ``speeds`` (axes, places) are those of a motion; of what is ``short`` derivatives are, too.

@@ -1,10 +1,11 @@
-"""Equilibria of a scene as functions of its numbers: solved again and again, with exact first and second derivatives."""
+"""Equilibria of a scene as functions of its numbers: solved again and again, with exact derivatives."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -334,7 +335,8 @@ class ParametricAnswer:
         """
         solver, model = self.of.solver, self.of.solver.model
         scene = solver.arguments.scene_at(self.numbers)
-        finer = assemble(scene, model.mesh.refined(), assembly=model.assembly, scales=model.scales)
+        assembly: Any = model.assembly
+        finer = assemble(scene, model.mesh.refined(), assembly=assembly, scales=model.scales)
         program = Program(Expressions(Equations(finer, kernels="interpreted"), "interpreted"))
         given = program.given_of(finer.loading(scene.analysis.steps[-1]))
         start = transferred(model, solver.arguments.program.state(self.outcome.state), finer)
