@@ -193,6 +193,7 @@ ORDER = [
     "benchmarks.code",
     "benchmarks.accuracy",
     "benchmarks.pieces",
+    "benchmarks.derivatives",
     "benchmarks.extremes",
     "benchmarks.random_run",
     "benchmark",
@@ -212,6 +213,7 @@ PROGRAMS = (
     "benchmarks.code",
     "benchmarks.accuracy",
     "benchmarks.pieces",
+    "benchmarks.derivatives",
     "benchmarks.extremes",
     "benchmarks.random_run",
 )

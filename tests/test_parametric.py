@@ -7,7 +7,7 @@ import pytest
 import systems
 from scenes import SOFT, cantilever, four_bar, helix
 
-from sfetcas import Parameter, Scene, SceneError, SolveError, Status, parametric, solve
+from sfetcas import Parameter, Scene, SceneError, SolveError, Status, changed, parametric, solve
 from sfetcas.parametric import implicit
 from sfetcas.parametric.implicit import Implicit
 
@@ -175,6 +175,17 @@ def test_other_values_are_another_scene():
     assert answer.residual < 1e-10
     assert answer.stable is True
     assert answer.values["factor"] == 0.9
+
+
+def test_a_changed_scene_expects_nothing_of_the_old_one():
+    known = {"quantity": "nodes.B.position", "value": [1, 0, 0], "tolerance": 1.0, "step": 1.0}
+    scene = Scene.from_dict({**cantilever([0.0, 1.0]), "expect": [known]})
+    other = changed(scene, {"sections.s.EI3": 2.0, "loads.tip.value": [0.5, 0.0], "factor": 3.0})
+    assert other.expect == ()
+    assert other.analysis.steps == (3.0,)
+    assert other.loads["tip"].vector == (0.5, 0.0, 0.0)
+    assert other.sections["s"].EI3 == 2.0
+    assert parametric(scene, ["factor"], ["nodes.B.position"]).solve().residual < 1e-10
 
 
 def test_a_mesh_that_has_become_too_coarse_is_told():

@@ -504,6 +504,8 @@ def _alike(one: Model, other: Model) -> bool:
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; in the dimension that it has.
 
+    What was expected of its answers is left out.
+
     Raises
     ------
     SceneError
@@ -511,6 +513,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     """
     table = scene.to_dict()
     table["dimension"] = scene.resolved_dimension
+    table.pop("expect", None)
     for name, value in numbers.items():
         _put(scene, table, name.split("."), float(value))
     return Scene.from_dict(table)

@@ -18,7 +18,7 @@ def changed(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
 
     ``changed(scene, {"sections.strip.EI3": 2.0, "loads.tip.value": [0, 3], "factor": 0.5})``; a list takes a list of as
     many numbers (in a plane scene those of the plane), or single ones by ``loads.tip.value.1``.  ``factor`` takes the
-    place of all steps.
+    place of all steps.  What was expected of the answers is left out.
 
     Raises
     ------

@@ -83,12 +83,17 @@ class Implicit:
         Of the unknowns, on the scale of which eigenvalues are of the size of one; nothing of multipliers.
     unique : bool
         Whether closings are independent.
+
+    Attributes
+    ----------
+    total : int
+        Unknowns and multipliers.
     """
 
     def __init__(self, arguments: Arguments, results: Results, weight: Array, *, unique: bool = True) -> None:
         self._arguments, self._results, self._program = arguments, results, arguments.program
         self._weight, self._unique = weight, unique
-        self._total, self._count = arguments.expressions.total, len(arguments.defaults)
+        self.total, self._count = arguments.expressions.total, len(arguments.defaults)
         self._symmetric = self._program.model.has_potential
         self._batches: dict[str, Batch] = {}
 
@@ -97,17 +102,17 @@ class Implicit:
     @functools.cached_property
     def _symbols(self) -> tuple[ca.MX, ca.MX]:
         """Step and numbers in one, and the state that the step goes from."""
-        return ca.MX.sym("x", self._total + self._count), ca.MX.sym("state", self._program.states)
+        return ca.MX.sym("x", self.total + self._count), ca.MX.sym("state", self._program.states)
 
     def _at(self, expression: ca.MX, *, moved: bool = True) -> ca.MX:
         """An expression of the program's state and given, and of :attr:`_numbers`, after the step or before it."""
         program, (x, state) = self._program, self._symbols
-        step, p = ca.vertsplit(x, [0, self._total, self._total + self._count])
+        step, p = ca.vertsplit(x, [0, self.total, self.total + self._count])
         given = self._arguments.given(p)
         hold = ca.Function("hold", [program.state_symbol, program.symbol], [program.held_expression])
         there = hold.call([state, given], True)[0]
         if moved:
-            by = ca.MX.sym("by", self._total)
+            by = ca.MX.sym("by", self.total)
             q, y, lam = program.moved_expression(by)
             move = ca.Function("move", [program.state_symbol, by], [ca.vertcat(ca.vec(q), y, lam, program.parts[3])])
             there = move.call([there, step], True)[0]
@@ -135,12 +140,12 @@ class Implicit:
         entries = self._at(self._program.matrix.nz[:], moved=False)
         found: Any = self._expanded(residual, entries) or (*self._symbols, (residual, entries))
         x, state, (balance, stiff) = found
-        by_p = ca.jtimes(balance, x, self._directions(ca.DM(self._total, self._count)))
+        by_p = ca.jtimes(balance, x, self._directions(ca.DM(self.total, self._count)))
         return ca.Function("equations", [x, state], [ca.densify(by_p), stiff])
 
     def _expanded(self, *results: ca.MX) -> tuple[ca.SX, ca.SX, Sequence[ca.SX]] | None:
         """Functions of x and state as scalar operations, which are ten times as fast; None where these are too many."""
-        if self._total > EXPANDED:
+        if self.total > EXPANDED:
             return None
         try:
             function = ca.Function("whole", list(self._symbols), list(results)).expand()
@@ -163,7 +168,7 @@ class Implicit:
     def _along(self) -> ca.Function:
         """(x, state, steps) -> the answers, and their derivatives in directions, one for each number."""
         x, state = self._symbols
-        steps = ca.MX.sym("steps", self._total, self._count)
+        steps = ca.MX.sym("steps", self.total, self._count)
         found = ca.jtimes(self._told, x, self._directions(steps))
         return ca.Function("along", [x, state, steps], [self._told, ca.densify(found)])
 
@@ -172,15 +177,15 @@ class Implicit:
         """(x, state, weights) -> derivative of weighted answers by the step."""
         x, state = self._symbols
         weights = ca.MX.sym("weights", self._results.size)
-        found = ca.jtimes(self._told, x, weights, True)[: self._total]
+        found = ca.jtimes(self._told, x, weights, True)[: self.total]
         return ca.Function("by_step", [x, state, weights], [ca.densify(found)])
 
     @functools.cached_property
     def _curved(self) -> ca.Function:
         """(x, state, weights, multipliers, steps) -> second derivatives of weighted answers by the numbers."""
         x, state = self._symbols
-        weights, m = ca.MX.sym("weights", self._results.size), ca.MX.sym("multipliers", self._total)
-        steps = ca.MX.sym("steps", self._total, self._count)
+        weights, m = ca.MX.sym("weights", self._results.size), ca.MX.sym("multipliers", self.total)
+        steps = ca.MX.sym("steps", self.total, self._count)
         lagrangian = ca.dot(weights, self._told) + ca.dot(m, self._at(self._program.forces.residual))
         along = self._directions(steps)
         found = ca.mtimes(along.T, ca.jtimes(ca.gradient(lagrangian, x), x, along))
@@ -189,7 +194,7 @@ class Implicit:
     # -- numbers ------------------------------------------------------------------------------------
 
     def _x(self, p: Array) -> Array:
-        return np.concatenate([np.zeros(self._total), p])
+        return np.concatenate([np.zeros(self.total), p])
 
     @single_threaded
     def slopes(self, p: Array, state: Array) -> Slopes:
@@ -201,7 +206,7 @@ class Implicit:
             The equilibrium is singular.
         """
         by_p, entries = self._called("_equations", self._x(p), state)
-        right = -by_p.reshape(self._count, self._total).T
+        right = -by_p.reshape(self._count, self.total).T
         steps = self._solved(entries, right)
         if steps is None:
             return self._softened(p, state, entries, right)
@@ -212,9 +217,9 @@ class Implicit:
             answers, jacobian = self._called("_along", self._x(p), state, steps.T)
             return Slopes(steps, answers, jacobian.reshape(self._count, -1).T.copy(), entries)
         answers, values = self._called("_by_all", self._x(p), state)
-        whole = np.zeros((len(answers), self._total + self._count))
+        whole = np.zeros((len(answers), self.total + self._count))
         whole[self._filled] = values
-        return Slopes(steps, answers, whole[:, : self._total] @ steps + whole[:, self._total :], entries)
+        return Slopes(steps, answers, whole[:, : self.total] @ steps + whole[:, self.total :], entries)
 
     @functools.cached_property
     def _filled(self) -> tuple[Array, Array]:
@@ -251,14 +256,14 @@ class Implicit:
     @functools.cached_property
     def _straight(self) -> SparseSolver:
         row, column = self._places
-        return SparseSolver(self._total, row, column, self._rows, symmetric=self._symmetric)
+        return SparseSolver(self.total, row, column, self._rows, symmetric=self._symmetric)
 
     @functools.cached_property
     def _across(self) -> tuple[SparseSolver, Array]:
         """That of the transposed matrix, and the order of its entries."""
         row, column = self._places
         order = np.lexsort((column, row))
-        solver = SparseSolver(self._total, column[order], row[order], self._rows, symmetric=self._symmetric)
+        solver = SparseSolver(self.total, column[order], row[order], self._rows, symmetric=self._symmetric)
         return solver, order
 
     @property
@@ -268,12 +273,12 @@ class Implicit:
     @functools.cached_property
     def _generic(self) -> Array:
         """A shape that no symmetry makes orthogonal to a neutral one."""
-        return 1.0 + 0.5 * np.sin(1.0 + np.arange(self._total))
+        return 1.0 + 0.5 * np.sin(1.0 + np.arange(self.total))
 
     def _solved(self, entries: Array, right: Array) -> Array | None:
         """Solution for the right sides; None where the matrix may be singular."""
-        if not self._unique or not self._total:
-            return None if self._total else right
+        if not self._unique or not self.total:
+            return None if self.total else right
         weight, generic = self._weight, self._generic
         try:
             self._straight.factor(entries)
@@ -289,7 +294,7 @@ class Implicit:
         row, column = self._places
         diagonal = np.flatnonzero(row == column)
         entries[diagonal] += proximal * self._weight
-        entries[diagonal[self._total - self._rows :]] -= DUAL
+        entries[diagonal[self.total - self._rows :]] -= DUAL
         return entries
 
     def _softened(self, p: Array, state: Array, entries: Array, right: Array) -> Slopes:
