@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from ..equilibria.statics import solve
 from ..mathematics.arrays import Array
 from ..parametric.solving import ParametricAnswer, parametric
 from ..tradeoff.tables import markdown_table
-from .pieces import bar, loop
 
 __all__ = ["derivatives"]
 
@@ -27,11 +27,22 @@ EXACT = Analysis(accuracy=1e-6)
 POST, TOP = CrossSection(EI2=1.0, EI3=1.0, GJ=0.8), CrossSection(EI2=3.0, EI3=2.0, GJ=1.5)
 
 
+def bar(dimension: str = "plane", **more: Any) -> Scene:
+    """A cantilever with a force of 10 EI/L^2 across it, and what else it is given."""
+    parts: dict[str, Any] = {
+        "sections": {"unit": TOP},
+        "nodes": {"root": Node(position=[0, 0], support="clamped"), "tip": Node(position=[1, 0])},
+        "members": {"beam": Member(nodes=["root", "tip"], section="unit")},
+        "loads": {"tip": Load(type="force", node="tip", value=[0, 10])},
+    }
+    return Scene(dimension=dimension, analysis=EXACT, **(parts | more))
+
+
 def tapered() -> tuple[Scene, list[str]]:
     """A cantilever of varying stiffness with weight, a force and a moment."""
     section = CrossSection(EI3=Table(at=(0.0, 0.3, 0.6, 1.0), value=(2.0, 1.6, 1.2, 1.0)), rhoA=0.3)
-    scene = bar(turn=Load(type="moment", node="tip", value=0.5))
-    scene = scene.replace(sections={"unit": section}, gravity=[0, -2.0], analysis=EXACT)
+    loads = {"turn": Load(type="moment", node="tip", value=0.5), "tip": Load(type="force", node="tip", value=[0, 10])}
+    scene = bar(sections={"unit": section}, gravity=[0, -2.0], loads=loads)
     names = ["sections.unit.EI3.value", "sections.unit.rhoA", "loads.tip.value", "loads.turn.value", "gravity.1"]
     return scene, [*names, "factor"]
 
@@ -40,21 +51,30 @@ def turned() -> tuple[Scene, list[str]]:
     """A cantilever in space whose clamp turns."""
     tip = Load(type="force", node="tip", value=[0.3, 6, 3])
     clamp = Motion(node="root", rotation=[0.2, -0.3, 0.1])
-    scene = bar("space").replace(sections={"unit": TOP}, loads={"tip": tip}, motions={"clamp": clamp}, analysis=EXACT)
+    scene = bar("space", loads={"tip": tip}, motions={"clamp": clamp})
     names = [f"sections.unit.{key}" for key in ("EI2", "EI3", "GJ")]
     return scene, [*names, "loads.tip.value", "motions.clamp.rotation", "factor"]
 
 
 def portal(dimension: str) -> tuple[Scene, list[str]]:
     """Two posts and a beam, with unlike sections and springs at the corners."""
-    whole = loop(dimension=dimension)
-    members = {name: member.replace(section=name) for name, member in whole.members.items()}
+    nodes = {
+        "A": Node(position=[0, 0], support="clamped"),
+        "B": Node(position=[0, 1]),
+        "C": Node(position=[1, 1.1]),
+        "D": Node(position=[1, 0], support="clamped"),
+    }
+    ends = {"left": ["A", "B"], "top": ["B", "C"], "right": ["D", "C"]}
+    members = {name: Member(nodes=pair, section=name) for name, pair in ends.items()}
     sections = {"left": POST, "top": TOP, "right": POST}
     springs = {
         name: Spring(type="translational", node=name, direction=[1, 0], stiffness=1.0, rest=0.1) for name in ("B", "C")
     }
-    loads = {**whole.loads, "down": Load(type="distributed", member="top", value=[0, -2])}
-    scene = whole.replace(members=members, sections=sections, springs=springs, loads=loads, analysis=EXACT)
+    loads = {
+        "side": Load(type="force", node="B", value=[3, -1]),
+        "down": Load(type="distributed", member="top", value=[0, -2]),
+    }
+    scene = bar(dimension, nodes=nodes, members=members, sections=sections, springs=springs, loads=loads)
     names = [f"sections.{name}.EI3" for name in sections]
     names += [f"springs.{name}.{key}" for name in springs for key in ("stiffness", "rest")]
     return scene, [*names, "loads.side.value.0", "loads.side.value.1", "loads.down.value.1"]
@@ -80,9 +100,7 @@ def linkage() -> tuple[Scene, list[str]]:
     }
     loads = {"push": Load(type="force", node="C", value=[0.6, -0.4])}
     sections = {"left": POST, "top": TOP}
-    scene = Scene(
-        sections=sections, nodes=nodes, members=members, springs=springs, loads=loads, analysis=EXACT, dimension="plane"
-    )
+    scene = bar(sections=sections, nodes=nodes, members=members, springs=springs, loads=loads)
     names = [f"springs.{name}.{key}" for name in springs for key in ("stiffness", "rest")]
     return scene, [*names, "loads.push.value", "sections.left.EI3", "sections.top.EI3"]
 
@@ -90,13 +108,13 @@ def linkage() -> tuple[Scene, list[str]]:
 def bend() -> tuple[Scene, list[str]]:
     """The 45-degree bend under an oblique force."""
     end = [100.0 * np.sin(np.pi / 4), 100.0 * (1.0 - np.cos(np.pi / 4))]
-    scene = bar("space").replace(
+    scene = bar(
+        "space",
         sections={"unit": CrossSection(EI2=8e5, EI3=9e5, GJ=7e5, rhoA=0.01)},
         nodes={"root": Node(position=[0, 0], support="clamped"), "tip": Node(position=end)},
         members={"beam": Member(nodes=["root", "tip"], section="unit", shape=Arc(angle=np.pi / 4))},
         loads={"tip": Load(type="force", node="tip", value=[20, -30, 500])},
         gravity=[1.0, -1.0, -3.0],
-        analysis=EXACT,
     )
     names = [f"sections.unit.{key}" for key in ("EI2", "EI3", "GJ", "rhoA")]
     return scene, [*names, "loads.tip.value", "gravity"]
@@ -180,6 +198,8 @@ def _measured(scene: Scene, names: list[str]) -> tuple[str, ...]:
 def derivatives() -> None:
     """Milliseconds of solves and of derivatives, and how far these are from differences."""
     print(f"Derivatives of all answers by ten numbers; milliseconds, medians of {RUNS}; accuracy 1e-6\n")
-    heads = ("scene", "unknowns", "numbers", "answers", "`solve(scene)`", "cold", "warm")
-    heads = (*heads, "first", "second, of one", "first / warm", "first off", "second off")
+    heads = (
+        *("scene", "unknowns", "numbers", "answers", "`solve(scene)`", "cold", "warm"),
+        *("first", "second, of one", "first / warm", "first off", "second off"),
+    )
     print("\n".join(markdown_table(heads, [(name, *_measured(*made())) for name, made in CASES.items()])))
