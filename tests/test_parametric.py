@@ -1,13 +1,14 @@
 """Equilibria as functions of numbers: derivatives against differences and literature, names, refusals."""
 
 import functools
+from pathlib import Path
 
 import numpy as np
 import pytest
 import systems
 from scenes import SOFT, cantilever, four_bar, helix
 
-from sfetcas import Parameter, Scene, SceneError, SolveError, Status, changed, parametric, solve
+from sfetcas import Parameter, Scene, SceneError, SolveError, Status, changed, load, parametric, solve
 from sfetcas.parametric import implicit
 from sfetcas.parametric.implicit import Implicit
 
@@ -58,6 +59,14 @@ TEN = (
     "gravity.1",
     "factor",
 )
+PROBLEMS = Path(__file__).parent.parent / "problems"
+
+
+def hinged_in_space():
+    """A plane linkage in space: its hinges hold it more often than needed."""
+    return load(PROBLEMS / "fourbar_hinges_in_space.toml").to_dict()
+
+
 CASES = {
     "tapered": (tapered, TEN),
     "springs": (
@@ -70,6 +79,7 @@ CASES = {
     "sections in space": (helix, ["sections.s.GJ", "sections.s.EI2", "sections.s.EI3"]),
     "turned clamp in space": (clamp_in_space, ["motions.clamp.rotation", "motions.clamp.displacement"]),
     "followers in space": (systems.following_space, None),
+    "closings that depend on each other": (hinged_in_space, None),
 }
 
 
@@ -175,6 +185,32 @@ def test_other_values_are_another_scene():
     assert answer.residual < 1e-10
     assert answer.stable is True
     assert answer.values["factor"] == 0.9
+
+
+def test_known_derivatives_tell_where_to_begin():
+    equilibrium = parametric(Scene.from_dict(tapered()), TEN)
+    answer, values = equilibrium.solve(), {"loads.tip.value": [0.3, 4.05]}
+    before = equilibrium.solve(values, answer)
+    answer.flat_jacobian  # noqa: B018
+    after = equilibrium.solve(values, answer)
+    assert after.outcome.iterations < before.outcome.iterations
+    # Both to rounding.
+    assert flat(after) == pytest.approx(flat(before), abs=1e-11)
+    # Far away first derivatives lead nowhere.
+    far = answer.near(answer.numbers + 100.0)
+    assert far is answer.outcome.state
+
+
+def test_what_has_a_history_goes_by_its_factor():
+    table = cantilever([0.0, 2.0], histories={"on": {"t": [0, 1], "value": [0.0, 1.0]}})
+    table["loads"]["tip"]["history"] = "on"
+    table["analysis"] = {"steps": [0.5]}
+    equilibrium = parametric(Scene.from_dict(table), ["histories.on"], ["nodes.B.position"])
+    answer = equilibrium.solve({"histories.on": 0.8})
+    wanted = solve(Scene.from_dict(cantilever([0.0, 1.6]))).last.position("B")
+    # Both to the accuracy of 1e-4.
+    assert answer["nodes.B.position"] == pytest.approx(wanted, abs=1e-4)
+    assert answer.certified().position("B") == pytest.approx(wanted, abs=1e-4)
 
 
 def test_a_changed_scene_expects_nothing_of_the_old_one():

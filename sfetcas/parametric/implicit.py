@@ -86,14 +86,15 @@ class Implicit:
 
     Attributes
     ----------
-    total : int
-        Unknowns and multipliers.
+    total, turning : int
+        Unknowns and multipliers; of these the first are rotations.
     """
 
     def __init__(self, arguments: Arguments, results: Results, weight: Array, *, unique: bool = True) -> None:
         self._arguments, self._results, self._program = arguments, results, arguments.program
         self._weight, self._unique = weight, unique
         self.total, self._count = arguments.expressions.total, len(arguments.defaults)
+        self.turning = self._program.equations.turning_unknowns
         self._symmetric = self._program.model.has_potential
         self._batches: dict[str, Batch] = {}
 

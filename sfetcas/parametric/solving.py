@@ -35,6 +35,9 @@ __all__ = ["ParametricAnswer", "ParametricEquilibrium", "Values", "parametric"]
 Values = Mapping[str, ArrayLike]
 """Values of parameters by their names; what is left out has its default."""
 
+FAR = 0.3
+"""Rotation, rad, up to which first derivatives tell where to begin."""
+
 SOLVED = (Code.SOLVED, Code.UNSTABLE)
 """How a solve ends that found an equilibrium."""
 
@@ -175,7 +178,7 @@ class ParametricEquilibrium:
             There is no equilibrium, or none was found.
         """
         numbers = self.flat(values)
-        outcome = self._outcome(numbers, None if start is None else start.outcome.state)
+        outcome = self._outcome(numbers, None if start is None else start.near(numbers))
         if outcome.code not in SOLVED and start is not None:
             outcome = self._outcome(numbers, None)
         if outcome.code not in SOLVED:
@@ -265,6 +268,18 @@ class ParametricAnswer:
         if name not in known:
             raise SceneError(unknown(name, known, "such answers"), ("answers",))
         return name
+
+    def near(self, numbers: Array) -> Array:
+        """A state to begin with for other numbers: by first derivatives where these are known and do not lead far."""
+        # What has been computed already costs nothing.
+        slopes: Slopes | None = self.__dict__.get("_slopes")
+        if slopes is None:
+            return self.outcome.state
+        step = slopes.steps @ (numbers - self.numbers)
+        turning = self.of.implicit.turning
+        if not np.abs(step[:turning]).max(initial=0.0) <= FAR:
+            return self.outcome.state
+        return np.array(self.of.solver.arguments.program.move(self.outcome.state, step, 1.0)).ravel()
 
     # -- derivatives --------------------------------------------------------------------------------
 
