@@ -152,6 +152,8 @@ def test_what_was_not_measured_counts_for_nothing():
 
 TIP = "nodes.B.position"
 REFUSED = [
+    (NAMES, [("nodes.B.position", [0, 0])], "measurements.0: found .*, accepted: a Measurement"),
+    (NAMES, [Measurement("nodes.B.position", "far", 1)], "measurements.0.value: found 'far', accepted: numbers"),
     (NAMES, [], "measurements: found none, accepted: one or more"),
     ([], [Measurement(TIP, [0, 0], 1)], "parameters: found none, accepted: names of numbers of the scene"),
     (NAMES, [Measurement("nodes.C.position", [0, 0], 1)], "answers: nodes.C.position: found 'C', accepted: A, B"),

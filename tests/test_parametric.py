@@ -289,6 +289,10 @@ def stopped():
 
 
 REFUSED = [
+    (cantilever, [3], "parameters: found 3, accepted: names of numbers of the scene"),
+    (cantilever, {"loads.tip.value": (0.0,)}, r"loads.tip.value: found \(0.0,\), accepted: a range from low to high"),
+    (cantilever, {"sections.s.EI3": (0.1, np.inf)}, "EI3: found .*inf.*, accepted: a range from low to high"),
+    (cantilever, {"L": Parameter(1.0, lambda x: x)}, "found 1.0, accepted: values of numbers of the scene by their na"),
     (cantilever, ["loads.tp.value"], "loads.tp.value of loads: found 'tp', accepted: tip"),
     (cantilever, ["members.m.elements"], "members.m.elements: found a number that changes the elements"),
     (cantilever, ["loads.tip.value", "loads.tip.value.1"], "parameters: found loads.tip.value.1 more than once"),

@@ -115,7 +115,8 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
     """The arguments that are asked for."""
     chosen = asked if asked is not None else default_arguments(scene)
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
-    for name in spans:
+    for name, span in spans.items():
+        _check_asked(name, span)
         if re.fullmatch(r"loads\.[^.]+\.at|members\.[^.]+\.elements", name):
             message = "found a number that changes the elements, and with them the unknowns"
             raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
@@ -123,6 +124,17 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
         _own(scene, name, span) if isinstance(span, Parameter) else argument(scene, name, span)
         for name, span in spans.items()
     ]
+
+
+def _check_asked(name: Any, span: Any) -> None:
+    """Refuse what is no name, or no range."""
+    if not isinstance(name, str):
+        raise SceneError(f"found {name!r}, accepted: names of numbers of the scene", ("arguments",))
+    if span is None or isinstance(span, Parameter):
+        return
+    ends = np.asarray(span, dtype=object).ravel()
+    if len(ends) != 2 or not all(isinstance(x, (int, float, np.number)) and np.isfinite(x) for x in ends):
+        raise SceneError(f"found {span!r}, accepted: a range from low to high", ("arguments", name))
 
 
 def _own(scene: Scene, name: str, given: Parameter) -> Argument:
@@ -153,6 +165,8 @@ def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, f
     SceneError
         The scene has no such number, or a list of another length.
     """
+    if not isinstance(values, Mapping):
+        raise SceneError(f"found {values!r}, accepted: values of numbers of the scene by their names", ("arguments",))
     single: dict[str, float] = {}
     for name, value in values.items():
         known = argument(scene, name)

@@ -95,6 +95,10 @@ def fitting(
     """
     if not measurements:
         raise SceneError("found none, accepted: one or more", ("measurements",))
+    for i, one in enumerate(measurements):
+        if not isinstance(one, Measurement):
+            raise SceneError(f"found {one!r}, accepted: a Measurement", ("measurements", str(i)))
+    parameters = [parameters] if isinstance(parameters, str) else parameters
     asked = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters or ())
     if not asked:
         raise SceneError("found none, accepted: names of numbers of the scene", ("parameters",))
@@ -121,13 +125,18 @@ def _spans(scene: Scene, measurements: Sequence[Measurement]) -> dict[str, tuple
     for i, one in enumerate(measurements):
         for name, value in one.case.items():
             known = argument(scene, name)
-            try:
-                given = np.asarray(value, dtype=float).ravel().tolist()
-            except (TypeError, ValueError):
-                raise SceneError(f"found {value!r}, accepted: numbers", ("measurements", str(i), name)) from None
-            values.setdefault(name, list(known.default)).extend(given)
+            given = _numbers(value, ("measurements", str(i), name))
+            values.setdefault(name, list(known.default)).extend(given.tolist())
     ends = {name: (min(given), max(given)) for name, given in values.items()}
     return {name: span if span[0] < span[1] else None for name, span in ends.items()}
+
+
+def _numbers(value: ArrayLike, where: tuple[str, ...]) -> Array:
+    """Numbers in one array."""
+    try:
+        return np.asarray(value, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise SceneError(f"found {value!r}, accepted: numbers", where) from None
 
 
 def _named(quantity: str, number: int) -> tuple[str, float | None, int | None]:
@@ -201,7 +210,7 @@ class Fitting:
         if place is not None:
             size = answer.size // answer.shape[0]
             first += size * self.equilibrium.solver.results.places[name.split(".")[1]].index(place)
-        value = np.asarray(one.value, dtype=float).ravel()
+        value = _numbers(one.value, (*where, "value"))
         chosen = list(range(size))
         if component is not None:
             chosen = [component] if component < size else []
@@ -210,7 +219,7 @@ class Fitting:
         if len(value) != len(chosen):
             accepted = f"{len(chosen)} numbers" if chosen else f"a component from 0 to {size - 1}"
             raise SceneError(f"found {one.value!r}, accepted: {accepted}", (*where, "value"))
-        deviation = np.nan if one.deviation is None else np.asarray(one.deviation, dtype=float)
+        deviation = _numbers(np.nan if one.deviation is None else one.deviation, (*where, "deviation"))
         spread = np.broadcast_to(deviation, value.shape) if np.size(deviation) in (1, len(value)) else np.zeros(1)
         if one.deviation is not None and not (np.isfinite(spread) & (spread > 0.0)).all():
             raise SceneError(f"found {one.deviation!r}, accepted: above zero", (*where, "deviation"))

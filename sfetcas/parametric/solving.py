@@ -74,6 +74,8 @@ def parametric(
         A scene with contact, stops or turning axes; a number or an answer that it does not have; a number that changes
         what the model is made of, or that the model depends on in no way that is found.
     """
+    parameters = [parameters] if isinstance(parameters, str) else parameters
+    answers = [answers] if isinstance(answers, str) else answers
     refuse_search(scene, "without derivatives")
     if scene.analysis.type == "modes":
         raise SceneError("found 'modes', accepted: static, or path", ("analysis", "type"))
@@ -83,7 +85,7 @@ def parametric(
         )
     except SceneError as error:
         raise _renamed(error) from None
-    if answers is None:
+    if not answers:
         own = [one.name for one in solver.results.results if not one.name.startswith("members.")]
         solver = solver.with_results(own)
     return ParametricEquilibrium(solver, settings or Settings())
