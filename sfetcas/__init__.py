@@ -6,7 +6,9 @@ The flow, in the order of the names below:
 2. :func:`solve` finds its equilibria, each with a certificate, its vibrations or its motion, to the accuracy asked for;
 3. a :class:`Solution` answers by the names of the scene; a :class:`Path` does so along a path, and :func:`switch`
    follows other branches from its bifurcations; :class:`Modes` has frequencies and shapes, a :class:`Trajectory` the
-   states of a motion, each an :class:`Instant`.
+   states of a motion, each an :class:`Instant`;
+4. :func:`parametric` makes equilibria a function of numbers of the scene, with exact first and second derivatives;
+   :func:`fit` finds such numbers from measurements, with bounds of confidence.
 
 :func:`sweep` does this for many cases of a scene at once, from a :func:`grid` or :func:`sampled`.
 
@@ -37,8 +39,11 @@ from .errors import SceneError, SolveError, Status
 from .mathematics.nlp import NLP, Ipopt, NLPResult, Solver
 from .mechanics.mesh import Mesh, first_mesh, uniform_mesh
 from .mechanics.model import Model, assemble
+from .parametric.arguments import Parameter
 from .parametric.changing import changed
 from .parametric.equilibrium import EquilibriumSolver
+from .parametric.fitting import Fit, Fitting, Measurement, fit, fitting
+from .parametric.solving import ParametricAnswer, ParametricEquilibrium, parametric
 from .paths.path import Branch, Path, PathPoint
 from .paths.paths import switch
 from .solvers.open_problem import OpenAnswer, OpenProblem, equilibrium_nlp
@@ -64,12 +69,15 @@ __all__ = [
     "Equilibrium",
     "EquilibriumSolver",
     "Expect",
+    "Fit",
+    "Fitting",
     "Helix",
     "History",
     "Instant",
     "Ipopt",
     "Load",
     "LogNormal",
+    "Measurement",
     "Member",
     "Mesh",
     "Model",
@@ -80,6 +88,9 @@ __all__ = [
     "Normal",
     "OpenAnswer",
     "OpenProblem",
+    "Parameter",
+    "ParametricAnswer",
+    "ParametricEquilibrium",
     "Path",
     "PathPoint",
     "Polynomial",
@@ -107,8 +118,11 @@ __all__ = [
     "equilibrium_nlp",
     "export",
     "first_mesh",
+    "fit",
+    "fitting",
     "grid",
     "load",
+    "parametric",
     "sampled",
     "solve",
     "solve_model",

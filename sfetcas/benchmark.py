@@ -1,7 +1,7 @@
 """Accuracy and speed measured: ``python -m sfetcas.benchmark [NAME ...]``.
 
-Names are order, loads, size, repeated, net, path, motion, steps, code, accuracy, pieces, start and extremes; left
-out, all are run.  Another one, ``random``, stands alone, takes options (``--help``) and half an hour.
+Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, start and
+extremes; left out, all are run.  Another one, ``random``, stands alone, takes options (``--help``) and half an hour.
 
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
@@ -26,6 +26,7 @@ import numpy as np
 
 from .benchmarks.accuracy import knob
 from .benchmarks.code import code
+from .benchmarks.derivatives import derivatives
 from .benchmarks.extremes import extremes
 from .benchmarks.many import many
 from .benchmarks.motion import motion, step_cost
@@ -408,7 +409,7 @@ def start() -> None:
 
 def main(names: list[str]) -> None:
     """Run the benchmarks of these names, all by default."""
-    known = {"order": order, "loads": loads, "size": size, "repeated": repeated}
+    known = {"order": order, "loads": loads, "size": size, "repeated": repeated, "derivatives": derivatives}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
     known |= {"accuracy": knob, "pieces": pieces, "sweep": many, "start": start, "extremes": extremes}
     if names[:1] == ["random"]:

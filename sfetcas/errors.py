@@ -38,6 +38,8 @@ class Status(enum.Enum):
     STOPPED = "the motion could not be followed further"
     INTERRUPTED = "interrupted: what was computed up to then is kept"
     ITERATIONS = "the solver used up its iterations"
+    SINGULAR = "the equilibrium is singular, where derivatives do not exist"
+    UNDETERMINED = "the measurements do not determine all parameters"
     FAILED = "the solver stopped before it reached an equilibrium"
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sfetcas import benchmark
+from sfetcas.benchmarks import derivatives as benchmark_derivatives
 from sfetcas.benchmarks import many as benchmark_many
 from sfetcas.benchmarks import motion as benchmark_motion
 from sfetcas.benchmarks import random_run as benchmark_random
@@ -52,6 +53,20 @@ def test_start_is_measured(capsys, once):
     benchmark.main(["start"])
     lines = capsys.readouterr().out.strip().splitlines()
     assert [re.sub(r"[\d.]+", "", line).split() for line in lines] == [["import", "s"], ["command", "line", "s"]]
+
+
+def test_derivatives_are_measured_and_are_those_of_differences(capsys, monkeypatch):
+    monkeypatch.setattr(benchmark_derivatives, "RUNS", 1)
+    monkeypatch.setattr(
+        benchmark_derivatives, "CASES", {"linkage": benchmark_derivatives.linkage, "bend": benchmark_derivatives.bend}
+    )
+    benchmark.main(["derivatives"])
+    lines = capsys.readouterr().out.strip().splitlines()[4:]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    assert [row[0] for row in cells] == ["linkage", "bend"]
+    assert [row[2] for row in cells] == ["10", "10"]
+    # Rounding of 1e-13 over steps of 1e-2, and the rest of extrapolations.
+    assert max(float(off) for row in cells for off in row[-2:]) < 1e-7
 
 
 @pytest.mark.parametrize("members", [1, 7, 30, 100])

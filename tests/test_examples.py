@@ -75,6 +75,27 @@ def test_picture_shows_the_mechanism_at_each_moment_and_both_curves(tmp_path):
     assert on_curve == pytest.approx(module.expected(module.flexible(), "nodes.5.angle"), abs=2e-3)
 
 
+def test_a_wrong_point_of_the_strip_and_bounds_that_are_too_narrow_are_noticed(monkeypatch):
+    module = imported(FOLDER / "identification_of_stiffness.py")
+    shot, noise = module.shot, module.noise
+    monkeypatch.setattr(module, "shot", lambda force: shot(force) * (1.0 + 1e-5))
+    assert min(module.recovered().values()) > module.TOLERANCE
+    monkeypatch.setattr(module, "EXPERIMENTS", 20)
+    monkeypatch.setattr(module, "noise", lambda: 3.0 * noise())
+    assert min(module.trusted().values()) > module.TOLERANCE
+
+
+def test_picture_shows_the_strip_and_its_ellipse(tmp_path):
+    module = imported(FOLDER / "identification_of_stiffness.py")
+    figure = module.picture()
+    figure.savefig(tmp_path / "strip.png")
+    strips, ellipse = figure.axes
+    assert len(module.table()) == 5
+    curve, estimate = (ellipse.lines[i].get_xydata() for i in (0, 5))
+    assert curve.mean(axis=0) == pytest.approx(estimate[0], rel=0.01)
+    assert len(strips.lines) >= 2 * len(module.FORCES)
+
+
 def test_links_that_do_not_become_as_stiff_as_said_are_noticed(monkeypatch):
     module = imported(FOLDER / "mechanism_two_loops.py")
     scene = module.scene

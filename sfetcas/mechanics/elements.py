@@ -221,6 +221,21 @@ class Element(Components):
         """
         return self._turning_in_space() if self.space else self._turning_in_plane()
 
+    @functools.cached_property
+    def moments(self) -> ca.Function:
+        """(q, stiffness, tangent, pull) -> the moments of :attr:`turning` alone, of which derivatives are short."""
+        if self.space:
+            return self._moments_in_space()
+        q, *data = self._symbols()
+        gradient = ca.gradient(self._energy(q, *data)[0], q)
+        return self._function("moments", [q, *data], {"moments": ca.densify(ca.vec(gradient))})
+
+    def _moments_in_space(self) -> ca.Function:
+        q, *data = self._large_symbols()
+        gradient = self._of_point("gradient").map(self.order + 1)(*self._at(q), *data)[1]
+        moments = ca.mtimes(self._spins(q).T, ca.vec(self._on_nodes(gradient)))
+        return self._function("moments", [q, *data], {"moments": ca.densify(moments)})
+
     def _turning_in_plane(self) -> ca.Function:
         q, *data = self._symbols()
         energy, reach = self._energy(q, *data)

@@ -37,6 +37,7 @@ __all__ = [
     "Universal",
     "by_components",
     "by_turning",
+    "forces_by_turning",
     "name_of",
 ]
 
@@ -470,6 +471,15 @@ def by_turning(kind: Connection) -> ca.Function:
     ]
     names = ["energy", "stored", "rows", "gradient", "stiffness", "spin"]
     return ca.Function(f"turning_{name_of(kind)}", arguments, results, ["q", "u", "data", "load", "lam"], names)
+
+
+@functools.cache
+def forces_by_turning(kind: Connection) -> ca.Function:
+    """(q, u, data, load, lam) -> rows and gradient of :func:`by_turning` alone, of which derivatives are short."""
+    whole = by_turning(kind)
+    symbols = whole.sx_in()
+    found = whole.call(symbols)
+    return ca.Function(f"forces_{name_of(kind)}", symbols, [found[2], found[3]], whole.name_in(), ["rows", "gradient"])
 
 
 @functools.cache

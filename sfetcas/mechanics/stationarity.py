@@ -15,7 +15,7 @@ from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
 from .entries import Entries
 from .expressions import Expressions, Given
-from .joints import by_turning
+from .joints import by_turning, forces_by_turning
 
 __all__ = ["Forces", "Stationarity", "StationarityPlaces", "summed"]
 
@@ -66,6 +66,11 @@ class StationarityPlaces:
 class Stationarity:
     """Residual and entries of one state.
 
+    Parameters
+    ----------
+    entries : bool
+        Without them derivatives of the residual are short: what gives entries gives their derivatives, too.
+
     Attributes
     ----------
     residual : MX (unknowns + rows,)
@@ -91,8 +96,11 @@ class Stationarity:
         given: Given,
         near: ca.MX,
         forces: Forces | None = None,
+        *,
+        entries: bool = True,
     ) -> None:
         forces = forces or Forces()
+        self._expressions, self._with_entries = expressions, entries
         model = expressions.model
         closings = len(model.positions.rows)
         self.shares: list[tuple[Index, ca.MX]] = []
@@ -104,35 +112,47 @@ class Stationarity:
         if expressions.elements:
             pull = given.pull + times(expressions.closing.T, lam[:closings, :]) + forces.pull
             self.pull = pull + expressions.carried(q, given)
-            found = expressions.many(model.element.turning, expressions.elements)(
-                q[:, model.rotations.turns.ravel().tolist()],
-                given.stiffness,
-                given.tangent,
-                ca.reshape(self.pull, expressions.axes, expressions.elements * expressions.points),
-            )
-            self.moments, self.spin = ca.vec(found[2]), found[5]
+            self._bent(q, given)
             gaps += times(expressions.closing, ca.vec(expressions.tangents(q, given)) - ca.vec(given.tangent))
             turning += times(expressions.onto_rotations, self.moments)
-            closed = ca.vec(self.spin)[expressions.closed.entry.tolist()] * ca.DM(expressions.closed.value)
-            self.entries += [ca.vec(found[3]), closed, closed]
         rows = [gaps]
         first = closings
         for number, (group, sides) in enumerate(zip(model.connections, expressions.linked, strict=True)):
             n, count = len(group.data), group.kind.sizes[2]
             own = ca.reshape(lam[first : first + n * count], count, n)
             data = *expressions.sides(group, q, places), expressions.data(number, given, near)
-            found = expressions.many(by_turning(group.kind), n)(*data, expressions.link_load(number, given), own)
-            self.shares.append((sides, found[3]))
-            self.entries.append(ca.vec(found[4]))
+            function = by_turning(group.kind) if entries else forces_by_turning(group.kind)
+            found = expressions.many(function, n)(*data, expressions.link_load(number, given), own)
+            forced, acting, *stiff = found[2:] if entries else found
+            self.shares.append((sides, acting))
+            self.entries += [ca.vec(one) for one in stiff[:1]]
             if count:
-                rows.append(ca.vec(found[2]))
-                self.entries += [ca.vec(found[5]), ca.vec(found[5])]
+                rows.append(ca.vec(forced))
+                self.entries += [ca.vec(one) for one in stiff[1:] * 2]
             first += n * count
         pushed, turned_by, followed = expressions.followed(q, given)
         self.entries += followed
         self.turning, self.on_places = turning + turned_by, on_places + pushed
         self.couples = given.moment - turned_by
-        self._lam, self._rows, self._expressions = lam[:closings, :], rows, expressions
+        self._lam, self._rows = lam[:closings, :], rows
+
+    def _bent(self, q: ca.MX, given: Given) -> None:
+        """Moments of the elements, and their entries."""
+        expressions = self._expressions
+        model = expressions.model
+        arguments = (
+            q[:, model.rotations.turns.ravel().tolist()],
+            given.stiffness,
+            given.tangent,
+            ca.reshape(self.pull, expressions.axes, expressions.elements * expressions.points),
+        )
+        if not self._with_entries:
+            self.moments = ca.vec(expressions.many(model.element.moments, expressions.elements)(*arguments))
+            return
+        found = expressions.many(model.element.turning, expressions.elements)(*arguments)
+        self.moments, self.spin = ca.vec(found[2]), found[5]
+        closed = ca.vec(self.spin)[expressions.closed.entry.tolist()] * ca.DM(expressions.closed.value)
+        self.entries += [ca.vec(found[3]), closed, closed]
 
     def gathered(self, more: list[tuple[Index, ca.MX]]) -> ca.MX:
         """The residual with further shares on sides."""

@@ -9,9 +9,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..description.records import Record, plain, unknown
-from ..description.scene import Scene
+from ..description.scene import History, Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
@@ -20,10 +21,46 @@ from ..mechanics.model import Model, assemble
 from ..solvers.program import Program, data_of, is_data
 from .dependence import Dependence, Number, found
 
-__all__ = ["FACTOR", "Argument", "Arguments", "Asked", "argument", "asked_for", "default_arguments", "with_numbers"]
+__all__ = [
+    "FACTOR",
+    "Argument",
+    "Arguments",
+    "Asked",
+    "Parameter",
+    "argument",
+    "asked_for",
+    "default_arguments",
+    "single_numbers",
+    "with_numbers",
+]
 
 FACTOR = "factor"
 """The argument that multiplies all loads and motions without a history."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of one's own that several numbers of a scene follow: a length, the place of a joint on a line.
+
+    ``Parameter(1.0, lambda x: {"nodes.B.position": [x, 0], "nodes.C.position": [2 * x, 0]}, low=0.8, high=1.2)``
+
+    Attributes
+    ----------
+    value : float
+        That of the scene as it stands.
+    numbers : callable
+        Numbers of the scene for a value, by their names; smooth.
+    low, high : float or None
+        Its range, where it needs one.
+    unit, meaning : str
+    """
+
+    value: float
+    numbers: Callable[[float], Mapping[str, ArrayLike]]
+    low: float | None = None
+    high: float | None = None
+    unit: str = ""
+    meaning: str = "a number that others follow"
 
 
 @dataclass(frozen=True)
@@ -40,6 +77,8 @@ class Argument:
         The range of each number, where it needs one.
     components : tuple of int or None
         Which numbers of a list these are; None of a single number.
+    numbers : callable or None
+        Numbers of the scene for its value, of a :class:`Parameter`.
     """
 
     name: str
@@ -49,13 +88,14 @@ class Argument:
     low: float | None = None
     high: float | None = None
     components: tuple[int, ...] | None = None
+    numbers: Callable[[float], Mapping[str, ArrayLike]] | None = None
 
     @property
     def limits(self) -> tuple[float, float]:
         """Least and largest value that is accepted: its range, and of sections what is positive."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
-        if self.name.startswith("sections."):
+        if self.name.startswith("sections.") and ".polynomial" not in self.name:
             return float(np.nextafter(0.0, 1.0)), np.inf
         return (0.0 if self.name.endswith(".stiffness") else -np.inf), np.inf
 
@@ -67,15 +107,76 @@ class Argument:
         return tuple(f"{self.name}.{i}" for i in self.components)
 
 
-Asked = Sequence[str] | Mapping[str, tuple[float, float] | None] | None
-"""Names of numbers, or these with their ranges; None for the usual ones."""
+Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
+"""Names of numbers, or these with their ranges, and names of one's own with what they are; None for the usual ones."""
 
 
 def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
     """The arguments that are asked for."""
     chosen = asked if asked is not None else default_arguments(scene)
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
-    return [argument(scene, name, span) for name, span in spans.items()]
+    for name, span in spans.items():
+        _check_asked(name, span)
+        if re.fullmatch(r"loads\.[^.]+\.at|members\.[^.]+\.elements", name):
+            message = "found a number that changes the elements, and with them the unknowns"
+            raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
+    return [
+        _own(scene, name, span) if isinstance(span, Parameter) else argument(scene, name, span)
+        for name, span in spans.items()
+    ]
+
+
+def _check_asked(name: Any, span: Any) -> None:
+    """Refuse what is no name, or no range."""
+    if not isinstance(name, str):
+        raise SceneError(f"found {name!r}, accepted: names of numbers of the scene", ("arguments",))
+    if span is None or isinstance(span, Parameter):
+        return
+    ends = np.asarray(span, dtype=object).ravel()
+    if len(ends) != 2 or not all(isinstance(x, (int, float, np.number)) and np.isfinite(x) for x in ends):
+        raise SceneError(f"found {span!r}, accepted: a range from low to high", ("arguments", name))
+
+
+def _own(scene: Scene, name: str, given: Parameter) -> Argument:
+    """The argument of a parameter of one's own."""
+    if "." in name or name == FACTOR:
+        raise SceneError(f"found {name!r} for a parameter of one's own, accepted: a name without dots", ("arguments",))
+    if given.low is not None and given.high is not None and not given.low <= given.value <= given.high:
+        message = f"found {given.value:g}, accepted: a value from {given.low:g} to {given.high:g}"
+        raise SceneError(message, ("arguments", name))
+    for number, value in single_numbers(scene, given.numbers(given.value)).items():
+        (stands,) = argument(scene, number).default
+        if abs(value - stands) > SAME * max(abs(value), abs(stands)):
+            message = f"{number} is {stands:g} in the scene, but {value:g} for {given.value:g}, accepted: the same"
+            raise SceneError(message, ("arguments", name))
+    unit, meaning = given.unit or "as its numbers", given.meaning
+    return Argument(name, (float(given.value),), unit, meaning, given.low, given.high, None, given.numbers)
+
+
+SAME = 1e-9
+"""Share by which numbers of a parameter may differ from those of the scene."""
+
+
+def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, float]:
+    """Values of numbers and of lists of numbers, number by number.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such number, or a list of another length.
+    """
+    if not isinstance(values, Mapping):
+        raise SceneError(f"found {values!r}, accepted: values of numbers of the scene by their names", ("arguments",))
+    single: dict[str, float] = {}
+    for name, value in values.items():
+        known = argument(scene, name)
+        given = np.asarray(value, dtype=float).ravel()
+        if len(given) != len(known.default) or not np.isfinite(given).all():
+            count = len(known.default)
+            accepted = "a finite number" if count == 1 else f"{count} finite numbers"
+            raise SceneError(f"{name}: found {value!r}, accepted: {accepted}")
+        single |= dict(zip(known.names, given.tolist(), strict=True))
+    return single
 
 
 def default_arguments(scene: Scene) -> list[str]:
@@ -122,7 +223,9 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
     value = _value(scene, path, name)
     if isinstance(value, (list, tuple)):
         count = len(value)
-        if scene.resolved_dimension == "plane" and count == 3 and path[-1] in VECTORS:
+        # Values along a member or over time are no vector, even where they are three.
+        vector = path[-1] in VECTORS and (path[-1] != "value" or (path[0] == "loads" and len(path) == 3))
+        if scene.resolved_dimension == "plane" and count == 3 and vector:
             # What is out of the plane is no number of a plane scene; moments and rotations are about z.
             about = path[-1] == "rotation" or (path[0] == "loads" and scene.loads[path[1]].type == "moment")
             chosen = [2] if about else [0, 1]
@@ -255,13 +358,38 @@ class Arguments:
         return values
 
     def _assembled(self, values: Sequence[float]) -> Model:
-        names = [self._numbers[i].name for i in self._own]
         try:
-            scene = with_numbers(self._scene, dict(zip(names, values, strict=True)))
+            scene = with_numbers(self._scene, self._followed(values))
             assembly: Any = self._base.assembly
             return assemble(scene, self._mesh, assembly=assembly, scales=self._base.scales)
         except SceneError as error:
             raise SceneError(f"{error} (asked for by the arguments)") from None
+
+    def _followed(self, values: Sequence[float]) -> dict[str, float]:
+        """Numbers of the scene, those that follow others among them."""
+        followers = {one.name: one.numbers for one in self.arguments}
+        found: dict[str, float] = {}
+        for i, value in zip(self._own, values, strict=True):
+            name = self._numbers[i].name
+            follow = followers.get(name)
+            more = {name: value} if follow is None else single_numbers(self._scene, follow(value))
+            twice = sorted(found.keys() & more.keys())
+            if twice:
+                raise SceneError(f"found {twice[0]} in two of them, accepted: each number once", ("arguments",))
+            found |= more
+        return found
+
+    def scene_at(self, values: Array) -> Scene:
+        """The scene with these values of the numbers; the factor in the place of all steps."""
+        scene = with_numbers(self._scene, self._followed([values[i] for i in self._own]))
+        steps, histories = (self._scene.analysis.steps[-1],), dict(scene.histories)
+        for number, value in zip(self._numbers, values.tolist(), strict=True):
+            if number.name == FACTOR:
+                steps = (value,)
+            elif self._is_factor(number.name):
+                histories[number.name.partition(".")[2]] = History(t=(0.0, 1.0), value=(value, value))
+        analysis = scene.analysis.model_copy(update={"steps": steps})
+        return scene.model_copy(update={"analysis": analysis, "histories": histories})
 
     def _every(self) -> dict[str, bool]:
         names = ["stiffness", "tangent", *LOADS]
@@ -287,6 +415,9 @@ class Arguments:
             flat = self._data(model, everything)
             if flat.shape != shape:
                 raise SceneError("found arguments that change what the model is made of", ("arguments",))
+            if not _alike(model, self.model):
+                message = "found arguments that change axes or directions of supports and joints"
+                raise SceneError(f"{message}, accepted: numbers that leave these as they are", ("arguments",))
             return flat
 
         return found([self._numbers[i] for i in self._own], probe, lengths)
@@ -307,7 +438,8 @@ class Arguments:
 
         data = [name for name in sizes if is_data(name)]
         loads = [name for name in sizes if not is_data(name)]
-        rest = np.full(self._undeformed // 3, 3, dtype=np.intp)
+        # Places are judged by the size of the whole scene.
+        rest = np.array([self._undeformed], dtype=np.intp)
         found = np.concatenate([rest, *rows(data), *(rows(loads) * len(self._groups))])
         return found[found > 0]
 
@@ -370,8 +502,23 @@ class Arguments:
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
 
 
+def _alike(one: Model, other: Model) -> bool:
+    """Whether what is no data is the same: unknowns, axes, directions of guides, closings."""
+
+    def parts(model: Model) -> list[Array]:
+        positions, rotations = model.positions, model.rotations
+        maps = [positions.E, positions.Y, positions.B, positions.Z, positions.W, positions.BZ]
+        found = [part for one in maps for part in (one.row, one.column, one.value)]
+        return [*found, rotations.kind, rotations.axis, model.winding.axis, model.winding.across]
+
+    pairs = zip(parts(one), parts(other), strict=True)
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=1e-12) for a, b in pairs)
+
+
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; in the dimension that it has.
+
+    What was expected of its answers is left out.
 
     Raises
     ------
@@ -385,7 +532,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
         for key in path:
             branch = branch.setdefault(key, {})
         branch[last] = float(value)
-    tree["dimension"] = scene.resolved_dimension
+    tree |= {"dimension": scene.resolved_dimension, "expect": ()}
     found = _with(scene, tree)
     assert isinstance(found, Scene)
     return found

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.scene import Scene
 from ..errors import SceneError
-from .arguments import FACTOR, argument, with_numbers
+from .arguments import FACTOR, single_numbers, with_numbers
 
 __all__ = ["changed"]
 
@@ -19,22 +18,14 @@ def changed(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
 
     ``changed(scene, {"sections.strip.EI3": 2.0, "loads.tip.value": [0, 3], "factor": 0.5})``; a list takes a list of as
     many numbers (in a plane scene those of the plane), or single ones by ``loads.tip.value.1``.  ``factor`` takes the
-    place of all steps.
+    place of all steps.  What was expected of the answers is left out.
 
     Raises
     ------
     SceneError
         The scene has no such number, or accepts no such value.
     """
-    single: dict[str, float] = {}
-    for name, value in values.items():
-        known = argument(scene, name)
-        given = np.asarray(value, dtype=float).ravel()
-        if len(given) != len(known.default) or not np.isfinite(given).all():
-            count = len(known.default)
-            accepted = "a finite number" if count == 1 else f"{count} finite numbers"
-            raise SceneError(f"{name}: found {value!r}, accepted: {accepted}")
-        single |= dict(zip(known.names, given.tolist(), strict=True))
+    single = single_numbers(scene, values)
     factor = single.pop(FACTOR, None)
     if any(name.startswith("histories.") and name.count(".") == 1 for name in single):
         raise SceneError(

@@ -31,6 +31,9 @@ DEGREES = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 GLOBAL = 4
 """Up to this degree a polynomial holds beyond the range it was found in: stiffness goes with the fourth power."""
 
+UNLIKE = 1e3
+"""Sizes of terms that differ by more lose digits of the least squares."""
+
 MOST_PROBES = 3000
 """Probes at most for numbers that act together."""
 
@@ -291,8 +294,10 @@ class _Probing:
     def _solved(self, group: tuple[int, ...], degrees: tuple[int, ...], rows: Array, values: Array) -> _Together:
         """Coefficients by what the basis is at some probes, and what data gain there."""
         entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, 1e-300)).any(axis=0))
-        coefficients = np.linalg.lstsq(rows, values[:, entries], rcond=None)[0].T
         largest = np.abs(rows).max(axis=0)
+        # Of one size where they are as unlike as products of moduli and widths.
+        size = largest if largest.max(initial=0.0) > UNLIKE * largest.min(initial=np.inf) else np.ones(len(largest))
+        coefficients = (np.linalg.lstsq(rows / size, values[:, entries], rcond=None)[0] / size[:, None]).T
         coefficients[np.abs(coefficients) * largest < 1e-3 * EXACT * self.unit[entries, None]] = 0.0
         return _Together(group, degrees, entries, coefficients)
 

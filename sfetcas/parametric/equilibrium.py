@@ -128,6 +128,16 @@ class EquilibriumSolver:
             # A stiffness of what is singular.
             return outcome, nothing
 
+    @property
+    def unique(self) -> bool:
+        """Whether reactions and section forces are: not where closings depend on each other."""
+        return not any(note.startswith(NOT_UNIQUE) for note in self.answer.notes)
+
+    def with_results(self, names: Sequence[str]) -> EquilibriumSolver:
+        """The same solver with other results."""
+        told = Results(self.model, names, self.results.places, unique=self.unique)
+        return replace(self, results=told)
+
     def by_name(self, results: Array) -> dict[str, Array]:
         """The results by their names, in their shapes."""
         bounds = np.cumsum([0, *(result.size for result in self.results.results)]).tolist()
@@ -203,23 +213,23 @@ NOT_UNIQUE = "reactions are not unique"
 """How a note of statics begins where closings depend on each other."""
 
 
-def refuse_search(scene: Scene) -> None:
-    """Refuse what takes a search that is not exported.
+def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
+    """Refuse what takes a search that is not exported, or is ``lacking`` otherwise.
 
     Raises
     ------
     SceneError
-        Says what, and what can be exported instead.
+        Says what, and what is possible instead.
     """
     instead = "accepted: the scene without"
     if scene.contacts:
-        raise SceneError(f"contact is found by a search that is not exported, {instead}", ("contacts",))
+        raise SceneError(f"contact is found by a search that is {lacking}, {instead}", ("contacts",))
     for name, spring in scene.springs.items():
         if spring.stop is not None:
-            message = f"which stops act is found by a search that is not exported, {instead}"
+            message = f"which stops act is found by a search that is {lacking}, {instead}"
             raise SceneError(message, ("springs", name, "stop"))
     if scene.rotating is not None:
-        raise SceneError(f"turning axes are not exported, {instead}", ("rotating",))
+        raise SceneError(f"turning axes are {lacking}, {instead}", ("rotating",))
 
 
 def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:

@@ -22,6 +22,7 @@ from ..mechanics.joints import LineSpring, Spring, TurnSpring, Universal
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
 from ..mechanics.singles import turned_vector
+from ..mechanics.stationarity import Stationarity
 from ..solvers.program import Program
 
 __all__ = ["Result", "Results", "default_motion_results", "default_results"]
@@ -242,16 +243,21 @@ class Results:
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.places.items()]
         return np.concatenate([*nodes, *(part.ravel() for part in along)])
 
-    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None) -> ca.MX:
-        """All results one after the other, rows before columns, in SI units; ``speeds`` (axes, places) of a motion."""
-        told = _Told(self, program, rest, speeds)
+    def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
+        """All results one after the other, rows before columns, in SI units.
+
+        ``speeds`` (axes, places) are those of a motion; of what is ``short`` derivatives are, too.
+        """
+        told = _Told(self, program, rest, speeds, program.forces if short else program.stationarity)
         return ca.vertcat(*(ca.densify(ca.vec(told.value(result.name).T)) for result in self.results))
 
 
 class _Told:
     """The values of results."""
 
-    def __init__(self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None = None) -> None:
+    def __init__(
+        self, results: Results, program: Program, rest: ca.MX, speeds: ca.MX | None, found: Stationarity
+    ) -> None:
         self._speeds = speeds
         self._results, self._program = results, program
         self._model, self._expressions = program.model, program.expressions
@@ -259,7 +265,7 @@ class _Told:
         self._q, self._y, self._lam, self._near = program.parts
         places = expressions.displacements(self._q, self._y, program.given)
         self._places = ca.reshape(places, expressions.axes, expressions.places)
-        self._found = program.stationarity
+        self._found = found
         count = len(model.nodes)
         along = [len(x) for x in results.places.values()]
         bounds = np.cumsum([0, 3 * count, *(3 * n for n in along)]).tolist()

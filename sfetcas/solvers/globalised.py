@@ -24,7 +24,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from .program import Program
 
-__all__ = ["MEANINGS", "Code", "Globalised", "Outcome", "Rules"]
+__all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Outcome", "Rules"]
 
 
 class Code(enum.IntEnum):

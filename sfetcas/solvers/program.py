@@ -283,9 +283,17 @@ class Program:
     @functools.cached_property
     def stationarity(self) -> Stationarity:
         """The equations at :attr:`parts`."""
+        return self._stationarity(entries=True)
+
+    @functools.cached_property
+    def forces(self) -> Stationarity:
+        """The same without entries of the matrix: what derivatives are taken of."""
+        return self._stationarity(entries=False)
+
+    def _stationarity(self, *, entries: bool) -> Stationarity:
         _, (q, y, lam, near) = self._symbols
         places = self.expressions.displacements(q, y, self.given)
-        return Stationarity(self.expressions, q, y, lam, places, self.given, near)
+        return Stationarity(self.expressions, q, y, lam, places, self.given, near, entries=entries)
 
     @functools.cached_property
     def places(self) -> StationarityPlaces:

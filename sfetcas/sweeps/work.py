@@ -106,6 +106,8 @@ def _outcome(job: Job, values: Sequence[float]) -> Outcome:
     try:
         with np.errstate(over="raise"):
             scene = changed(job.scene, dict(zip(job.names, values, strict=True)))
+            # What is expected says at which times and factors there are answers.
+            scene = scene.model_copy(update={"expect": job.scene.expect})
             begin = time.perf_counter()
             answer = solve(scene, job.settings)
             seconds = time.perf_counter() - begin

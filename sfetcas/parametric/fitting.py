@@ -1,0 +1,499 @@
+"""Parameters of a scene from what was measured of it: estimates with bounds of confidence.
+
+The sum of squares of all residuals over their standard deviations is least (for normal noise the likelihood is
+greatest).  With the derivatives ``J`` of the residuals there the covariance is ``(J^T J)^-1``, or, as second
+derivatives are exact, ``(J^T J + sum r r'')^-1``: both agree where residuals are small or the model is nearly linear.
+Deviations that are not known are taken as one, estimated from the residuals; bounds are then Student's.
+
+Source: Seber and Wild 2003, sections 2.1, 2.8 and 5.1 (estimation, confidence regions, intervals).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.scene import Scene
+from ..equilibria.settings import Settings
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.distributions import chi_square_tail, normal_quantile, student_quantile
+from ..mathematics.least_squares import Evaluated, Minimum, least_squares
+from .arguments import Asked, argument
+from .solving import ParametricAnswer, ParametricEquilibrium, Values, parametric
+
+__all__ = ["Fit", "Fitting", "Measurement", "fit", "fitting"]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was measured of one load case.
+
+    Attributes
+    ----------
+    quantity : str
+        As in the answer: ``nodes.tip.position``, ``springs.k.angle``, ``reactions.A.force``; along a member with a
+        place, ``members.beam.position at 0.5``; one component by its number, ``nodes.tip.position.1``.
+    value : number or list of numbers
+        SI units; of a vector in the plane two are enough, and what was not measured is not a number (``nan``).
+    deviation : number, list or None
+        Standard deviation of the noise; None where it is not known: then of none, and all are taken to have the same.
+    case : mapping
+        Numbers of the scene that are others than there: ``{"loads.tip.value": [0, 3]}``.
+    """
+
+    quantity: str
+    value: ArrayLike
+    deviation: ArrayLike | None = None
+    case: Values = field(default_factory=dict)
+
+
+def fit(
+    scene: Scene,
+    parameters: Asked,
+    measurements: Sequence[Measurement],
+    *,
+    start: Values | None = None,
+    settings: Settings | None = None,
+) -> Fit:
+    """Parameters by which a scene is nearest to what was measured.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its own numbers are where the search begins, and decide the mesh.
+    parameters : as of :func:`~sfetcas.parametric.solving.parametric`
+        Ranges are bounds of the search.
+    measurements : sequence of Measurement
+    start : mapping, optional
+        Where the search begins instead.
+    settings : Settings, optional
+
+    Raises
+    ------
+    SceneError
+        What is measured, or asked for, is not there; fewer measurements than parameters.
+    SolveError
+        No equilibrium at the start, no least sum of squares, or parameters that the measurements do not determine.
+    """
+    return fitting(scene, parameters, measurements, settings=settings).fit(start=start)
+
+
+def fitting(
+    scene: Scene, parameters: Asked, measurements: Sequence[Measurement], *, settings: Settings | None = None
+) -> Fitting:
+    """The same prepared: measured values may then be others, as for many experiments of one kind.
+
+    Raises
+    ------
+    SceneError
+        As of :func:`fit`.
+    """
+    if not measurements:
+        raise SceneError("found none, accepted: one or more", ("measurements",))
+    for i, one in enumerate(measurements):
+        if not isinstance(one, Measurement):
+            raise SceneError(f"found {one!r}, accepted: a Measurement", ("measurements", str(i)))
+    parameters = [parameters] if isinstance(parameters, str) else parameters
+    asked = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters or ())
+    if not asked:
+        raise SceneError("found none, accepted: names of numbers of the scene", ("parameters",))
+    spans = _spans(scene, measurements)
+    twice = sorted(asked.keys() & spans.keys())
+    if twice:
+        raise SceneError(f"found {twice[0]} in a case, accepted: parameters that no case gives", ("parameters",))
+    places: dict[str, list[float]] = {}
+    names: list[str] = []
+    for i, one in enumerate(measurements):
+        name, place, _ = _named(one.quantity, i)
+        names += [name] if name not in names else []
+        if place is not None:
+            own = places.setdefault(name.split(".")[1], [])
+            own += [place] if place not in own else []
+    equilibrium = parametric(scene, asked | spans, names, places=places, settings=settings)
+    chosen = [i for i, one in enumerate(equilibrium.parameters) if one.name in asked]
+    return Fitting(equilibrium, tuple(measurements), tuple(equilibrium.parameters[i].name for i in chosen))
+
+
+def _spans(scene: Scene, measurements: Sequence[Measurement]) -> dict[str, tuple[float, float] | None]:
+    """Numbers that cases give, with the range that they have there."""
+    values: dict[str, list[float]] = {}
+    for i, one in enumerate(measurements):
+        for name, value in one.case.items():
+            known = argument(scene, name)
+            given = _numbers(value, ("measurements", str(i), name))
+            values.setdefault(name, list(known.default)).extend(given.tolist())
+    ends = {name: (min(given), max(given)) for name, given in values.items()}
+    return {name: span if span[0] < span[1] else None for name, span in ends.items()}
+
+
+def _numbers(value: ArrayLike, where: tuple[str, ...]) -> Array:
+    """Numbers in one array."""
+    try:
+        return np.asarray(value, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise SceneError(f"found {value!r}, accepted: numbers", where) from None
+
+
+def _named(quantity: str, number: int) -> tuple[str, float | None, int | None]:
+    """Name of the answer, place along a member, and component of what was measured."""
+    where = ("measurements", str(number), "quantity")
+    name, at, place = (part.strip() for part in quantity.partition(" at "))
+    head, _, last = name.rpartition(".")
+    component = int(last) if last.isdigit() and head.count(".") == 2 else None
+    name = name if component is None else head
+    if name.startswith("members.") != bool(at):
+        accepted = "members.NAME.QUANTITY at FRACTION, and no place for all others"
+        raise SceneError(f"found {quantity!r}, accepted: {accepted}", where)
+    try:
+        return name, float(place) if at else None, component
+    except ValueError:
+        raise SceneError(f"found {quantity!r}, accepted: a fraction of the length after 'at'", where) from None
+
+
+class Fitting:
+    """Measurements of a scene and its equilibrium as a function of parameters; made by :func:`fitting`.
+
+    Attributes
+    ----------
+    equilibrium : ParametricEquilibrium
+        Of the parameters and of what cases give.
+    measurements : tuple of Measurement
+    parameters : tuple of str
+        Names of what is fitted.
+    cases : tuple of mapping
+        The load cases, each once.
+    """
+
+    def __init__(
+        self, equilibrium: ParametricEquilibrium, measurements: tuple[Measurement, ...], parameters: tuple[str, ...]
+    ) -> None:
+        self.equilibrium, self.measurements, self.parameters = equilibrium, measurements, parameters
+        self.cases: tuple[Values, ...] = ()
+        rows: list[list[int]] = []
+        values: list[list[float]] = []
+        deviations: list[list[float]] = []
+        self._case: list[int] = []
+        for i, one in enumerate(measurements):
+            chosen, value, deviation = self._measured(one, i)
+            self._case += [self._case_of(one)] * len(chosen)
+            rows, values, deviations = [*rows, chosen], [*values, value], [*deviations, deviation]
+        self.values, self._deviations = np.concatenate(values), np.concatenate(deviations)
+        self._row, self._cases = np.concatenate(rows).astype(np.intp), np.array(self._case)
+        self._own = self._columns()
+        self._check()
+
+    # -- what was measured --------------------------------------------------------------------------
+
+    def _case_of(self, one: Measurement) -> int:
+        flat = {name: np.asarray(x, dtype=float).ravel().tolist() for name, x in sorted(one.case.items())}
+        for i, known in enumerate(self.cases):
+            if known == flat:
+                return i
+        self.cases = (*self.cases, flat)
+        return len(self.cases) - 1
+
+    def _measured(self, one: Measurement, number: int) -> tuple[list[int], list[float], list[float]]:
+        """Rows of the flat answers, values and deviations of one measurement."""
+        where = ("measurements", str(number))
+        name, place, component = _named(one.quantity, number)
+        first = 0
+        for answer in self.equilibrium.answers:
+            if answer.name == name:
+                break
+            first += answer.size
+        size = answer.shape[-1] if answer.shape else 1
+        if place is not None:
+            size = answer.size // answer.shape[0]
+            first += size * self.equilibrium.solver.results.places[name.split(".")[1]].index(place)
+        value = _numbers(one.value, (*where, "value"))
+        chosen = list(range(size))
+        if component is not None:
+            chosen = [component] if component < size else []
+        elif len(value) == 2 and size == 3 and not self.equilibrium.solver.model.space:
+            chosen = [0, 1]
+        if len(value) != len(chosen):
+            accepted = f"{len(chosen)} numbers" if chosen else f"a component from 0 to {size - 1}"
+            raise SceneError(f"found {one.value!r}, accepted: {accepted}", (*where, "value"))
+        deviation = _numbers(np.nan if one.deviation is None else one.deviation, (*where, "deviation"))
+        spread = np.broadcast_to(deviation, value.shape) if np.size(deviation) in (1, len(value)) else np.zeros(1)
+        if one.deviation is not None and not (np.isfinite(spread) & (spread > 0.0)).all():
+            raise SceneError(f"found {one.deviation!r}, accepted: above zero", (*where, "deviation"))
+        there = np.flatnonzero(np.isfinite(value)).tolist()
+        return [first + chosen[i] for i in there], value[there].tolist(), spread[there].tolist()
+
+    def _columns(self) -> list[int]:
+        """Of all numbers of the equilibrium those that are fitted."""
+        first = 0
+        own: list[int] = []
+        for one in self.equilibrium.parameters:
+            own += range(first, first + len(one.default)) if one.name in self.parameters else []
+            first += len(one.default)
+        return own
+
+    def _check(self) -> None:
+        """Refuse too few measurements, and deviations of some only."""
+        unknown, count = np.isnan(self._deviations), len(self._own)
+        if unknown.any() and not unknown.all():
+            raise SceneError("found deviations of some, accepted: of all, or of none", ("measurements",))
+        if len(self.values) < count + bool(unknown.any()):
+            more = "" if not unknown.any() else ", and one more as their deviation is not known"
+            message = f"found {len(self.values)} numbers, accepted: as many as parameters, {count}{more}"
+            raise SceneError(message, ("measurements",))
+        units = {answer.unit for answer in self.equilibrium.answers}
+        if unknown.any() and len(units) > 1:
+            accepted = "a deviation of each, as they are of different units"
+            raise SceneError(f"found {' and '.join(sorted(units))}, accepted: {accepted}", ("measurements",))
+
+    @property
+    def known(self) -> bool:
+        """Whether deviations are."""
+        return not np.isnan(self._deviations).any()
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations, one each where they are not known."""
+        return self._deviations if self.known else np.ones(len(self._deviations))
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """A name for each number that is fitted."""
+        return tuple(self.equilibrium.numbers[i] for i in self._own)
+
+    # -- the fit ------------------------------------------------------------------------------------
+
+    def limits(self) -> tuple[Array, Array]:
+        """Least and largest values of the numbers."""
+        known = [one for one in self.equilibrium.parameters if one.name in self.parameters]
+        ends = np.array([one.limits for one in known for _ in one.default])
+        return ends[:, 0], ends[:, 1]
+
+    def fit(self, values: ArrayLike | None = None, start: Values | None = None) -> Fit:
+        """The parameters by which the residuals are least.
+
+        Parameters
+        ----------
+        values : (measured numbers,), optional
+            Instead of those measured, in the order of :attr:`values`.
+        start : mapping, optional
+            Where the search begins, the scene's own numbers without.
+
+        Raises
+        ------
+        SolveError
+            No equilibrium at the start, no least sum of squares, or parameters that are not determined.
+        """
+        measured = self.values if values is None else np.asarray(values, dtype=float).ravel()
+        if measured.shape != self.values.shape or not np.isfinite(measured).all():
+            raise SceneError(f"found {values!r}, accepted: {len(self.values)} finite numbers", ("values",))
+        begin = self.equilibrium.flat(start)[self._own]
+        low, high = self.limits()
+        width = np.where(np.isfinite(high - low), high - low, 0.0)
+        scale = np.maximum(np.abs(begin), width)
+        scale = np.where(scale > 0.0, scale, 1.0)
+        search = _Search(self, measured, scale)
+        found = least_squares(search, begin / scale, low / scale, high / scale)
+        if found is None:
+            raise search.failure or SolveError(Status.FAILED, "the search found no start")
+        if not found.converged:
+            raise SolveError(Status.ITERATIONS, f"{found.iterations} steps towards the least sum of squares", search)
+        _refuse_undetermined(found, self.numbers)
+        return Fit(self, measured, scale, found, tuple(search.reached))
+
+
+class _Search:
+    """Residuals over their deviations at scaled numbers; each case begins where it was last accepted."""
+
+    def __init__(self, fitting: Fitting, measured: Array, scale: Array) -> None:
+        self._of, self._measured, self._scale = fitting, measured, scale
+        self.reached: list[ParametricAnswer] = []
+        self.failure: SolveError | None = None
+
+    def __call__(self, x: Array) -> Evaluated | None:
+        starts: Sequence[ParametricAnswer | None] = self.reached or [None] * len(self._of.cases)
+        try:
+            found = [self._solved(x, case, start) for case, start in zip(self._of.cases, starts, strict=True)]
+            told = np.stack([np.concatenate([np.ravel(a) for a in one.answers.values()]) for one in found])
+        except SolveError as error:
+            self.failure = error
+            return None
+        residuals = told[self._of._cases, self._of._row] - self._measured
+        return Evaluated(residuals / self._of.deviations, lambda: self._jacobian(found))
+
+    def _solved(self, x: Array, case: Values, start: ParametricAnswer | None) -> ParametricAnswer:
+        equilibrium = self._of.equilibrium
+        numbers = equilibrium.flat(case)
+        numbers[self._of._own] = x * self._scale
+        return equilibrium.solve(equilibrium.by_parameter(numbers), start)
+
+    def _jacobian(self, found: list[ParametricAnswer]) -> Array:
+        # What derivatives are asked of was accepted.
+        self.reached = found
+        whole = np.stack([one.flat_jacobian[:, self._of._own] for one in found])
+        rows = whole[self._of._cases, self._of._row] * self._scale
+        return np.asarray(rows / self._of.deviations[:, None])
+
+
+UNDETERMINED = 1e-7
+"""Share of the largest singular value, of parameters over their size, below which a direction is not determined."""
+
+
+def _refuse_undetermined(found: Minimum, names: tuple[str, ...]) -> None:
+    """Refuse what no measurement depends on, alone or together."""
+    free = np.flatnonzero(~found.held)
+    if not len(free):
+        return
+    _, values, vectors = np.linalg.svd(found.jacobian[:, free], full_matrices=False)
+    if values[-1] > UNDETERMINED * values[0]:
+        return
+    shares = np.abs(vectors[-1])
+    taking = [names[free[i]] for i in np.flatnonzero(shares > 0.1 * shares.max())]
+    said = f"nothing that was measured depends on {taking[0]}"
+    if len(taking) > 1:
+        said = f"{', '.join(taking[:-1])} and {taking[-1]} may change together so that nothing that was measured does"
+    raise SolveError(Status.UNDETERMINED, said, found)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Parameters with their bounds of confidence.
+
+    Attributes
+    ----------
+    of : Fitting
+    measured : ndarray (measured,)
+    scale : ndarray (numbers,)
+        Sizes of the numbers.
+    minimum : Minimum
+        Where the search ended, for numbers over their sizes.
+    answers : tuple of ParametricAnswer
+        The equilibrium of each case there.
+    """
+
+    of: Fitting
+    measured: Array
+    scale: Array
+    minimum: Minimum
+    answers: tuple[ParametricAnswer, ...]
+
+    @property
+    def estimates(self) -> dict[str, float]:
+        """The numbers by their names."""
+        return dict(zip(self.of.numbers, (self.minimum.x * self.scale).tolist(), strict=True))
+
+    @property
+    def residuals(self) -> Array:
+        """Computed less measured values, (measured,), SI units."""
+        return self.minimum.here.residuals * self.of.deviations
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom: measured numbers less those that are free."""
+        return len(self.measured) - int((~self.minimum.held).sum())
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of the squares of residuals over deviations; over the freedom it is near one where the model is right."""
+        return float(self.minimum.here.residuals @ self.minimum.here.residuals)
+
+    @property
+    def probability(self) -> float | None:
+        """How often noise alone would leave more than this; None where deviations are not known."""
+        return chi_square_tail(self.chi_square, self.freedom) if self.of.known and self.freedom else None
+
+    @property
+    def deviation(self) -> float | None:
+        """The standard deviation of the noise as the residuals tell it, where it is not known."""
+        return None if self.of.known else float(np.sqrt(self.chi_square / self.freedom))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know about the bounds."""
+        found = []
+        for name, held in zip(self.of.numbers, self.minimum.held, strict=True):
+            if held:
+                found.append(
+                    f"{name} is at an end of its range: it has no bounds, and those of others take it as known"
+                )
+        if self.probability is not None and self.probability < UNLIKELY:
+            share = self.chi_square / self.freedom
+            found.append(f"residuals are {np.sqrt(share):.3g} times as large as their deviations say")
+        return tuple(found)
+
+    # -- confidence ---------------------------------------------------------------------------------
+
+    @property
+    def covariance(self) -> Array:
+        """Of the numbers, (numbers, numbers), from first derivatives; not a number where a range ends."""
+        return self._inverse(self.minimum.jacobian.T @ self.minimum.jacobian)
+
+    @functools.cached_property
+    def full_covariance(self) -> Array:
+        """The same from second derivatives, too."""
+        size = len(self.minimum.x)
+        curved: Array = np.zeros((size, size))
+        shares = self.minimum.here.residuals / self.of.deviations
+        for i, answer in enumerate(self.answers):
+            weights = np.zeros(self.of.equilibrium.solver.results.size)
+            np.add.at(weights, self.of._row[self.of._cases == i], shares[self.of._cases == i])
+            curved += answer.flat_hessian(weights)[np.ix_(self.of._own, self.of._own)]
+        curved *= np.outer(self.scale, self.scale)
+        return self._inverse(self.minimum.jacobian.T @ self.minimum.jacobian + curved)
+
+    def _inverse(self, information: Array) -> Array:
+        free = np.ix_(~self.minimum.held, ~self.minimum.held)
+        found = np.full(information.shape, np.nan)
+        size = np.sqrt(np.diag(information[free]))
+        found[free] = np.linalg.inv(information[free] / np.outer(size, size)) / np.outer(size, size)
+        share = 1.0 if self.of.known else self.chi_square / self.freedom
+        return np.asarray(share * found * np.outer(self.scale, self.scale))
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations of the numbers."""
+        return dict(zip(self.of.numbers, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def correlation(self) -> Array:
+        """Of the numbers, (numbers, numbers)."""
+        size = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(size, size))
+
+    def bounds(self, confidence: float = 0.95, *, full: bool = False) -> dict[str, tuple[float, float]]:
+        """Least and largest value of each number by itself, with a confidence.
+
+        ``full`` takes second derivatives into account.
+        """
+        if not 0.0 < confidence < 1.0:
+            raise SceneError(f"found {confidence:g}, accepted: between 0 and 1", ("confidence",))
+        p = 0.5 * (1.0 + confidence)
+        wide = normal_quantile(p) if self.of.known else student_quantile(p, self.freedom)
+        size = wide * np.sqrt(np.diag(self.full_covariance if full else self.covariance))
+        middle = self.minimum.x * self.scale
+        pairs = zip((middle - size).tolist(), (middle + size).tolist(), strict=True)
+        return dict(zip(self.of.numbers, pairs, strict=True))
+
+    def ellipse(self, first: str, second: str, confidence: float = 0.95, points: int = 100) -> Array:
+        """The curve (points, 2) that holds two numbers together with a confidence."""
+        places = [self._place(name) for name in (first, second)]
+        tail = 1.0 - confidence
+        # Chi-square of two degrees of freedom, and twice Fisher's distribution of two and as many as there are.
+        n = self.freedom
+        square = -2.0 * np.log(tail) if self.of.known else n * (tail ** (-2.0 / n) - 1.0)
+        turn = np.linspace(0.0, 2.0 * np.pi, points)
+        circle = np.sqrt(square) * np.column_stack([np.cos(turn), np.sin(turn)])
+        covariance = self.covariance[np.ix_(places, places)]
+        return np.asarray((self.minimum.x * self.scale)[places] + circle @ np.linalg.cholesky(covariance).T)
+
+    def _place(self, name: str) -> int:
+        if name not in self.of.numbers:
+            raise SceneError(f"found {name!r}, accepted: {', '.join(self.of.numbers)}", ("parameters",))
+        return self.of.numbers.index(name)
+
+
+UNLIKELY = 1e-3
+"""Probability below which residuals are too large for their deviations."""

@@ -1,0 +1,316 @@
+"""Derivatives of answers of an equilibrium by numbers, first and second, from its equations.
+
+Near an equilibrium a state is told by a *step* of all unknowns and multipliers from it, after held rotations have
+moved to where the numbers say.  With the equations ``F(step, p) = 0`` and the answers ``a(step, p)``, both in this
+step, ``K = dF/dstep`` and ``S = dstep/dp = -K^-1 dF/dp``
+
+    da/dp = a_step S + a_p,      K^T m = -a_step^T,      d2a/dp2 = [S; I]^T d2(a + m.F) [S; I],
+
+exact whatever the step means, as long as it means the same in both.
+
+Source: Hinze, Pinnau, Ulbrich and Ulbrich 2009, section 1.6 (sensitivities and adjoints; the second derivatives).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Batch
+from ..mathematics.linear import SparseSolver
+from ..mathematics.threads import single_threaded
+from .arguments import Arguments
+from .results import Results
+
+__all__ = ["Implicit", "Slopes"]
+
+SINGULAR = 1e-5
+"""Eigenvalues of the weighted matrix, usually of the size of one, below which an equilibrium may be singular.
+
+Rounding of 1e-13 in the equations leaves that over the eigenvalue in the state, which the matrix depends on: of the
+derivatives no more than three digits are left.
+"""
+
+PROXIMAL = (1e-10, 1e-7)
+"""Weights on the diagonal that make neutral directions harmless: where numbers act along one both differ."""
+
+DUAL = 1e-12
+"""Softness of closings that depend on each other."""
+
+EXPANDED = 1000
+"""Up to this many unknowns functions are expanded to scalar operations: with more that takes longer than it gains."""
+
+APART = 1e-3
+"""Share by which the derivatives of both may differ."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """First derivatives at one equilibrium.
+
+    Attributes
+    ----------
+    steps : ndarray (total, numbers)
+        Of the step by the numbers.
+    answers : ndarray (answers,)
+    jacobian : ndarray (answers, numbers)
+    entries : ndarray
+        Of Newton's matrix.
+    """
+
+    steps: Array
+    answers: Array
+    jacobian: Array
+    entries: Array
+
+
+class Implicit:
+    """Derivatives of the answers of one program.
+
+    Parameters
+    ----------
+    arguments : Arguments
+    results : Results
+        The answers.
+    weight : ndarray (total,)
+        Of the unknowns, on the scale of which eigenvalues are of the size of one; nothing of multipliers.
+    unique : bool
+        Whether closings are independent.
+
+    Attributes
+    ----------
+    total, turning : int
+        Unknowns and multipliers; of these the first are rotations.
+    """
+
+    def __init__(self, arguments: Arguments, results: Results, weight: Array, *, unique: bool = True) -> None:
+        self._arguments, self._results, self._program = arguments, results, arguments.program
+        self._weight, self._unique = weight, unique
+        self.total, self._count = arguments.expressions.total, len(arguments.defaults)
+        self.turning = self._program.equations.turning_unknowns
+        self._symmetric = self._program.model.has_potential
+        self._batches: dict[str, Batch] = {}
+
+    # -- functions ----------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _symbols(self) -> tuple[ca.MX, ca.MX]:
+        """Step and numbers in one, and the state that the step goes from."""
+        return ca.MX.sym("x", self.total + self._count), ca.MX.sym("state", self._program.states)
+
+    def _at(self, expression: ca.MX, *, moved: bool = True) -> ca.MX:
+        """An expression of the program's state and given, and of :attr:`_numbers`, after the step or before it."""
+        program, (x, state) = self._program, self._symbols
+        step, p = ca.vertsplit(x, [0, self.total, self.total + self._count])
+        given = self._arguments.given(p)
+        hold = ca.Function("hold", [program.state_symbol, program.symbol], [program.held_expression])
+        there = hold.call([state, given], True)[0]
+        if moved:
+            by = ca.MX.sym("by", self.total)
+            q, y, lam = program.moved_expression(by)
+            move = ca.Function("move", [program.state_symbol, by], [ca.vertcat(ca.vec(q), y, lam, program.parts[3])])
+            there = move.call([there, step], True)[0]
+        function = ca.Function("at", [self._numbers, program.state_symbol, program.symbol], [ca.densify(expression)])
+        return function.call([p, there, given], True)[0]
+
+    @functools.cached_property
+    def _numbers(self) -> ca.MX:
+        return ca.MX.sym("p", self._count)
+
+    @functools.cached_property
+    def _told(self) -> ca.MX:
+        """The answers after a step."""
+        undeformed = self._arguments.undeformed(self._numbers)
+        return self._at(self._results.expression(self._program, undeformed, short=True))
+
+    def _directions(self, steps: ca.MX | ca.DM) -> ca.MX:
+        """Directions of step and numbers, one for each number."""
+        return ca.vertcat(steps, ca.DM.eye(self._count))
+
+    @functools.cached_property
+    def _equations(self) -> ca.Function:
+        """(x, state) -> derivative of the equations by the numbers, and the entries of the matrix."""
+        residual = self._at(self._program.forces.residual, moved=False)
+        entries = self._at(self._program.matrix.nz[:], moved=False)
+        found: Any = self._expanded(residual, entries) or (*self._symbols, (residual, entries))
+        x, state, (balance, stiff) = found
+        by_p = ca.jtimes(balance, x, self._directions(ca.DM(self.total, self._count)))
+        return ca.Function("equations", [x, state], [ca.densify(by_p), stiff])
+
+    def _expanded(self, *results: ca.MX) -> tuple[ca.SX, ca.SX, Sequence[ca.SX]] | None:
+        """Functions of x and state as scalar operations, which are ten times as fast; None where these are too many."""
+        if self.total > EXPANDED:
+            return None
+        try:
+            function = ca.Function("whole", list(self._symbols), list(results)).expand()
+        except RuntimeError:
+            # What solves linear systems.
+            return None
+        x, state = (ca.SX.sym(symbol.name(), symbol.shape[0]) for symbol in self._symbols)
+        return x, state, function.call([x, state])
+
+    @functools.cached_property
+    def _by_all(self) -> ca.Function | None:
+        """(x, state) -> the answers, and their derivatives by x, sparse; None where :attr:`_along` is meant for it."""
+        found = self._expanded(self._told)
+        if found is None:
+            return None
+        x, state, (told,) = found
+        return ca.Function("by_all", [x, state], [told, ca.jacobian(told, x)])
+
+    @functools.cached_property
+    def _along(self) -> ca.Function:
+        """(x, state, steps) -> the answers, and their derivatives in directions, one for each number."""
+        x, state = self._symbols
+        steps = ca.MX.sym("steps", self.total, self._count)
+        found = ca.jtimes(self._told, x, self._directions(steps))
+        return ca.Function("along", [x, state, steps], [self._told, ca.densify(found)])
+
+    @functools.cached_property
+    def _by_step(self) -> ca.Function:
+        """(x, state, weights) -> derivative of weighted answers by the step."""
+        x, state = self._symbols
+        weights = ca.MX.sym("weights", self._results.size)
+        found = ca.jtimes(self._told, x, weights, True)[: self.total]
+        return ca.Function("by_step", [x, state, weights], [ca.densify(found)])
+
+    @functools.cached_property
+    def _curved(self) -> ca.Function:
+        """(x, state, weights, multipliers, steps) -> second derivatives of weighted answers by the numbers."""
+        x, state = self._symbols
+        weights, m = ca.MX.sym("weights", self._results.size), ca.MX.sym("multipliers", self.total)
+        steps = ca.MX.sym("steps", self.total, self._count)
+        lagrangian = ca.dot(weights, self._told) + ca.dot(m, self._at(self._program.forces.residual))
+        along = self._directions(steps)
+        found = ca.mtimes(along.T, ca.jtimes(ca.gradient(lagrangian, x), x, along))
+        return ca.Function("curved", [x, state, weights, m, steps], [ca.densify(found)])
+
+    # -- numbers ------------------------------------------------------------------------------------
+
+    def _x(self, p: Array) -> Array:
+        return np.concatenate([np.zeros(self.total), p])
+
+    @single_threaded
+    def slopes(self, p: Array, state: Array) -> Slopes:
+        """First derivatives at the equilibrium of the numbers.
+
+        Raises
+        ------
+        SolveError
+            The equilibrium is singular.
+        """
+        by_p, entries = self._called("_equations", self._x(p), state)
+        right = -by_p.reshape(self._count, self.total).T
+        steps = self._solved(entries, right)
+        if steps is None:
+            return self._softened(p, state, entries, right)
+        return self._slopes(p, state, entries, steps)
+
+    def _slopes(self, p: Array, state: Array, entries: Array, steps: Array) -> Slopes:
+        if self._by_all is None:
+            answers, jacobian = self._called("_along", self._x(p), state, steps.T)
+            return Slopes(steps, answers, jacobian.reshape(self._count, -1).T.copy(), entries)
+        answers, values = self._called("_by_all", self._x(p), state)
+        whole = np.zeros((len(answers), self.total + self._count))
+        whole[self._filled] = values
+        return Slopes(steps, answers, whole[:, : self.total] @ steps + whole[:, self.total :], entries)
+
+    @functools.cached_property
+    def _filled(self) -> tuple[Array, Array]:
+        """Places of the derivatives of the answers by x."""
+        assert self._by_all is not None
+        row, column = self._by_all.sparsity_out(1).get_triplet()
+        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
+
+    @single_threaded
+    def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
+        """Second derivatives (numbers, numbers) of the answers, each times its weight and added up."""
+        (right,) = self._called("_by_step", self._x(p), state, weights)
+        multipliers = self._transposed(slopes.entries, -right)
+        (found,) = self._called("_curved", self._x(p), state, weights, multipliers, slopes.steps.T)
+        found = found.reshape(self._count, self._count)
+        return 0.5 * (found + found.T)
+
+    def _called(self, name: str, *given: Array) -> list[Array]:
+        """Results of one of the functions, flat, without copies between NumPy and CasADi on the way in."""
+        if name not in self._batches:
+            self._batches[name] = Batch(getattr(self, name), 1)
+        batch = self._batches[name]
+        for i, values in enumerate(given):
+            batch.set(i, values)
+        return [found.ravel().copy() for found in batch()]
+
+    # -- the linear system --------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _places(self) -> tuple[Array, Array]:
+        row, column = (np.array(part, dtype=np.intp) for part in self._program.sparsity.get_triplet())
+        return row, column
+
+    @functools.cached_property
+    def _straight(self) -> SparseSolver:
+        row, column = self._places
+        return SparseSolver(self.total, row, column, self._rows, symmetric=self._symmetric)
+
+    @functools.cached_property
+    def _across(self) -> tuple[SparseSolver, Array]:
+        """That of the transposed matrix, and the order of its entries."""
+        row, column = self._places
+        order = np.lexsort((column, row))
+        solver = SparseSolver(self.total, column[order], row[order], self._rows, symmetric=self._symmetric)
+        return solver, order
+
+    @property
+    def _rows(self) -> int:
+        return self._program.equations.rows
+
+    @functools.cached_property
+    def _generic(self) -> Array:
+        """A shape that no symmetry makes orthogonal to a neutral one."""
+        return 1.0 + 0.5 * np.sin(1.0 + np.arange(self.total))
+
+    def _solved(self, entries: Array, right: Array) -> Array | None:
+        """Solution for the right sides; None where the matrix may be singular."""
+        if not self._unique or not self.total:
+            return None if self.total else right
+        weight, generic = self._weight, self._generic
+        try:
+            self._straight.factor(entries)
+            found = self._straight.solve(np.column_stack([right, weight * generic]))
+        except np.linalg.LinAlgError:
+            return None
+        # An inverse iteration: what is soft grows by as much.
+        size, grown = (float(np.sqrt(weight @ shape**2)) for shape in (generic, found[:, -1]))
+        return found[:, :-1] if np.isfinite(found).all() and grown * SINGULAR <= size else None
+
+    def _soft(self, entries: Array, proximal: float) -> Array:
+        entries = entries.copy()
+        row, column = self._places
+        diagonal = np.flatnonzero(row == column)
+        entries[diagonal] += proximal * self._weight
+        entries[diagonal[self.total - self._rows :]] -= DUAL
+        return entries
+
+    def _softened(self, p: Array, state: Array, entries: Array, right: Array) -> Slopes:
+        """Derivatives with a little softness in all neutral directions, if none of the numbers acts along these."""
+        found = []
+        for proximal in PROXIMAL:
+            soft = self._soft(entries, proximal)
+            self._straight.factor(soft)
+            found.append(self._slopes(p, state, soft, self._straight.solve(right)))
+        one, other = (slopes.jacobian for slopes in found)
+        if not np.abs(one - other).max(initial=0.0) <= APART * np.abs(one).max(initial=0.0):
+            raise SolveError(Status.SINGULAR, "a limit point, a bifurcation, or what nothing resists")
+        return found[0]
+
+    def _transposed(self, entries: Array, right: Array) -> Array:
+        solver, order = self._across
+        solver.factor(entries[order])
+        return solver.solve(right)

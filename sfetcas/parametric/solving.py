@@ -1,0 +1,377 @@
+"""Equilibria of a scene as functions of its numbers: solved again and again, with exact derivatives."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import unknown
+from ..description.scene import Scene
+from ..equilibria.settings import Settings
+from ..equilibria.solution import Equilibrium
+from ..equilibria.statics import solve
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations
+from ..mechanics.expressions import Expressions
+from ..mechanics.fields import transferred
+from ..mechanics.model import assemble
+from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome
+from ..solvers.prepared import Prepared
+from ..solvers.program import Program
+from .arguments import Argument, Asked
+from .equilibrium import EquilibriumSolver, Place, equilibrium_solver, refuse_search
+from .implicit import Implicit, Slopes
+from .results import Result, Results
+
+__all__ = ["ParametricAnswer", "ParametricEquilibrium", "Values", "parametric"]
+
+Values = Mapping[str, ArrayLike]
+"""Values of parameters by their names; what is left out has its default."""
+
+FAR = 0.3
+"""Rotation, rad, up to which first derivatives tell where to begin."""
+
+SOLVED = (Code.SOLVED, Code.UNSTABLE)
+"""How a solve ends that found an equilibrium."""
+
+
+def parametric(
+    scene: Scene,
+    parameters: Asked = None,
+    answers: Sequence[str] | None = None,
+    *,
+    places: Place | None = None,
+    settings: Settings | None = None,
+) -> ParametricEquilibrium:
+    """The equilibrium of a scene as a function of some of its numbers.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its last step is what is solved, on the mesh that its accuracy asks for with its own numbers.
+    parameters : names of numbers, or mapping of names to ranges or to a :class:`Parameter`
+        As ``loads.tip.value``, ``sections.strip.EI3``, ``springs.k.rest``, ``nodes.B.position.0``, ``factor``; a range
+        ``(low, high)`` where the model is no power of a number, as of places and angles.  The usual ones without:
+        factor, loads and motions.
+    answers : names
+        As ``nodes.tip.position``, ``members.beam.moment``, ``reactions.A.force``, ``energy.elastic``,
+        ``compliance.tip``; without all of nodes, reactions, springs and energies.
+    places : mapping of members to fractions of their length
+        Where members are told of.
+    settings : Settings, optional
+        As of :func:`~sfetcas.solve`.
+
+    Raises
+    ------
+    SceneError
+        A scene with contact, stops or turning axes; a number or an answer that it does not have; a number that changes
+        what the model is made of, or that the model depends on in no way that is found.
+    """
+    parameters = [parameters] if isinstance(parameters, str) else parameters
+    answers = [answers] if isinstance(answers, str) else answers
+    refuse_search(scene, "without derivatives")
+    if scene.analysis.type == "modes":
+        raise SceneError("found 'modes', accepted: static, or path", ("analysis", "type"))
+    try:
+        solver = equilibrium_solver(
+            scene, "equilibrium", arguments=parameters, results=answers, places=places, settings=settings
+        )
+    except SceneError as error:
+        raise _renamed(error) from None
+    if not answers:
+        own = [one.name for one in solver.results.results if not one.name.startswith("members.")]
+        solver = solver.with_results(own)
+    return ParametricEquilibrium(solver, settings or Settings())
+
+
+def _renamed(error: SceneError) -> SceneError:
+    """The error with its place as the caller knows it."""
+    names = {"arguments": "parameters", "results": "answers"}
+    first, *others = error.where or ("",)
+    return SceneError(error.bare, (names[first], *others)) if first in names else error
+
+
+@dataclass(frozen=True, eq=False)
+class ParametricEquilibrium:
+    """The equilibrium of one scene on one mesh, a function of parameters; made by :func:`parametric`.
+
+    Attributes
+    ----------
+    solver : EquilibriumSolver
+    settings : Settings
+    """
+
+    solver: EquilibriumSolver
+    settings: Settings
+
+    @property
+    def parameters(self) -> tuple[Argument, ...]:
+        """The parameters: name, default, unit, meaning, range."""
+        return self.solver.arguments.arguments
+
+    @property
+    def answers(self) -> tuple[Result, ...]:
+        """The answers: name, shape, unit, meaning."""
+        return self.solver.results.results
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """A name for each number of the parameters, in the order of flat arrays."""
+        return tuple(name for one in self.parameters for name in one.names)
+
+    @property
+    def defaults(self) -> dict[str, Array]:
+        """The parameters as they stand in the scene."""
+        return self.by_parameter(self.solver.arguments.defaults)
+
+    def by_parameter(self, numbers: Array) -> dict[str, Array]:
+        """Arrays whose last axis is that of all numbers, cut into parameters; single numbers lose the axis."""
+        found, first = {}, 0
+        for one in self.parameters:
+            last = first + len(one.default)
+            found[one.name] = numbers[..., first] if one.components is None else numbers[..., first:last]
+            first = last
+        return found
+
+    def flat(self, values: Values | None = None) -> Array:
+        """All numbers in one array; what is not given has its default.
+
+        Raises
+        ------
+        SceneError
+            There is no such parameter, it takes another number of numbers, or is out of its range.
+        """
+        values = values or {}
+        known = [one.name for one in self.parameters]
+        for name in values:
+            if name not in known:
+                raise SceneError(unknown(name, known, "such parameters"), ("values",))
+        parts = [_given(one, values.get(one.name, one.default)) for one in self.parameters]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def scene_at(self, values: Values | None = None) -> Scene:
+        """The scene with these values, as :func:`~sfetcas.solve` takes it."""
+        scene = self.solver.arguments.scene_at(self.flat(values))
+        analysis = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
+        return scene.model_copy(update={"analysis": analysis})
+
+    def solve(self, values: Values | None = None, start: ParametricAnswer | None = None) -> ParametricAnswer:
+        """The equilibrium for values of the parameters.
+
+        Parameters
+        ----------
+        values : mapping of names to numbers, or lists of them
+            Those left out have their defaults.
+        start : ParametricAnswer, optional
+            An earlier answer, near which to look first: faster, and on its branch.
+
+        Raises
+        ------
+        SceneError
+            A value that is not accepted.
+        SolveError
+            There is no equilibrium, or none was found.
+        """
+        numbers = self.flat(values)
+        outcome = self._outcome(numbers, None if start is None else start.near(numbers))
+        if outcome.code not in SOLVED and start is not None:
+            outcome = self._outcome(numbers, None)
+        if outcome.code not in SOLVED:
+            status = Status.ITERATIONS if outcome.code is Code.ITERATIONS else Status.FAILED
+            said = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.numbers, numbers, strict=True))
+            raise SolveError(status, f"{MEANINGS[outcome.code]}, at {said}", outcome)
+        return ParametricAnswer(self, numbers, outcome)
+
+    def _outcome(self, numbers: Array, state: Array | None) -> Outcome:
+        solver = self.solver
+        given = np.array(solver.prepare(numbers)).ravel()
+        return solver.method(given, solver.start if state is None else state)
+
+    @functools.cached_property
+    def implicit(self) -> Implicit:
+        """The derivatives."""
+        return Implicit(self.solver.arguments, self.solver.results, self.solver.method.mass, unique=self.solver.unique)
+
+
+def _given(one: Argument, value: ArrayLike) -> Array:
+    """The numbers of one parameter."""
+    try:
+        given = np.asarray(value, dtype=float).ravel()
+    except (TypeError, ValueError):
+        given = np.zeros(0)
+    count = len(one.default)
+    if len(given) != count or not np.isfinite(given).all():
+        accepted = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise SceneError(f"found {value!r}, accepted: {accepted}", ("values", one.name))
+    low, high = one.limits
+    if ((given < low) | (given > high)).any():
+        wrong = given[(given < low) | (given > high)][0]
+        accepted = f"{low:g} to {high:g}" if one.low is not None else "above zero" if low > 0.0 else "zero or more"
+        raise SceneError(f"found {wrong:g}, accepted: {accepted}", ("values", one.name))
+    return given
+
+
+@dataclass(frozen=True, eq=False)
+class ParametricAnswer:
+    """One equilibrium; derivatives are computed when they are first asked for.
+
+    Attributes
+    ----------
+    of : ParametricEquilibrium
+    numbers : ndarray (numbers,)
+        Where the parameters are.
+    outcome : Outcome
+        State, residual, ways out and iterations.
+    """
+
+    of: ParametricEquilibrium
+    numbers: Array
+    outcome: Outcome
+
+    @property
+    def values(self) -> dict[str, Array]:
+        """The parameters by their names."""
+        return self.of.by_parameter(self.numbers)
+
+    @property
+    def residual(self) -> float:
+        """Of all equations, relative."""
+        return self.outcome.residual
+
+    @property
+    def stable(self) -> bool | str:
+        """Whether the energy has no way out; "not defined" for loads without potential."""
+        return "not defined" if self.outcome.negative == NOT_DEFINED else self.outcome.negative == 0
+
+    @functools.cached_property
+    def answers(self) -> dict[str, Array]:
+        """The answers by their names, in their shapes, SI units."""
+        solver = self.of.solver
+        given = np.array(solver.prepare(self.numbers)).ravel()
+        try:
+            return solver.by_name(np.array(solver.tell(self.numbers, self.outcome.state, given)).ravel())
+        except RuntimeError:
+            detail = "a stiffness or compliance that was asked for has no value"
+            raise SolveError(Status.SINGULAR, detail) from None
+
+    def __getitem__(self, name: str) -> Array:
+        """An answer by its name."""
+        return self.answers[self._known(name)]
+
+    def _known(self, name: str) -> str:
+        known = [one.name for one in self.of.answers]
+        if name not in known:
+            raise SceneError(unknown(name, known, "such answers"), ("answers",))
+        return name
+
+    def near(self, numbers: Array) -> Array:
+        """A state to begin with for other numbers: by first derivatives where these are known and do not lead far."""
+        # What has been computed already costs nothing.
+        slopes: Slopes | None = self.__dict__.get("_slopes")
+        if slopes is None:
+            return self.outcome.state
+        step = slopes.steps @ (numbers - self.numbers)
+        turning = self.of.implicit.turning
+        if not np.abs(step[:turning]).max(initial=0.0) <= FAR:
+            return self.outcome.state
+        return np.array(self.of.solver.arguments.program.move(self.outcome.state, step, 1.0)).ravel()
+
+    # -- derivatives --------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def _slopes(self) -> Slopes:
+        return self.of.implicit.slopes(self.numbers, self.outcome.state)
+
+    @property
+    def flat_jacobian(self) -> Array:
+        """First derivatives of all answers, one after the other, by all numbers: (answers, numbers).
+
+        Raises
+        ------
+        SolveError
+            The equilibrium is singular.
+        """
+        return self._slopes.jacobian
+
+    @functools.cached_property
+    def jacobian(self) -> dict[str, dict[str, Array]]:
+        """First derivatives, ``jacobian[answer][parameter]``, of the shape of the answer and then of the parameter."""
+        found = {}
+        for one, rows in self._rows():
+            own = self.flat_jacobian[rows].reshape(*one.shape, -1)
+            found[one.name] = self.of.by_parameter(own)
+        return found
+
+    def _rows(self) -> list[tuple[Result, slice]]:
+        bounds = np.cumsum([0, *(one.size for one in self.of.answers)]).tolist()
+        return [(one, slice(a, b)) for one, a, b in zip(self.of.answers, bounds, bounds[1:], strict=False)]
+
+    def flat_hessian(self, weights: ArrayLike) -> Array:
+        """Second derivatives (numbers, numbers) of all answers, each times its weight and added up."""
+        given = np.asarray(weights, dtype=float).ravel()
+        size = self.of.solver.results.size
+        if len(given) != size:
+            raise SceneError(f"found {len(given)} weights, accepted: {size}, one for each number", ("weights",))
+        return self.of.implicit.second(self.numbers, self.outcome.state, self._slopes, given)
+
+    def hessian(self, answer: str) -> dict[str, dict[str, Array]]:
+        """Second derivatives of one answer, ``hessian(answer)[parameter][parameter]``.
+
+        Arrays of the shape of the answer, then of the first and of the second parameter.
+        """
+        self._known(answer)
+        one, rows = next(pair for pair in self._rows() if pair[0].name == answer)
+        unit = np.eye(self.of.solver.results.size)[rows]
+        whole = np.stack([self.flat_hessian(weights) for weights in unit])
+        whole = whole.reshape(*one.shape, *whole.shape[1:])
+        first = self.of.by_parameter(np.moveaxis(whole, -2, -1))
+        scalar = {parameter.name: parameter.components is None for parameter in self.of.parameters}
+        return {
+            name: self.of.by_parameter(part if scalar[name] else np.moveaxis(part, -1, -2))
+            for name, part in first.items()
+        }
+
+    # -- how good it is -----------------------------------------------------------------------------
+
+    def errors(self) -> dict[str, float]:
+        """By how much each answer changes, at most, when all elements are halved.
+
+        The mesh is that of the scene's own numbers: far from these it may be too coarse, and this says so.
+
+        Raises
+        ------
+        SolveError
+            The finer mesh has no equilibrium nearby.
+        """
+        solver, model = self.of.solver, self.of.solver.model
+        scene = solver.arguments.scene_at(self.numbers)
+        assembly: Any = model.assembly
+        finer = assemble(scene, model.mesh.refined(), assembly=assembly, scales=model.scales)
+        program = Program(Expressions(Equations(finer, kernels="interpreted"), "interpreted"))
+        given = program.given_of(finer.loading(scene.analysis.steps[-1]))
+        start = transferred(model, solver.arguments.program.state(self.outcome.state), finer)
+        outcome = Globalised(program, Prepared(finer).weight, solver.rules)(given, program.flat(start))
+        if outcome.code not in SOLVED:
+            raise SolveError(Status.FAILED, f"on half the elements: {MEANINGS[outcome.code]}", outcome)
+        results = Results(finer, [one.name for one in self.of.answers], solver.results.places, unique=solver.unique)
+        told = results.expression(program, ca.MX(ca.DM(results.rest(finer))))
+        function = ca.Function("told", [program.state_symbol, program.symbol], [told])
+        there = solver.by_name(np.array(function(outcome.state, given)).ravel())
+        return {name: float(np.abs(there[name] - own).max(initial=0.0)) for name, own in self.answers.items()}
+
+    def certified(self) -> Equilibrium:
+        """The equilibrium by :func:`~sfetcas.solve` for the same values, with its mesh, its branch and its certificate.
+
+        Raises
+        ------
+        SolveError
+            There is none.
+        """
+        return solve(self.of.scene_at(self.values), self.of.settings).last
