@@ -1,0 +1,81 @@
+"""What an answer of a program is worth: each case again by Newton's method, its stability, and half the elements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..equilibria.single import finished, unjudged
+from ..equilibria.solution import Equilibrium
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.accuracy import halving
+from ..mechanics.equations import State
+from ..mechanics.fields import transferred
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import assemble
+from ..solvers.prepared import SOLVED, Prepared
+from .formulation import labelled
+
+__all__ = ["Certified", "certified"]
+
+MOVED = 1e-4
+"""How far Newton's method may lead from an answer of the program, rad: a thousand times its tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """A case with its certificate.
+
+    Attributes
+    ----------
+    equilibrium : Equilibrium
+        On the mesh of the program.
+    shape : ndarray
+        Its softest shape: rotations, then displacements.
+    smallest : float
+        The eigenvalue, dimensionless.
+    error : float
+        Difference of positions to those on half the elements' length, over the size of the scene.
+    """
+
+    equilibrium: Equilibrium
+    shape: Array
+    smallest: float
+    error: float
+
+
+def certified(scene: Scene, mesh: Mesh, assembly: str, state: State, case: str, notes: Sequence[str] = ()) -> Certified:
+    """A case that a program found, looked at by what knows nothing of the program.
+
+    Raises
+    ------
+    SolveError
+        The case is no equilibrium of its scene.
+    """
+    prepared = Prepared(assemble(scene, mesh, assembly=assembly))  # type: ignore[arg-type]
+    factor = float(scene.analysis.steps[-1])
+    loading = prepared.model.loading(factor)
+    found = prepared.correct(state, loading)
+    if not found.residual <= SOLVED or prepared.distance(found.state, state) > MOVED:
+        raise SolveError(Status.FAILED, labelled(case, "what was found is no equilibrium of the scene"), state)
+    stability = prepared.stability(found)
+    error, finer_notes = _error(scene, prepared, unjudged(prepared, found, loading, factor), assembly)
+    equilibrium = finished(prepared, found, loading, factor, stability, estimate=error, notes=(*notes, *finer_notes))
+    return Certified(equilibrium, np.concatenate([stability.shape, stability.travel]), stability.smallest, error)
+
+
+def _error(scene: Scene, coarse: Prepared, here: Equilibrium, assembly: str) -> tuple[float, tuple[str, ...]]:
+    mesh = coarse.model.mesh.refined()
+    if mesh.same(coarse.model.mesh):
+        return 0.0, ()
+    fine = Prepared(assemble(scene, mesh, assembly=assembly))  # type: ignore[arg-type]
+    loading = fine.model.loading(here.factor)
+    found = fine.correct(transferred(coarse.model, here.state, fine.model), loading, iterations=25, most=1.5)
+    if not found.converged:
+        return np.inf, ("an equilibrium of a coarse mesh only",)
+    difference, left = halving(here.fields, unjudged(fine, found, loading, here.factor).fields)
+    return difference + left, ()
