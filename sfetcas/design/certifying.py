@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..solvers.prepared import SOLVED, Prepared
+from .equations import CaseEquations
 from .formulation import labelled
 
 __all__ = ["Certified", "certified"]
@@ -48,7 +49,7 @@ class Certified:
     error: float
 
 
-def certified(scene: Scene, mesh: Mesh, assembly: str, state: State, case: str, notes: Sequence[str] = ()) -> Certified:
+def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -> Certified:
     """A case that a program found, looked at by what knows nothing of the program.
 
     Raises
@@ -56,23 +57,31 @@ def certified(scene: Scene, mesh: Mesh, assembly: str, state: State, case: str, 
     SolveError
         The case is no equilibrium of its scene.
     """
-    prepared = Prepared(assemble(scene, mesh, assembly=assembly))  # type: ignore[arg-type]
+    prepared = _prepared(scene, equations, equations.mesh)
     factor = float(scene.analysis.steps[-1])
     loading = prepared.model.loading(factor)
     found = prepared.correct(state, loading)
     if not found.residual <= SOLVED or prepared.distance(found.state, state) > MOVED:
         raise SolveError(Status.FAILED, labelled(case, "what was found is no equilibrium of the scene"), state)
     stability = prepared.stability(found)
-    error, finer_notes = _error(scene, prepared, unjudged(prepared, found, loading, factor), assembly)
-    equilibrium = finished(prepared, found, loading, factor, stability, estimate=error, notes=(*notes, *finer_notes))
+    error, notes = _error(scene, equations, prepared, unjudged(prepared, found, loading, factor))
+    equilibrium = finished(prepared, found, loading, factor, stability, estimate=error, notes=notes)
     return Certified(equilibrium, np.concatenate([stability.shape, stability.travel]), stability.smallest, error)
 
 
-def _error(scene: Scene, coarse: Prepared, here: Equilibrium, assembly: str) -> tuple[float, tuple[str, ...]]:
+def _prepared(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepared:
+    """The scene of a case on a mesh, in the units of the program: those of multipliers, too."""
+    assembly: Any = equations.assembly
+    return Prepared(assemble(scene, mesh, assembly=assembly, scales=equations.scales))
+
+
+def _error(
+    scene: Scene, equations: CaseEquations, coarse: Prepared, here: Equilibrium
+) -> tuple[float, tuple[str, ...]]:
     mesh = coarse.model.mesh.refined()
     if mesh.same(coarse.model.mesh):
         return 0.0, ()
-    fine = Prepared(assemble(scene, mesh, assembly=assembly))  # type: ignore[arg-type]
+    fine = _prepared(scene, equations, mesh)
     loading = fine.model.loading(here.factor)
     found = fine.correct(transferred(coarse.model, here.state, fine.model), loading, iterations=25, most=1.5)
     if not found.converged:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -66,7 +67,8 @@ class CaseEquations:
         places: Place,
     ) -> None:
         self.scene, self.mesh, self.assembly = scene, mesh, assembly
-        base = assemble(scene, mesh, assembly=assembly)  # type: ignore[arg-type]
+        of_all: Any = assembly
+        base = assemble(scene, mesh, assembly=of_all)
         self.scales = base.scales
         self.results = Results(base, results, places)
         self.arguments = Arguments(scene, base, arguments, self.results.rest, "design_")
@@ -141,16 +143,16 @@ class CaseEquations:
         return self._function("lifted", [said], said - self._told[list(part)])
 
     @functools.cached_property
-    def _pencil(self) -> tuple[ca.MX, Array]:
-        """The tangent after the step, and the mass that eigenvalues are of (total,)."""
-        method = self.method
-        return self._at(self.program.matrix), method.mass
+    def mass(self) -> Array:
+        """What eigenvalues of the tangent are of, (total,): rotations, as in certificates."""
+        equations = self.program.equations
+        return np.concatenate([equations.mass, np.zeros(self.total - equations.turning_unknowns)])
 
     @functools.cached_property
     def eigen(self) -> ca.Function:
         """(w, c) -> K v - sigma M v on the closings, and v.M v - 1; w ends with v and multipliers, then sigma."""
         v, sigma = ca.MX.sym("v", self.total), ca.MX.sym("sigma")
-        tangent, mass = self._pencil
+        tangent, mass = self._at(self.program.matrix), self.mass
         rows = ca.mtimes(tangent, v) - sigma * ca.DM(mass) * v
         return self._function("eigen", [v, sigma], ca.vertcat(rows, ca.dot(v, ca.DM(mass) * v) - 1.0))
 

@@ -278,7 +278,7 @@ class Solving:
         for i, case in enumerate(self.formulation.cases):
             state = equations.program.state(states[i])
             try:
-                found.append(certified(self._scene(i, values), equations.mesh, equations.assembly, state, case))
+                found.append(certified(self._scene(i, values), equations, state, case))
             except SolveError as error:
                 raise SolveError(error.status, error.detail, self._iterate(program, result)) from None
         return found
@@ -315,7 +315,7 @@ class Solving:
 
     @staticmethod
     def _pair(number: int, case: Certified, program: Assembled, margin: float) -> Pair:
-        mass = program.equations.method.mass
+        mass = program.equations.mass
         shape = np.zeros(len(mass))
         shape[: len(case.shape)] = case.shape
         shape /= np.sqrt(shape @ (mass * shape))
