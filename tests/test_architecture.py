@@ -159,6 +159,7 @@ ORDER = [
     "design.certifying",
     "design.solving",
     "design.designing",
+    "design.quasi_static",
     "codegen",
     "codegen.derivatives",
     "codegen.timestep",

@@ -267,12 +267,13 @@ class Assembled:
             self.weight = 1.0
             return
         function, index = self.pieces.function_of("objective", objective)
-        w = ca.MX.sym("w", index.shape[1])
-        slope = ca.Function("slope", [w], [ca.gradient(function(w), w)])
-        largest = np.abs(np.array(slope(self.pieces.guess[index[0]])).ravel() * self.pieces.units[index[0]])
-        # At a least value to begin with nothing tells its size.
-        size = float(largest.max(initial=0.0))
-        self.weight = float(np.clip(1.0 / size, 1e-6, 1e6)) if np.isfinite(size) and size > 1e-9 else 1.0
+        w, unit = ca.MX.sym("w", index.shape[1]), self.pieces.units[index[0]]
+        bends, slopes = ca.hessian(function(w), w)
+        both = ca.Function("both", [w], [ca.diag(bends), slopes])
+        diagonal, slope = (np.array(part).ravel() for part in both(self.pieces.guess[index[0]]))
+        # Where a first derivative vanishes a second one tells the size.
+        size = float(max(np.abs(slope * unit).max(), np.abs(diagonal * unit**2).max()))
+        self.weight = float(np.clip(1.0 / size, 1e-9, 1e9)) if np.isfinite(size) and size > 0.0 else 1.0
         self.pieces.add_term("objective", objective, self.weight)
 
     # -- numbers ----------------------------------------------------------------------------------------

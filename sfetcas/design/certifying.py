@@ -21,7 +21,7 @@ from ..solvers.prepared import SOLVED, Prepared
 from .equations import CaseEquations
 from .formulation import labelled
 
-__all__ = ["Certified", "certified"]
+__all__ = ["Certified", "certified", "prepared_case"]
 
 MOVED = 1e-4
 """How far Newton's method may lead from an answer of the program, rad: a thousand times its tolerance."""
@@ -39,6 +39,8 @@ class Certified:
         Its softest shape: rotations, then displacements.
     smallest : float
         The eigenvalue, dimensionless.
+    prepared : Prepared
+        What it was solved with.
     error : float
         Difference of positions to those on half the elements' length, over the size of the scene.
     """
@@ -46,6 +48,7 @@ class Certified:
     equilibrium: Equilibrium
     shape: Array
     smallest: float
+    prepared: Prepared
     error: float
 
 
@@ -57,7 +60,7 @@ def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -
     SolveError
         The case is no equilibrium of its scene.
     """
-    prepared = _prepared(scene, equations, equations.mesh)
+    prepared = prepared_case(scene, equations, equations.mesh)
     factor = float(scene.analysis.steps[-1])
     loading = prepared.model.loading(factor)
     found = prepared.correct(state, loading)
@@ -66,10 +69,12 @@ def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -
     stability = prepared.stability(found)
     error, notes = _error(scene, equations, prepared, unjudged(prepared, found, loading, factor))
     equilibrium = finished(prepared, found, loading, factor, stability, estimate=error, notes=notes)
-    return Certified(equilibrium, np.concatenate([stability.shape, stability.travel]), stability.smallest, error)
+    return Certified(
+        equilibrium, np.concatenate([stability.shape, stability.travel]), stability.smallest, prepared, error
+    )
 
 
-def _prepared(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepared:
+def prepared_case(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepared:
     """The scene of a case on a mesh, in the units of the program: those of multipliers, too."""
     assembly: Any = equations.assembly
     return Prepared(assemble(scene, mesh, assembly=assembly, scales=equations.scales))
@@ -81,7 +86,7 @@ def _error(
     mesh = coarse.model.mesh.refined()
     if mesh.same(coarse.model.mesh):
         return 0.0, ()
-    fine = _prepared(scene, equations, mesh)
+    fine = prepared_case(scene, equations, mesh)
     loading = fine.model.loading(here.factor)
     found = fine.correct(transferred(coarse.model, here.state, fine.model), loading, iterations=25, most=1.5)
     if not found.converged:

@@ -40,6 +40,9 @@ FIRST, LEAST = 0.2, 1e-3
 SHORT = 60
 """Iterations at most from one step to the next."""
 
+ENOUGH = {"acceptable_tol": 1e-7, "acceptable_constr_viol_tol": 1e-9, "acceptable_iter": 5}
+"""Of objectives rounding leaves less than of rows."""
+
 WARM = {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6, "warm_start_init_point": "yes"}
 """IPOPT begun near a solution."""
 
@@ -112,7 +115,7 @@ class Solving:
 
     def __init__(self, formulation: Formulation, solver: Ipopt | None = None, kernels: Kernels = "auto") -> None:
         self.formulation, self._kernels = formulation, kernels
-        self._solver = solver or Ipopt(tolerance=1e-9, iterations=300)
+        self._solver = solver or Ipopt(tolerance=1e-9, iterations=300, extra=ENOUGH)
         self.iterations = 0
 
     # -- the beginning ------------------------------------------------------------------------------
@@ -347,7 +350,8 @@ class Solving:
             found[kept] = result.lam[at] / unit / program.weight if len(kept) else 0.0
             multipliers[one.name] = found
         unstable = [self.formulation.cases[i] for i, c in enumerate(cases) if c.equilibrium.certificate.stable is False]
-        notes = [labelled(", ".join(unstable), "unstable")] if unstable else []
+        told = [*unstable[:3], *([counted(len(unstable) - 3, "other", "others")] if unstable[3:] else [])]
+        notes = [labelled(", ".join(told), "unstable")] if unstable else []
         return Solved(
             iterate=self._iterate(program, result),
             cases=tuple(cases),
