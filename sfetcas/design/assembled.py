@@ -43,11 +43,10 @@ def places_asked(formulation: Formulation) -> tuple[list[str], dict[str, tuple[f
     """Names of all answers, and for each member all places at which it is told of."""
     asked = formulation.asked.values()
     names = list(dict.fromkeys(one.name for one in asked))
-    members = [n for n, record in formulation.scene.members.items() if record.type == "flexible"]
-    places: dict[str, set[float]] = {name: {0.0} for name in members}
+    places: dict[str, set[float]] = {}
     for one in asked:
         if one.name.startswith("members."):
-            places[one.name.split(".")[1]] |= set(one.at)
+            places.setdefault(one.name.split(".")[1], set()).update(one.at)
     return names, {name: tuple(sorted(x)) for name, x in places.items()}
 
 

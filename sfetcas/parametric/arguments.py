@@ -12,6 +12,7 @@ import numpy as np
 
 from ..description.records import plain, unknown
 from ..description.scene import Scene
+from ..description.shapes import end_of
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
@@ -307,7 +308,8 @@ class Arguments:
 
         data = [name for name in sizes if is_data(name)]
         loads = [name for name in sizes if not is_data(name)]
-        rest = np.full(self._undeformed // 3, 3, dtype=np.intp)
+        # A place at the origin is zero but for rounding of where the others are.
+        rest = np.array([self._undeformed], dtype=np.intp)
         found = np.concatenate([rest, *rows(data), *(rows(loads) * len(self._groups))])
         return found[found > 0]
 
@@ -373,6 +375,8 @@ class Arguments:
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; in the dimension that it has.
 
+    Where a shape changes that says itself where it ends, as a given curvature does, a free node there goes with it.
+
     Raises
     ------
     SceneError
@@ -382,7 +386,24 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     table["dimension"] = scene.resolved_dimension
     for name, value in numbers.items():
         _put(scene, table, name.split("."), float(value))
+    _carry_ends(scene, table, numbers)
     return Scene.from_dict(table)
+
+
+def _carry_ends(scene: Scene, table: dict[str, Any], numbers: Mapping[str, float]) -> None:
+    """Take free nodes to where the shapes end that numbers change."""
+    for name, member in scene.members.items():
+        first, last = member.nodes[0], member.nodes[-1]
+        moved = any(n.startswith((f"members.{name}.shape.", f"nodes.{first}.position.")) for n in numbers)
+        others = [n for n, other in scene.members.items() if last in other.nodes and n != name]
+        told = any(n.startswith(f"nodes.{last}.position.") for n in numbers)
+        if not moved or told or others or scene.nodes[last].support != "free":
+            continue
+        shape = type(member.shape)(**plain(table["members"][name].get("shape") or {}))
+        end = end_of(shape, [*table["nodes"][first]["position"], 0.0][:3], member.b2)
+        if end is not None:
+            position = table["nodes"][last]["position"]
+            table["nodes"][last]["position"] = end.tolist()[: len(position)]
 
 
 def _put(scene: Scene, table: dict[str, Any], path: Sequence[str], value: float) -> None:
