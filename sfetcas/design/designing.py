@@ -18,7 +18,7 @@ from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt
-from .formulation import Bounds, Formulation, labelled
+from .formulation import Bounds, Formulation, Tied, labelled
 from .solving import Iterate, Solved, Solving
 
 __all__ = ["Design", "DesignAnswer", "DesignIterate", "find"]
@@ -119,7 +119,7 @@ class Design:
     ----------
     scene : Scene
         Static and without contact.
-    variables : mapping of str to (low, high)
+    variables : mapping of str to (low, high) or Tied
         Numbers of the scene that are chosen once for all cases; infinite bounds where there are none.
     cases : mapping of str to mapping of str to numbers
         What differs from case to case; one case without.
@@ -147,7 +147,7 @@ class Design:
     def __init__(
         self,
         scene: Scene,
-        variables: Mapping[str, Bounds] | None = None,
+        variables: Mapping[str, Bounds | Tied] | None = None,
         cases: Mapping[str, Mapping[str, ArrayLike]] | None = None,
         *,
         inputs: Mapping[str, Bounds] | None = None,
@@ -172,11 +172,8 @@ class Design:
             known = [*(variables or {}), *(inputs or {})]
             raise SceneError(not_known(next(iter(self._guess)), known, "unknowns"), ("guess",))
 
-    def _vary(self, label: str, name: str, bounds: Bounds, case: str | None, guess: ArrayLike | None) -> None:
-        try:
-            low, high = (float(x) for x in bounds)
-        except (TypeError, ValueError):
-            raise SceneError(f"found {bounds!r}, accepted: a lower and an upper bound", (label,)) from None
+    def _vary(self, label: str, name: str, bounds: Bounds | Tied, case: str | None, guess: ArrayLike | None) -> None:
+        low, high = self._formulation.bounds(label, name, bounds, guess)
         known = self._formulation.numbers(name)
         start = np.array(known.default, dtype=float)
         if case is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,13 +23,31 @@ from ..parametric.changing import changed
 from ..parametric.equilibrium import refuse_search
 from ..parametric.results import Results
 
-__all__ = ["Asked", "Bounds", "Formulation", "Free", "Required", "Setting", "labelled"]
+__all__ = ["Asked", "Bounds", "Formulation", "Free", "Required", "Setting", "Tied", "labelled"]
 
 Bounds = tuple[float, float]
 """Least and largest value; infinite where there is none."""
 
 EVENLY = tuple(np.linspace(0.0, 1.0, 21).tolist())
 """Where members are told of without a word about it: not where elements end, which may change on the way."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tied:
+    """One variable that moves several numbers of a scene: a crossing point, a length between joints, a profile.
+
+    Attributes
+    ----------
+    numbers : callable
+        Numbers of the scene by their names for a value of the variable:
+        ``lambda x: {"nodes.B.position": [x, 0.0], "nodes.C.position": [x, 1.0]}``.
+    low, high : float
+        Bounds, and the range in which the scene is looked at.
+    """
+
+    numbers: Callable[[float], Mapping[str, ArrayLike]]
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +160,7 @@ class Formulation:
         self.settings: list[dict[str, Setting]] = [{} for _ in self.cases]
         self.asked: dict[Any, Asked] = {}
         self.required: list[Required] = []
+        self.tied: dict[str, Argument] = {}
         self.objective = ca.MX(0)
         self.margin: float | None = None
         self._results: Results | None = None
@@ -185,10 +204,57 @@ class Formulation:
         SceneError
             The scene has none of this name.
         """
+        if name in self.tied:
+            return self.tied[name]
         found = argument(self.scene, name)
         if name.startswith("histories.") and name.count(".") == 1:
             raise SceneError(f"found {name!r}, accepted: numbers of it, as {name}.value.0", ("variables",))
         return found
+
+    def bounds(self, label: str, name: str, given: Bounds | Tied, guess: ArrayLike | None) -> Bounds:
+        """Lower and upper bound of a variable; what is tied is made known.
+
+        Raises
+        ------
+        SceneError
+            What is given are no two numbers.
+        """
+        if isinstance(given, Tied):
+            if not given.low < given.high:
+                message = f"found the bounds {given.low:g} and {given.high:g}, accepted: the lower one first"
+                raise SceneError(message, (label,))
+            self.tie(name, given, 0.5 * (given.low + given.high) if guess is None else float(np.asarray(guess)))
+            return given.low, given.high
+        try:
+            low, high = (float(x) for x in given)
+        except (TypeError, ValueError):
+            raise SceneError(f"found {given!r}, accepted: a lower and an upper bound", (label,)) from None
+        return low, high
+
+    def tie(self, name: str, tied: Tied, guess: float) -> None:
+        """Let a name stand for what moves several numbers of the scene.
+
+        Raises
+        ------
+        SceneError
+            A name that is there already, or numbers that the scene does not have.
+        """
+        known = {n.partition(".")[0] for n in ("factor", "histories.x", *type(self.scene).model_fields)}
+        if name.partition(".")[0] in known or name in self.tied:
+            raise SceneError(f"found {name!r}, accepted: a name that is none of the scene", ("variables",))
+
+        def moves(value: float) -> dict[str, float]:
+            single: dict[str, float] = {}
+            for number, values in tied.numbers(value).items():
+                names = argument(self.scene, number).names
+                flat = np.asarray(values, dtype=float).ravel()
+                if len(names) != len(flat):
+                    raise SceneError(f"found {len(flat)} numbers, accepted: {len(names)}", (name, number))
+                single |= dict(zip(names, flat.tolist(), strict=True))
+            return single
+
+        moves(guess)
+        self.tied[name] = Argument(name, (guess,), "1", name, tied.low, tied.high, None, moves)
 
     def set(
         self, name: str, value: ArrayLike | ca.MX, *, case: str | None = None, between: Bounds | None = None
@@ -347,7 +413,15 @@ class Formulation:
 
     def case_scene(self, case: int, values: Mapping[str, Array]) -> Scene:
         """The scene of a case, for values of the free numbers."""
-        return changed(self.scene, self.numbers_of(case, values))
+        return self.scene_with(self.numbers_of(case, values))
+
+    def scene_with(self, numbers: Mapping[str, float]) -> Scene:
+        """The scene with other values of numbers, and of what moves several."""
+        found: dict[str, float] = {}
+        for name, value in numbers.items():
+            moves = self.tied[name].moves if name in self.tied else None
+            found |= {name: value} if moves is None else moves(value)
+        return changed(self.scene, found)
 
     @property
     def guesses(self) -> dict[str, Array]:

@@ -17,9 +17,8 @@ from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt
 from ..mechanics.equations import State
-from ..parametric.changing import changed
 from .certifying import Certified, prepared_case
-from .formulation import Bounds, Formulation
+from .formulation import Bounds, Formulation, Tied
 from .solving import Iterate, Solved, Solving
 
 __all__ = ["QuasiStatic", "QuasiStaticAnswer", "QuasiStaticIterate"]
@@ -120,7 +119,7 @@ class QuasiStatic:
         Numbers of the scene that may change along the path.
     points : int
         Points of the path, evenly spaced from 0 to 1.
-    variables : mapping of str to (low, high)
+    variables : mapping of str to (low, high) or Tied
         Numbers of the scene that are unknown, but the same everywhere.
     guess : mapping of str to numbers
         Where they begin: of an input (n,) or (points, n); the values of the scene without.
@@ -150,7 +149,7 @@ class QuasiStatic:
         inputs: Mapping[str, Bounds],
         points: int = 21,
         *,
-        variables: Mapping[str, Bounds] | None = None,
+        variables: Mapping[str, Bounds | Tied] | None = None,
         guess: Mapping[str, ArrayLike] | None = None,
         accuracy: float | None = None,
         kernels: Kernels = "auto",
@@ -165,14 +164,15 @@ class QuasiStatic:
         starts = dict(guess or {})
         for name, bounds in inputs.items():
             self._vary(name, bounds, starts.pop(name, None), everywhere=False)
-        for name, bounds in (variables or {}).items():
-            self._vary(name, bounds, starts.pop(name, None), everywhere=True)
+        for name, given in (variables or {}).items():
+            self._vary(name, given, starts.pop(name, None), everywhere=True)
         if starts:
             known = [*inputs, *(variables or {})]
             raise SceneError(not_known(next(iter(starts)), known, "unknowns"), ("guess",))
 
-    def _vary(self, name: str, bounds: Bounds, guess: ArrayLike | None, *, everywhere: bool) -> None:
-        known, (low, high) = self._formulation.numbers(name), bounds
+    def _vary(self, name: str, bounds: Bounds | Tied, guess: ArrayLike | None, *, everywhere: bool) -> None:
+        low, high = self._formulation.bounds(name, name, bounds, guess)
+        known = self._formulation.numbers(name)
         start = np.array(known.default, dtype=float)
         shape = start.shape if everywhere else (len(self.s), len(start))
         if guess is not None:
@@ -327,7 +327,7 @@ class QuasiStatic:
         state = before.equilibrium.state
         for share in SHARES:
             numbers = (1.0 - share) * solved.numbers[i - 1] + share * solved.numbers[i]
-            scene = changed(self._formulation.scene, dict(zip(names, numbers.tolist(), strict=True)))
+            scene = self._formulation.scene_with(dict(zip(names, numbers.tolist(), strict=True)))
             prepared = prepared_case(scene, solved.equations, solved.mesh)
             found = prepared.correct(state, prepared.model.loading(here.equilibrium.factor), most=1.0)
             if not found.converged:

@@ -41,6 +41,8 @@ class Argument:
         The range of each number, where it needs one.
     components : tuple of int or None
         Which numbers of a list these are; None of a single number.
+    moves : callable or None
+        Numbers of the scene for a value of it, where it is none itself but moves several.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Argument:
     low: float | None = None
     high: float | None = None
     components: tuple[int, ...] | None = None
+    moves: Callable[[float], Mapping[str, float]] | None = None
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -256,9 +259,13 @@ class Arguments:
         return values
 
     def _assembled(self, values: Sequence[float]) -> Model:
-        names = [self._numbers[i].name for i in self._own]
+        moves = [one.moves for one in self.arguments for _ in one.default]
+        changes: dict[str, float] = {}
+        for i, value in zip(self._own, values, strict=True):
+            move = moves[i]
+            changes |= {self._numbers[i].name: value} if move is None else move(value)
         try:
-            scene = with_numbers(self._scene, dict(zip(names, values, strict=True)))
+            scene = with_numbers(self._scene, changes)
             assembly: Any = self._base.assembly
             return assemble(scene, self._mesh, assembly=assembly, scales=self._base.scales)
         except SceneError as error:
