@@ -27,6 +27,9 @@ from .description.scenefile import dump, load
 from .description.sections import CrossSection, Polynomial, Table
 from .description.shapes import Arc, Curvature, Helix, Spline, Straight
 from .description.springs import Spring
+from .design.designing import Design, DesignAnswer, find
+from .design.formulation import Tied
+from .design.quasi_static import QuasiStatic, QuasiStaticAnswer
 from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Certificate, Equilibrium, Solution
@@ -54,6 +57,8 @@ __all__ = [
     "CrossSection",
     "Curvature",
     "Derivatives",
+    "Design",
+    "DesignAnswer",
     "Equilibrium",
     "EquilibriumSolver",
     "Expect",
@@ -75,6 +80,8 @@ __all__ = [
     "PathPoint",
     "Polynomial",
     "Prepared",
+    "QuasiStatic",
+    "QuasiStaticAnswer",
     "Scene",
     "SceneError",
     "Settings",
@@ -86,6 +93,7 @@ __all__ = [
     "Status",
     "Straight",
     "Table",
+    "Tied",
     "TimeStep",
     "Trajectory",
     "Until",
@@ -95,6 +103,7 @@ __all__ = [
     "dump",
     "equilibrium_nlp",
     "export",
+    "find",
     "first_mesh",
     "load",
     "solve",

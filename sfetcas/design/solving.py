@@ -115,7 +115,7 @@ class Solving:
 
     def __init__(self, formulation: Formulation, solver: Ipopt | None = None, kernels: Kernels = "auto") -> None:
         self.formulation, self._kernels = formulation, kernels
-        self._solver = solver or Ipopt(tolerance=1e-9, iterations=300, extra=ENOUGH)
+        self._solver = solver or Ipopt(tolerance=1e-11, iterations=300, extra=ENOUGH)
         self.iterations = 0
 
     # -- the beginning ------------------------------------------------------------------------------
