@@ -113,7 +113,8 @@ def _draw_strips(axes: Axes) -> None:
         x, y, _ = case.along("strip", fractions)["position"].T
         axes.scatter(x, y, s=12.0 * thick**2, color=f"C{i}", label=f"{TRAVELS[i]:g} m", linewidths=0)
     axes.set(aspect="equal", xlabel="x, m", ylabel="y, m", title="As thick as drawn, not to scale")
-    axes.legend(fontsize=8, title="travel")
+    axes.set_xlim(-0.05, 0.45)
+    axes.legend(fontsize=8, title="travel", loc="lower right")
 
 
 def _draw_forces(axes: Axes) -> None:

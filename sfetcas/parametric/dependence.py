@@ -31,6 +31,9 @@ DEGREES = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 GLOBAL = 4
 """Up to this degree a polynomial holds beyond the range it was found in: stiffness goes with the fourth power."""
 
+HIGHEST = 1.3
+"""A power series of a sum has more of its mixed terms than of its pure ones: a little more than one."""
+
 TESTS = 8
 """Probes that are not fitted, but tell what a fit misses."""
 
@@ -71,7 +74,7 @@ class Number:
 class _Together:
     """Numbers that act together: their polynomial is a sum over products of Chebyshev polynomials.
 
-    ``short`` leaves products out whose degrees, each over the largest of its number, add up to more than one.
+    ``short`` leaves products out whose degrees, each over the largest of its number, add up to more than HIGHEST.
     """
 
     numbers: tuple[int, ...]
@@ -144,7 +147,7 @@ def _basis(numbers: Sequence[Number], degrees: Sequence[int], short: bool) -> ca
     products = [(0.0, ca.SX(1))]
     for terms, degree in zip(each, degrees, strict=True):
         products = [(k + i / degree, a * b) for k, a in products for i, b in enumerate(terms)]
-    chosen = [product for share, product in products if not short or share <= 1.0 + 1e-9]
+    chosen = [product for share, product in products if not short or share <= HIGHEST]
     all_of_them = ca.vertcat(*chosen[1:])
     known = ca.evalf(ca.substitute(all_of_them, x, ca.DM([number.value for number in numbers])))
     return ca.Function("basis", [x], [all_of_them - ca.DM(known)])
@@ -306,7 +309,7 @@ class _Probing:
         """The polynomial without high products, from a fraction of the probes; None where it misses the model."""
         chosen = [self.numbers[i] for i in group]
         basis = _basis(chosen, degrees, True)
-        random, size = np.random.default_rng(1), 2 * basis.numel_out(0) + TESTS
+        random, size = np.random.default_rng(1), int(1.5 * basis.numel_out(0)) + TESTS
         if size > MOST_PROBES:
             return None
         # As dense at the ends as where Chebyshev polynomials are told apart.
