@@ -16,9 +16,13 @@ from ..mathematics.pieces import Pieces, Unknown
 from .equations import CaseEquations
 from .formulation import Asked, Formulation, labelled
 
-__all__ = ["Assembled", "Pair", "places_asked"]
+__all__ = ["REQUIRED", "Assembled", "Pair", "places_asked"]
 
 STEPS, STATES = "steps", "equilibria"
+"""Names of blocks and pieces."""
+
+REQUIRED = "required "
+"""How the names of pieces begin that were asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,9 +239,7 @@ class Assembled:
             size = np.linalg.norm(slope * units[index[0]], axis=1)[kept]
             unit = np.where(size > 0.0, size, 1.0)
             if len(kept):
-                self.pieces.add_expression(
-                    f"required {one.name}", expression[kept.tolist()], low[kept], high[kept], unit
-                )
+                self.pieces.add_expression(REQUIRED + one.name, expression[kept.tolist()], low[kept], high[kept], unit)
             self.lines[one.name] = kept, unit
 
     def _depending(self, function: ca.Function, index: Index) -> Array:
@@ -290,6 +292,23 @@ class Assembled:
     def nlp(self) -> NLP:
         """The program."""
         return self.pieces.nlp()
+
+    def recentre(self, states: Array) -> None:
+        """Take other references: constants of the program, which is not made again."""
+        self._c = np.concatenate([states, self._fixed[:, self.equations.fixed]], axis=1)
+        self.states = states
+        self.pieces.set_constants(STATES, self._c)
+        for number, asked in enumerate(self.formulation.asked.values()):
+            self.pieces.set_constants(f"lifted {number}", self._c[list(asked.cases)])
+        if self._pairs:
+            self.pieces.set_constants("stability", self._c[[pair.case for pair in self._pairs]])
+
+    def recentred(self, x: Array) -> Array:
+        """The same answer from where it stands: steps are zero."""
+        self.recentre(self.arrived(x))
+        found = x.copy()
+        found[self._steps.index] = 0.0
+        return found
 
     def tell(self, steps: Array, values: Array | None = None) -> Array:
         """All results of all cases after steps, (cases, results); ``values`` are all unknowns."""

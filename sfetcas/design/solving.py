@@ -20,7 +20,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import SAME, Mesh
 from ..parametric.equilibrium import asked_mesh
-from .assembled import Assembled, Pair, places_asked
+from .assembled import REQUIRED, Assembled, Pair, places_asked
 from .bounds import refuse_contradictions
 from .certifying import Certified, certified
 from .equations import CaseEquations
@@ -33,6 +33,9 @@ ROUNDS = 6
 
 TURN = 0.5
 """Rotation of a node, rad, in one step of the way at most: a step that turns more may have left its branch."""
+
+FAR = 1.0
+"""Rotation from a reference, rad, beyond which the next step of the way begins from another one."""
 
 FIRST, LEAST = 0.2, 1e-3
 """Share of the way from the guess in the first step, and in the last one before giving up."""
@@ -228,14 +231,16 @@ class Solving:
             cases = self._certified(program, result)
             if self.formulation.margin is not None or not _unstable(cases):
                 return result, cases
+        begun = program.states
         followed = self._followed(program, nlp, rows)
         if followed is not None:
             along = self._certified(program, followed)
             if result.status is not Status.SOLVED or _unstable(along) < _unstable(cases):
                 return followed, along
+        program.recentre(begun)
         if result.status is not Status.SOLVED:
             lines = np.array(rows(result.x, nlp.p_value)).ravel()
-            self._refuse(program, result, nlp.rows, np.maximum(lines - nlp.upper, nlp.lower - lines))
+            self._refuse(program, result, np.maximum(lines - nlp.upper, nlp.lower - lines))
         return result, cases
 
     def _followed(self, program: Assembled, nlp: NLP, rows: ca.Function) -> NLPResult | None:
@@ -243,11 +248,11 @@ class Solving:
         method = replace(self._solver, iterations=SHORT, extra={**self._solver.extra, **WARM}).prepare(nlp)
         first = np.array(rows(nlp.guess, nlp.p_value)).ravel()
         missed = np.clip(first, nlp.lower, nlp.upper) - first
-        share, step, x, lam = 0.0, FIRST, nlp.guess, None
+        share, step, x, lam, p = 0.0, FIRST, nlp.guess, None, nlp.p_value
         while step > LEAST:
             there = min(1.0, share + step)
             rest = (1.0 - there) * missed
-            result = method(guess=x, lam=lam, lower=nlp.lower - rest, upper=nlp.upper - rest)
+            result = method(p=p, guess=x, lam=lam, lower=nlp.lower - rest, upper=nlp.upper - rest)
             self.iterations += result.iterations
             if result.status is not Status.SOLVED or program.turned(x, result.x) > TURN:
                 step *= 0.5
@@ -255,9 +260,12 @@ class Solving:
             share, x, lam, step = there, result.x, result.lam, 1.5 * step
             if share == 1.0:
                 return result
+            if program.turned(nlp.guess, x) > FAR:
+                x = program.recentred(x)
+                p = program.pieces.constants()
         return None
 
-    def _refuse(self, program: Assembled, result: NLPResult, names: Sequence[str], missed: Array) -> None:
+    def _refuse(self, program: Assembled, result: NLPResult, missed: Array) -> None:
         """Say what could not be met.
 
         Raises
@@ -265,9 +273,10 @@ class Solving:
         SolveError
             Always.
         """
-        own = [(float(x), name) for x, name in zip(missed, names, strict=True)]
-        named = [(x, _plain(name)) for x, name in sorted(own, reverse=True) if x > VIOLATED or not np.isfinite(x)]
-        worst = list(dict.fromkeys(name for _, name in named))[:3]
+        found = zip(missed.tolist(), program.pieces.row_owners(), strict=True)
+        # What was asked for by name comes first: what answers miss follows from it.
+        named = sorted((not piece.startswith(REQUIRED), -x, label) for x, (piece, label) in found if not x <= VIOLATED)
+        worst = list(dict.fromkeys(label.removeprefix(REQUIRED) for _, _, label in named))[:3]
         last = self._iterate(program, result)
         status = Status.UNMET if result.status is Status.INFEASIBLE else result.status
         detail = f"IPOPT: {result.message} after {counted(result.iterations, 'iteration')}"
@@ -342,12 +351,11 @@ class Solving:
 
     def _answer(self, program: Assembled, result: NLPResult, cases: Sequence[Certified]) -> Solved:
         multipliers: dict[str, Array] = {}
-        names = [_without_number(name) for name in program.pieces.row_names()]
+        pieces = np.array([piece for piece, _ in program.pieces.row_owners()])
         for one in self.formulation.required:
             kept, unit = program.lines[one.name]
-            at = [i for i, name in enumerate(names) if name == f"required {one.name}"]
             found = np.zeros(len(one.relation.low))
-            found[kept] = result.lam[at] / unit / program.weight if len(kept) else 0.0
+            found[kept] = result.lam[pieces == REQUIRED + one.name] / unit / program.weight
             multipliers[one.name] = found
         unstable = [self.formulation.cases[i] for i, c in enumerate(cases) if c.equilibrium.certificate.stable is False]
         told = [*unstable[:3], *([counted(len(unstable) - 3, "other", "others")] if unstable[3:] else [])]
@@ -370,16 +378,6 @@ BELOW = 1e-6
 def _unstable(cases: Sequence[Certified]) -> int:
     """How many cases are unstable."""
     return sum(case.equilibrium.certificate.stable is False for case in cases)
-
-
-def _plain(name: str) -> str:
-    """The name of rows without what the program puts before and behind."""
-    return _without_number(name).removeprefix("required ")
-
-
-def _without_number(name: str) -> str:
-    head, dot, tail = name.rpartition(".")
-    return head if dot and tail.isdigit() else name
 
 
 def _united(meshes: Sequence[Mesh]) -> Mesh:

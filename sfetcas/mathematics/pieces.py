@@ -11,7 +11,7 @@ have units: the solver sees numbers near one.  This module knows no mechanics.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -261,12 +261,20 @@ class Pieces:
     def row_names(self) -> list[str]:
         """A name for each row."""
         names = []
-        for piece in self._pieces:
-            many, several = piece.instances > 1, piece.rows > 1
-            for i in range(piece.instances):
-                where = piece.labels[i] if piece.labels else f"{piece.name}[{i}]" if many else piece.name
-                names += [f"{where}.{k}" if several else where for k in range(piece.rows)]
+        for _, where, rows in self._instances():
+            names += [f"{where}.{k}" for k in range(rows)] if rows > 1 else [where] * rows
         return names
+
+    def row_owners(self) -> list[tuple[str, str]]:
+        """For each row the name of its piece, and what its instance is called."""
+        return [(name, where) for name, where, rows in self._instances() for _ in range(rows)]
+
+    def _instances(self) -> Iterator[tuple[str, str, int]]:
+        """Of each instance the piece, what it is called, and its rows."""
+        for piece in self._pieces:
+            for i in range(piece.instances):
+                where = f"{piece.name}[{i}]" if piece.instances > 1 else piece.name
+                yield piece.name, piece.labels[i] if piece.labels else where, piece.rows
 
     # -- the program ----------------------------------------------------------------------------------
 

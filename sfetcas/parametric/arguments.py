@@ -126,7 +126,9 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
     value = _value(scene, path, name)
     if isinstance(value, (list, tuple)):
         count = len(value)
-        if scene.resolved_dimension == "plane" and count == 3 and path[-1] in VECTORS:
+        # A table along a member has values, too, but these are no vector.
+        vector = path[-1] in VECTORS and (path[-1] != "value" or path[0] == "loads")
+        if scene.resolved_dimension == "plane" and count == 3 and vector:
             # What is out of the plane is no number of a plane scene; moments and rotations are about z.
             about = path[-1] == "rotation" or (path[0] == "loads" and scene.loads[path[1]].type == "moment")
             chosen = [2] if about else [0, 1]
