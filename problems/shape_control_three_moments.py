@@ -34,7 +34,7 @@ IN_SPACE = ((0.0, 1.0, 0.6), (0.0, -2.0, 0.5), (0.0, 0.5, 1.5))
 """Moments, N m, in fixed axes; x is along the straight rod."""
 
 TOLERANCE = 1e-6
-"""Moments, N m, and positions, m: meshes are within 1e-8."""
+"""Moments, N m, and positions, m: meshes are within 1e-8, of the helix 1e-6, which it is 3 mm from: 1e-8 m2."""
 
 
 def scene(*, space: bool) -> Scene:
@@ -77,12 +77,12 @@ def helix(x: np.ndarray) -> np.ndarray:
     return np.stack([local @ along, local[:, 1], local @ across], axis=1)
 
 
-def bent(scene: Scene, targets: dict[str, np.ndarray]) -> DesignAnswer:
+def bent(scene: Scene, targets: dict[str, np.ndarray], accuracy: float) -> DesignAnswer:
     """Moments for which nodes are as near as can be to where they shall be."""
     components = (1, 2) if scene.resolved_dimension == "space" else (0,)
     one = "loads.{}.value.{}" if len(components) > 1 else "loads.{}.value"
     names = [one.format(level, i) for level in LEVELS for i in components]
-    design = Design(scene, dict.fromkeys(names, (-10.0, 10.0)), accuracy=1e-8)
+    design = Design(scene, dict.fromkeys(names, (-10.0, 10.0)), accuracy=accuracy)
     off = [design.answer("", f"nodes.{node}.position")[: len(at)] - ca.DM(at) for node, at in targets.items()]
     design.minimise(ca.sumsqr(ca.vertcat(*off)))
     return design.solve()
@@ -91,7 +91,7 @@ def bent(scene: Scene, targets: dict[str, np.ndarray]) -> DesignAnswer:
 @functools.cache
 def plane() -> DesignAnswer:
     """The rod through the ends of three arcs."""
-    return bent(scene(space=False), dict(zip(LEVELS, arcs(IN_PLANE), strict=True)))
+    return bent(scene(space=False), dict(zip(LEVELS, arcs(IN_PLANE), strict=True)), 1e-8)
 
 
 def known() -> Scene:
@@ -103,13 +103,13 @@ def known() -> Scene:
 def space() -> DesignAnswer:
     """The rod through its nodes under the known moments."""
     step = solve(known(), accuracy=1e-8).last
-    return bent(scene(space=True), {level: step.position(level) for level in LEVELS})
+    return bent(scene(space=True), {level: step.position(level) for level in LEVELS}, 1e-8)
 
 
 @functools.cache
 def nearest() -> DesignAnswer:
     """The rod as near as can be to a helix."""
-    return bent(scene(space=True), dict(zip(LEVELS, helix(np.array([1 / 3, 2 / 3, 1.0])), strict=True)))
+    return bent(scene(space=True), dict(zip(LEVELS, helix(np.array([1 / 3, 2 / 3, 1.0])), strict=True)), 1e-6)
 
 
 def moments(answer: DesignAnswer) -> np.ndarray:
@@ -120,7 +120,7 @@ def moments(answer: DesignAnswer) -> np.ndarray:
 def missed(answer: DesignAnswer, at: np.ndarray) -> float:
     """Sum of the squared distances to the helix under moments, by statics."""
     numbers = dict(zip(answer.values, at.tolist(), strict=True))
-    step = solve(changed(scene(space=True), numbers), accuracy=1e-8).last
+    step = solve(changed(scene(space=True), numbers), accuracy=1e-6).last
     wanted = helix(np.array([1 / 3, 2 / 3, 1.0]))
     return float(sum(np.sum((step.position(n) - w) ** 2) for n, w in zip(LEVELS, wanted, strict=True)))
 
@@ -129,7 +129,7 @@ def check() -> dict[str, float]:
     """Differences that have to be below TOLERANCE."""
     wanted = np.array(IN_SPACE)[:, 1:].ravel()
     helical, found = nearest(), moments(nearest())
-    beside = min(missed(helical, found * (1.0 + 0.02 * s * np.eye(6)[i])) for i in range(0, 6, 2) for s in (-1, 1))
+    beside = min(missed(helical, found * (1.0 + 0.02 * s * np.eye(6)[i])) for i in (0, 3) for s in (-1, 1))
     return {
         "moments in the plane against arcs": float(np.abs(moments(plane()) - IN_PLANE).max()),
         "moments in space against those that were known": float(np.abs(moments(space()) - wanted).max()),

@@ -105,12 +105,12 @@ def test_large_rotations_in_space():
         dimension="space",
         sections={"strip": CrossSection(EI2=1.5, EI3=1.0, GJ=0.7)},
         loads={"tip": Load(type="moment", node="tip", value=[0, 0, 0.5])},
-        analysis=Analysis(accuracy=1e-6),
+        analysis=Analysis(accuracy=1e-5),
     )
     # An arc of 5.5 rad by its energy M^2 L / 2 EI.
     answer = find(rod, {"loads.tip.value.2": (-10.0, 10.0)}, {"energy.elastic": 0.5 * 5.5**2})
     # The energy on the mesh is as far as its positions.
-    assert answer.values["loads.tip.value.2"] == pytest.approx(5.5, abs=1e-5)
+    assert answer.values["loads.tip.value.2"] == pytest.approx(5.5, abs=1e-4)
 
 
 def test_curvature_is_that_of_statics():

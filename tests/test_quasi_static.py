@@ -31,13 +31,13 @@ def cantilever(force=(0, 1)):
 
 
 def test_tip_follows_a_circle():
-    path = QuasiStatic(cantilever(), {"loads.tip.value": (-60.0, 60.0)}, points=9)
+    path = QuasiStatic(cantilever(), {"loads.tip.value": (-60.0, 60.0)}, points=7)
     tip, angle = path.answer("nodes.tip.position"), 0.5 * np.pi * path.s
     path.subject_to(tip[:, 0] == 0.55 + 0.1 * np.cos(angle), tip[:, 1] == 0.7 + 0.05 * np.sin(angle))
     answer = path.solve()
     assert answer.jumps == ()
     assert answer.stable
-    for i in (3, 8):
+    for i in (2, 6):
         there = solve(changed(cantilever(), {"loads.tip.value": answer.inputs["loads.tip.value"][i]})).last
         wanted = 0.55 + 0.1 * np.cos(angle[i]), 0.7 + 0.05 * np.sin(angle[i])
         # Both meshes are within 1e-6 of the length.
