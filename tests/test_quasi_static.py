@@ -1,5 +1,7 @@
 """Quasi-static trajectories: against statics of single points, closed forms, and a snap that is known."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -15,8 +17,11 @@ from sfetcas import (
     SceneError,
     SolveError,
     changed,
+    load,
     solve,
 )
+
+FOLDER = Path(__file__).parent.parent / "problems"
 
 
 def cantilever(force=(0, 1)):
@@ -42,6 +47,21 @@ def test_tip_follows_a_circle():
         wanted = 0.55 + 0.1 * np.cos(angle[i]), 0.7 + 0.05 * np.sin(angle[i])
         # Both meshes are within 1e-6 of the length.
         assert there.position("tip")[:2] == pytest.approx(wanted, abs=3e-6)
+
+
+def test_a_mechanism_in_space_follows_its_output():
+    """The crank that turns the rocker of a loop of hinges, which count turns."""
+    scene = load(FOLDER / "fourbar_hinges_in_space.toml")
+    scene = scene.replace(expect=(), analysis=Analysis(steps=[30.0]))
+    path = QuasiStatic(scene, {"factor": (-400.0, 400.0)}, points=4, accuracy=1e-6)
+    rocker = solve(scene).last.spring("foot").to_dict()["angle"] + 0.3 * path.s
+    path.subject_to(path.answer("springs.foot.angle") == rocker)
+    answer = path.solve()
+    there = solve(answer.scene(3)).last
+    # Rigid links: to rounding, and what IPOPT leaves.
+    assert there.spring("foot").to_dict()["angle"] == pytest.approx(rocker[-1], abs=1e-8)
+    assert answer.jumps == ()
+    assert (np.diff(answer.inputs["factor"][:, 0]) > 0.0).all()
 
 
 def test_smoothest_input_between_two_values_is_a_straight_line():

@@ -309,7 +309,7 @@ class Pieces:
         return NLP(
             x=x,
             p=p,
-            f=f,
+            f=ca.densify(f),
             g=g,
             lower=lower,
             upper=upper,
