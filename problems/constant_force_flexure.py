@@ -67,7 +67,7 @@ def designed() -> DesignAnswer:
 def force(strip: Scene, travel: float) -> float:
     """What the head pushes back with, N, by statics."""
     pressed = changed(strip, {"motions.press.displacement": [0, -travel]})
-    return -float(solve(pressed, accuracy=1e-6).last.reaction("head")[0][1])
+    return -float(solve(pressed, accuracy=1e-5).last.reaction("head")[0][1])
 
 
 def ripple(forces: np.ndarray) -> float:
