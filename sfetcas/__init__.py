@@ -31,6 +31,8 @@ from .description.scenefile import dump, load
 from .description.sections import CrossSection, Polynomial, Table
 from .description.shapes import Arc, Curvature, Helix, Spline, Straight
 from .description.springs import Spring
+from .design.designing import Design, DesignAnswer, find
+from .design.quasi_static import QuasiStatic, QuasiStaticAnswer
 from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Certificate, Equilibrium, Solution
@@ -66,6 +68,8 @@ __all__ = [
     "CrossSection",
     "Curvature",
     "Derivatives",
+    "Design",
+    "DesignAnswer",
     "Equilibrium",
     "EquilibriumSolver",
     "Expect",
@@ -95,6 +99,8 @@ __all__ = [
     "PathPoint",
     "Polynomial",
     "Prepared",
+    "QuasiStatic",
+    "QuasiStaticAnswer",
     "Scene",
     "SceneError",
     "Settings",
@@ -117,6 +123,7 @@ __all__ = [
     "dump",
     "equilibrium_nlp",
     "export",
+    "find",
     "first_mesh",
     "fit",
     "fitting",

@@ -33,6 +33,7 @@ class Status(enum.Enum):
     SHORT = "solved, but not to the accuracy asked for"
     CUT = "solved, but the path could not be followed to the end of its range"
     INFEASIBLE = "no shape of the members satisfies all supports, joints and motions"
+    UNMET = "no values of the unknowns within their bounds meet all that is asked for"
     STRETCHED = "no finite force holds the members"
     UNBOUNDED = "the loads are not held: the energy falls without bound"
     STOPPED = "the motion could not be followed further"

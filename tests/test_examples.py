@@ -1,5 +1,6 @@
 """The problems that are programs: each checks itself."""
 
+import functools
 import importlib.util
 from pathlib import Path
 
@@ -10,6 +11,7 @@ FOLDER = Path(__file__).parent.parent / "problems"
 PROGRAMS = sorted(FOLDER.glob("*.py"))
 
 
+@functools.cache
 def imported(path):
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
@@ -109,3 +111,29 @@ def test_tables_of_the_two_loops_have_a_row_a_kind_and_a_row_a_stiffness(monkeyp
     monkeypatch.setattr(module, "STIFFER", module.STIFFER[:2])
     assert [line.split()[0] for line in module.side_by_side()[1:]] == list(module.KINDS)
     assert [float(line.split()[0]) for line in module.agreement()[1:]] == list(module.STIFFER)
+
+
+DESIGNS = (
+    "constant_force_flexure",
+    "flexure_hinge_least_shift",
+    "rest_shape_hangs_straight",
+    "shape_control_three_moments",
+)
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_designs_are_drawn(name, monkeypatch, tmp_path):
+    module = imported(FOLDER / f"{name}.py")
+    if name == "flexure_hinge_least_shift":
+        # Shifts are checked above; a curve of them takes a solution a point.
+        monkeypatch.setattr(module, "shift", lambda crossing, angle: abs(crossing - module.WITTRICK) * angle)
+    figure = module.picture()
+    figure.savefig(tmp_path / "design.png")
+    assert (tmp_path / "design.png").stat().st_size > 10_000
+    assert all(axes.has_data() for axes in figure.axes)
+
+
+def test_a_wrong_closed_form_of_the_rest_shape_is_noticed(monkeypatch):
+    module = imported(FOLDER / "rest_shape_hangs_straight.py")
+    monkeypatch.setattr(module, "EXACT", module.EXACT * (1.0 + 1e-6))
+    assert max(module.check().values()) > module.TOLERANCE

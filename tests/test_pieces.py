@@ -91,6 +91,27 @@ def test_rows_have_names():
     assert len(names) == 8
 
 
+def test_other_constants_and_guesses_need_no_other_program():
+    pieces, symbol = Pieces("interpreted"), ca.MX.sym("mine", 2)
+    x = pieces.unknowns("x", [1.0, 1.0], symbol=symbol)
+    w, c = ca.SX.sym("w"), ca.SX.sym("c")
+    function = ca.Function("cube", [w, c], [w**3 - c])
+    pieces.add_rows("cube", function, x.index[:, None], np.array([[8.0], [27.0]]), labels=("one", "other"))
+    pieces.add_term("nothing", 0.0 * symbol[0])
+    assert pieces.row_names() == ["one", "other"]
+    assert pieces.row_owners() == [("cube", "one"), ("cube", "other")]
+    nlp = pieces.nlp()
+    solve = Ipopt().prepare(nlp)
+    np.testing.assert_allclose(solve().x, [2.0, 3.0], atol=1e-8)
+    pieces.set_constants("cube", np.array([[-64.0], [125.0]]))
+    pieces.set_guess("x", [-3.0, 4.0])
+    np.testing.assert_array_equal(pieces.guess, [-3.0, 4.0])
+    # The tolerance of IPOPT.
+    np.testing.assert_allclose(solve(p=pieces.constants(), guess=pieces.guess).x, [-4.0, 5.0], atol=1e-8)
+    shifted = solve(lower=nlp.lower + 12.0, upper=nlp.upper + 12.0)
+    np.testing.assert_allclose(shifted.x, np.cbrt([20.0, 39.0]), atol=1e-8)
+
+
 def test_expressions_read_only_what_they_depend_on():
     pieces = Pieces()
     x = pieces.unknowns("x", np.zeros((3, 4)))

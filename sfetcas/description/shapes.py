@@ -33,7 +33,7 @@ from ..mathematics.curves import (
 from ..mathematics.quaternion import matrix, rotate
 from .records import Direction, Number, Numbers, Positive, Record, Vector
 
-__all__ = ["Arc", "CenterLine", "Curvature", "Helix", "Shape", "Spline", "Straight", "place"]
+__all__ = ["Arc", "CenterLine", "Curvature", "Helix", "Shape", "Spline", "Straight", "end_of", "place"]
 
 Floats = NDArray[np.float64]
 
@@ -243,6 +243,26 @@ def place(
         return _line(first, chord, length, curve)
     except SceneError as error:
         raise error.within(*where) from None
+
+
+def end_of(shape: Any, start: ArrayLike, b2: ArrayLike | None = None) -> Floats | None:
+    """Where a shape ends that says so by itself: a given curvature, a helix, a spline; None of others.
+
+    Parameters
+    ----------
+    shape : Straight, Arc, Helix, Curvature or Spline
+    start : (3,) m
+        Position of the first node.
+    b2 : (3,), optional
+    """
+    if isinstance(shape, Spline):
+        return np.array(shape.points[-1], float)
+    if not isinstance(shape, Helix) and not (isinstance(shape, Curvature) and shape.start is not None):
+        return None
+    first, across = np.array(start, float), None if b2 is None else np.array(b2, float)
+    # Of the chord only its not being zero is asked.
+    length, curve = _curve_of(shape, first, np.ones(3), across)
+    return np.asarray(first + length * curve.positions(np.ones(1))[0])
 
 
 def _curve_of(shape: Any, start: Floats, chord: Floats, b2: Floats | None) -> tuple[float, Curve]:

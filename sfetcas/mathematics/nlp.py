@@ -124,21 +124,27 @@ class Solver:
     exact: bool = True
 
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
-        """A function (p, guess, lam) -> NLPResult; each argument defaults to that of the record."""
+        """A function (p, guess, lam, lower, upper) -> NLPResult; each argument defaults to that of the record."""
         options = dict(self.options)
         if self.exact and self.plugin == "ipopt":
             options |= _derivatives(nlp)
         function = ca.nlpsol("nlp", self.plugin, {"x": nlp.x, "p": nlp.p, "f": nlp.f, "g": nlp.g}, options)
 
-        def solve(p: Array | None = None, guess: Array | None = None, lam: Array | None = None) -> NLPResult:
+        def solve(
+            p: Array | None = None,
+            guess: Array | None = None,
+            lam: Array | None = None,
+            lower: Array | None = None,
+            upper: Array | None = None,
+        ) -> NLPResult:
             try:
                 solution = function(
                     x0=nlp.guess if guess is None else guess,
                     p=nlp.p_value if p is None else p,
                     lbx=nlp.x_lower,
                     ubx=nlp.x_upper,
-                    lbg=nlp.lower,
-                    ubg=nlp.upper,
+                    lbg=nlp.lower if lower is None else lower,
+                    ubg=nlp.upper if upper is None else upper,
                     lam_g0=np.zeros(nlp.g.numel()) if lam is None else lam,
                 )
             except RuntimeError as error:
@@ -213,7 +219,7 @@ class Ipopt:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
-        """A function (p, guess, lam) -> NLPResult."""
+        """A function (p, guess, lam, lower, upper) -> NLPResult."""
         ipopt = {
             "tol": self.tolerance,
             "max_iter": self.iterations,

@@ -11,8 +11,8 @@ have units: the solver sees numbers near one.  This module knows no mechanics.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -64,6 +64,7 @@ class _Piece:
     high: Array
     unit: Array
     cost: float
+    labels: tuple[str, ...] = ()
 
     @property
     def instances(self) -> int:
@@ -101,8 +102,11 @@ class Pieces:
         low: ArrayLike = -np.inf,
         high: ArrayLike = np.inf,
         unit: ArrayLike = 1.0,
+        symbol: ca.MX | None = None,
     ) -> Unknown:
         """A block of unknowns in the shape of its guess; bounds and units are broadcast to it.
+
+        A symbol may be there already, as expressions outlive the program they are put into.
 
         Raises
         ------
@@ -117,7 +121,7 @@ class Pieces:
         index = self._size + np.arange(start.size).reshape(shape)
         self._size += start.size
         # A matrix in CasADi's order has the same places as the block's own.
-        symbol = ca.MX.sym(name, *shape)
+        symbol = ca.MX.sym(name, *shape) if symbol is None else symbol
         block = Unknown(name, symbol, index, unit, low, high)
         self.blocks[name] = block
         self._guesses.append(start.reshape(shape).ravel())
@@ -132,6 +136,7 @@ class Pieces:
         low: ArrayLike = 0.0,
         high: ArrayLike | None = None,
         unit: ArrayLike = 1.0,
+        labels: Sequence[str] = (),
     ) -> None:
         """Rows ``low <= function(w, c) <= high`` of each instance; equal to ``low`` without ``high``.
 
@@ -141,8 +146,9 @@ class Pieces:
         index : (instances, w), places of the unknowns
         constants : (instances, c)
         low, high, unit : broadcast to (instances, rows)
+        labels : what rows of each instance are called, in place of numbers of the instances
         """
-        self._add(name, function, index, constants, low, low if high is None else high, unit, 0.0)
+        self._add(name, function, index, constants, low, low if high is None else high, unit, 0.0, labels)
 
     def add_cost(
         self, name: str, function: ca.Function, index: Index, constants: Array | None = None, weight: float = 1.0
@@ -200,12 +206,26 @@ class Pieces:
         high: ArrayLike,
         unit: ArrayLike,
         cost: float,
+        labels: Sequence[str] = (),
     ) -> None:
         index = np.asarray(index, dtype=np.intp)
         given = np.zeros((len(index), 0)) if constants is None else np.asarray(constants, dtype=float)
         shape = (len(index), 0 if cost else function.numel_out(0))
         a, b, each = (np.broadcast_to(np.asarray(part, dtype=float), shape) for part in (low, high, unit))
-        self._pieces.append(_Piece(name, function, index, given, a, b, each, cost))
+        self._pieces.append(_Piece(name, function, index, given, a, b, each, cost, tuple(labels)))
+
+    # -- what may change without the program being made again ----------------------------------------
+
+    def set_constants(self, name: str, constants: Array) -> None:
+        """Other constants of the piece of a name, (instances, c)."""
+        at = next(i for i, piece in enumerate(self._pieces) if piece.name == name)
+        self._pieces[at] = replace(self._pieces[at], constants=np.asarray(constants, dtype=float))
+
+    def set_guess(self, name: str, guess: ArrayLike) -> None:
+        """Where the unknowns of a name begin, in the shape of the block."""
+        at = list(self.blocks).index(name)
+        shape = self.blocks[name].index.shape
+        self._guesses[at] = np.broadcast_to(np.asarray(guess, dtype=float), shape).ravel().copy()
 
     # -- what stands where --------------------------------------------------------------------------
 
@@ -239,11 +259,8 @@ class Pieces:
     def row_names(self) -> list[str]:
         """A name for each row."""
         names = []
-        for piece in self._pieces:
-            many, several = piece.instances > 1, piece.rows > 1
-            for i in range(piece.instances):
-                where = f"{piece.name}[{i}]" if many else piece.name
-                names += [f"{where}.{k}" if several else where for k in range(piece.rows)]
+        for _, where, rows in self._instances():
+            names += [f"{where}.{k}" for k in range(rows)] if rows > 1 else [where] * rows
         return names
 
     def violated(self, nlp: NLP, x: Array) -> list[tuple[str, float]]:
@@ -252,11 +269,21 @@ class Pieces:
         off = np.maximum(np.maximum(nlp.lower - values, values - nlp.upper), 0.0)
         off = np.where(np.isfinite(off), off, np.inf)
         worst: dict[str, float] = {}
-        for name, amount in zip(nlp.rows, off.tolist(), strict=True):
-            piece = name.partition("[")[0]
+        for (piece, _), amount in zip(self.row_owners(), off.tolist(), strict=True):
             if amount > FEASIBLE:
                 worst[piece] = max(worst.get(piece, 0.0), amount)
         return sorted(worst.items(), key=lambda item: -item[1])
+
+    def row_owners(self) -> list[tuple[str, str]]:
+        """For each row the name of its piece, and what its instance is called."""
+        return [(name, where) for name, where, rows in self._instances() for _ in range(rows)]
+
+    def _instances(self) -> Iterator[tuple[str, str, int]]:
+        """Of each instance the piece, what it is called, and its rows."""
+        for piece in self._pieces:
+            for i in range(piece.instances):
+                where = f"{piece.name}[{i}]" if piece.instances > 1 else piece.name
+                yield piece.name, piece.labels[i] if piece.labels else where, piece.rows
 
     # -- the program ----------------------------------------------------------------------------------
 
@@ -291,7 +318,7 @@ class Pieces:
         return NLP(
             x=x,
             p=p,
-            f=f,
+            f=ca.densify(f),
             g=g,
             lower=lower,
             upper=upper,

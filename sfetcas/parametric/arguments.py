@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
+from ..description.shapes import end_of
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
@@ -518,6 +519,7 @@ def _alike(one: Model, other: Model) -> bool:
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; in the dimension that it has.
 
+    Where a shape changes that says itself where it ends, as a given curvature does, a free node there goes with it.
     What was expected of its answers is left out.
 
     Raises
@@ -533,9 +535,27 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
             branch = branch.setdefault(key, {})
         branch[last] = float(value)
     tree |= {"dimension": scene.resolved_dimension, "expect": ()}
+    _carry_ends(scene, tree, numbers)
     found = _with(scene, tree)
     assert isinstance(found, Scene)
     return found
+
+
+def _carry_ends(scene: Scene, tree: dict[str, Any], numbers: Mapping[str, float]) -> None:
+    """Take free nodes to where the shapes end that numbers change."""
+    for name, member in scene.members.items():
+        first, last = member.nodes[0], member.nodes[-1]
+        moved = any(n.startswith((f"members.{name}.shape.", f"nodes.{first}.position.")) for n in numbers)
+        others = [n for n, other in scene.members.items() if last in other.nodes and n != name]
+        told = any(n.startswith(f"nodes.{last}.position.") for n in numbers)
+        if not moved or told or others or scene.nodes[last].support != "free":
+            continue
+        shape = _with(member.shape, tree.get("members", {}).get(name, {}).get("shape", {}))
+        begin = _with(scene.nodes[first].position, tree.get("nodes", {}).get(first, {}).get("position", {}))
+        end = end_of(shape, [*begin, 0.0][:3], member.b2)
+        if end is not None:
+            place = {str(i): x for i, x in enumerate(end.tolist()[: len(scene.nodes[last].position)])}
+            tree.setdefault("nodes", {}).setdefault(last, {})["position"] = place
 
 
 def _with(here: Any, tree: Any) -> Any:

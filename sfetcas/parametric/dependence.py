@@ -34,6 +34,15 @@ GLOBAL = 4
 UNLIKE = 1e3
 """Sizes of terms that differ by more lose digits of the least squares."""
 
+HIGHEST = 1.3
+"""A power series of a sum has more of its mixed terms than of its pure ones: a little more than one."""
+
+TESTS = 8
+"""Probes that are not fitted, but tell what a fit misses."""
+
+MISSED = 30.0
+"""Times EXACT that a polynomial without high products may miss there: what least squares leave of rounding."""
+
 MOST_PROBES = 3000
 """Probes at most for numbers that act together."""
 
@@ -66,10 +75,14 @@ class Number:
 
 @dataclass(frozen=True)
 class _Together:
-    """Numbers that act together: their polynomial is a sum over products of Chebyshev polynomials."""
+    """Numbers that act together: their polynomial is a sum over products of Chebyshev polynomials.
+
+    ``short`` leaves products out whose degrees, each over the largest of its number, add up to more than HIGHEST.
+    """
 
     numbers: tuple[int, ...]
     degrees: tuple[int, ...]
+    short: bool
     entries: Array
     coefficients: Array
 
@@ -107,7 +120,7 @@ class Dependence:
             if not coefficients.any():
                 continue
             chosen = [self.numbers[i] for i in group.numbers]
-            terms = _basis(chosen, group.degrees)(p[list(group.numbers)])
+            terms = _basis(chosen, group.degrees, group.short)(p[list(group.numbers)])
             total += times(ca.sparsify(ca.DM(coefficients)), terms)
         return total
 
@@ -130,14 +143,15 @@ def _polynomials(x: ca.SX, number: Number, degree: int) -> list[ca.SX]:
     return terms
 
 
-def _basis(numbers: Sequence[Number], degrees: Sequence[int]) -> ca.Function:
+def _basis(numbers: Sequence[Number], degrees: Sequence[int], short: bool) -> ca.Function:
     """(numbers) -> all products of their polynomials but the constant one, less what they are at the values."""
     x = ca.SX.sym("x", len(numbers))
     each = [_polynomials(x[i], number, degree) for i, (number, degree) in enumerate(zip(numbers, degrees, strict=True))]
-    products = [ca.SX(1)]
-    for terms in each:
-        products = [a * b for a in products for b in terms]
-    all_of_them = ca.vertcat(*products[1:])
+    products = [(0.0, ca.SX(1))]
+    for terms, degree in zip(each, degrees, strict=True):
+        products = [(k + i / degree, a * b) for k, a in products for i, b in enumerate(terms)]
+    chosen = [product for share, product in products if not short or share <= HIGHEST]
+    all_of_them = ca.vertcat(*chosen[1:])
     known = ca.evalf(ca.substitute(all_of_them, x, ca.DM([number.value for number in numbers])))
     return ca.Function("basis", [x], [all_of_them - ca.DM(known)])
 
@@ -275,7 +289,10 @@ class _Probing:
         if degrees == (1,):
             values = (self.moved[group[0]] - self.base)[None, :]
             rows = np.array([[self._end(group[0]) - self.numbers[group[0]].value]])
-            return self._solved(group, degrees, rows, values)
+            return self._solved(group, degrees, rows, values, short=False)
+        brief = self._short(group, degrees) if len(group) > 1 and max(degrees) > 2 else None
+        if brief is not None:
+            return brief
         count = int(np.prod([degree + 1 for degree in degrees]))
         names = ", ".join(self.numbers[i].name for i in group)
         if count > MOST_PROBES:
@@ -286,12 +303,32 @@ class _Probing:
             nodes = centre + half * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
             grids.append(nodes.tolist() if degree > 1 else [self.numbers[i].value, self._end(i)])
         points = list(itertools.product(*grids))
-        basis = _basis([self.numbers[i] for i in group], degrees)
+        basis = _basis([self.numbers[i] for i in group], degrees, False)
         rows = np.array([np.array(basis(ca.DM(point))).ravel() for point in points])
         values = np.stack([self.at(dict(zip(group, point, strict=True))) for point in points]) - self.base
-        return self._solved(group, degrees, rows, values)
+        return self._solved(group, degrees, rows, values, short=False)
 
-    def _solved(self, group: tuple[int, ...], degrees: tuple[int, ...], rows: Array, values: Array) -> _Together:
+    def _short(self, group: tuple[int, ...], degrees: tuple[int, ...]) -> _Together | None:
+        """The polynomial without high products, from a fraction of the probes; None where it misses the model."""
+        chosen = [self.numbers[i] for i in group]
+        basis = _basis(chosen, degrees, True)
+        random, size = np.random.default_rng(1), int(1.5 * basis.numel_out(0)) + TESTS
+        if size > MOST_PROBES:
+            return None
+        # As dense at the ends as where Chebyshev polynomials are told apart.
+        points = np.cos(np.pi * random.uniform(size=(size, len(group))))
+        points = np.array([n.span[0] for n in chosen]) + np.array([n.span[1] for n in chosen]) * points
+        rows = np.array([np.array(basis(ca.DM(point))).ravel() for point in points])
+        values = np.stack([self.at(dict(zip(group, point, strict=True))) for point in points.tolist()]) - self.base
+        found = self._solved(group, degrees, rows[TESTS:], values[TESTS:], short=True)
+        told = np.zeros_like(values[:TESTS])
+        told[:, found.entries] = rows[:TESTS] @ found.coefficients.T
+        missed = [self.differs(a, b, MISSED).any() for a, b in zip(told, values[:TESTS], strict=True)]
+        return None if any(missed) else found
+
+    def _solved(
+        self, group: tuple[int, ...], degrees: tuple[int, ...], rows: Array, values: Array, *, short: bool
+    ) -> _Together:
         """Coefficients by what the basis is at some probes, and what data gain there."""
         entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, 1e-300)).any(axis=0))
         largest = np.abs(rows).max(axis=0)
@@ -299,7 +336,7 @@ class _Probing:
         size = largest if largest.max(initial=0.0) > UNLIKE * largest.min(initial=np.inf) else np.ones(len(largest))
         coefficients = (np.linalg.lstsq(rows / size, values[:, entries], rcond=None)[0] / size[:, None]).T
         coefficients[np.abs(coefficients) * largest < 1e-3 * EXACT * self.unit[entries, None]] = 0.0
-        return _Together(group, degrees, entries, coefficients)
+        return _Together(group, degrees, short, entries, coefficients)
 
     def check(self, result: Dependence) -> None:
         """Refuse what misses the model at random values.

@@ -25,7 +25,7 @@ from ..solvers.prepared import Prepared
 from .arguments import Arguments, Asked, asked_for
 from .results import Results, default_results
 
-__all__ = ["EquilibriumSolver", "Place", "chosen_places", "equilibrium_solver", "refuse_search"]
+__all__ = ["EquilibriumSolver", "Place", "asked_mesh", "chosen_places", "equilibrium_solver", "refuse_search"]
 
 Place = Mapping[str, Sequence[float]]
 """Fractions of the length of members."""
@@ -175,7 +175,7 @@ def equilibrium_solver(
     if scene.analysis.type == "modes":
         message = "found 'modes', accepted: static or path, whose equilibria are exported, or dynamic"
         raise SceneError(message, ("analysis", "type"))
-    mesh, assembly, answer = _mesh(scene, settings or Settings())
+    mesh, assembly, answer = asked_mesh(scene, settings or Settings())
     base = assemble(scene, mesh, assembly=assembly)
     prepared = Prepared(base)
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
@@ -232,7 +232,7 @@ def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
         raise SceneError(f"turning axes are {lacking}, {instead}", ("rotating",))
 
 
-def _mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
+def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
     """The mesh that the accuracy asks for, the assembly, and the answer of statics."""
     static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
     still = scene.model_copy(update={"analysis": static})

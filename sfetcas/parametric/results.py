@@ -6,7 +6,7 @@ points: both as accurate as the positions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..description.records import unknown
 from ..errors import SceneError
-from ..mathematics import interpolation
+from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.constants import constant, times
 from ..mechanics.connections import GROUND
@@ -51,7 +51,7 @@ class Result:
         return int(np.prod(self.shape, dtype=int))
 
 
-FIELDS = {"position": "m", "force": "N", "moment": "N m"}
+FIELDS = {"position": "m", "force": "N", "moment": "N m", "curvature": "1/m"}
 """What is told along a member, beside its rotation."""
 
 
@@ -97,7 +97,7 @@ def _moment_known(model: Model, node: str) -> bool:
     return held in ([], [node])
 
 
-STATIC = ("moment", "force", "potential")
+STATIC = ("moment", "force", "curvature", "potential")
 """What is told of equilibria only; springs are told by their travel."""
 
 FREE = ("free", "ball")
@@ -151,7 +151,9 @@ class Results:
                 "nodes.*.position, .angle or .quaternion, .velocity, members.*.position, springs.*, energy.elastic"
             )
             raise SceneError(f"found {name!r}, accepted of a step: {accepted}", ("results",))
-        if not self._unique and (kind == "reactions" or (kind == "members" and key in ("force", "moment"))):
+        if not self._unique and (
+            kind == "reactions" or (kind == "members" and key in ("force", "moment", "curvature"))
+        ):
             message = f"found {name!r}, which is not unique as closings depend on each other, accepted: what is"
             raise SceneError(message, ("results",))
         tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "springs": self._spring}
@@ -220,11 +222,13 @@ class Results:
     def _member(self, name: str, member: str, key: str) -> Result:
         flexible = [n for n, record in self.model.scene.members.items() if record.type == "flexible"]
         self._known(member, flexible, name)
-        self._key(name, key, ("position", self._rotation, "force", "moment"))
+        self._key(name, key, ("position", self._rotation, "force", "moment", "curvature"))
         count = len(self.places[member])
         if key == self._rotation:
             return self._turned(name, (count,), f"the sections of {member}")
         whose = "" if key == "position" else ", of what is beyond a place on what is before"
+        if key == "curvature":
+            whose = " about the axes b1, b2, b3 of its sections"
         return Result(name, (count, 3), FIELDS[key], f"{key} along the member {member}{whose}")
 
     def _spring(self, name: str, spring: str, key: str) -> Result:
@@ -236,12 +240,52 @@ class Results:
 
     # -- what they are ------------------------------------------------------------------------------
 
+    @property
+    def curved(self) -> list[str]:
+        """Members whose curvature is told."""
+        names = [result.name.split(".") for result in self.results if result.name.endswith(".curvature")]
+        return [name[1] for name in names]
+
     def rest(self, model: Model) -> Array:
-        """Undeformed positions (m) of all nodes, then of the places of all members, flat."""
+        """Undeformed positions (m) of all nodes, then of the places of all members, flat; then what curvatures need."""
         scene = model.scene
         nodes = [np.asarray(scene.nodes[name].position, dtype=float) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.places.items()]
-        return np.concatenate([*nodes, *(part.ravel() for part in along)])
+        sections = [self._sections(model, name).ravel() for name in self.curved]
+        return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])
+
+    def _sections(self, model: Model, member: str) -> Array:
+        """Stiffness over that of the first model, curvature times size and axes b1, b2, b3 at places, (places, 15)."""
+        scene, x = model.scene, np.array(self.places[member])
+        line, section = scene.center_lines[member], scene.sections[str(scene.members[member].section)]
+        stiffness = section.stiffness(x) / self._stiffness(member)
+        axes = np.moveaxis(quaternion.matrix(line.quaternions(x)), 2, 1).reshape(len(x), 9)
+        return np.concatenate([np.nan_to_num(stiffness), line.curvatures(x) * self.model.scene.size, axes], axis=1)
+
+    def _stiffness(self, member: str) -> Array:
+        """Of the first model at the places of a member, (places, 3); infinite where it is not known."""
+        scene = self.model.scene
+        values = scene.sections[str(scene.members[member].section)].stiffness(np.array(self.places[member]))
+        return np.where(np.isnan(values), np.inf, values)
+
+    def curvature(self, member: str, moment: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
+        """Curvature about the axes of the sections, (places, 3), 1/m.
+
+        Parameters
+        ----------
+        moment : (3, places), N m, fixed axes
+        axes : what turns vectors (3, places) as the sections turn
+        sections : what :meth:`rest` tells of them, (15, places)
+        """
+        known, found = self._stiffness(member), []
+        for k in range(3):
+            along = ca.sum1(axes(sections[6 + 3 * k : 9 + 3 * k, :]) * moment)
+            finite = np.isfinite(known[:, k])
+            # What is not known is not bent: there is no moment about that axis.
+            inverse = ca.DM(np.where(finite, 1.0 / known[:, k], 0.0)).T
+            relative = sections[k, :] * ca.DM(finite.astype(float)).T + ca.DM((~finite).astype(float)).T
+            found.append(sections[3 + k, :] / self.model.scene.size + along * inverse / relative)
+        return ca.vertcat(*found).T
 
     def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
         """All results one after the other, rows before columns, in SI units.
@@ -268,10 +312,13 @@ class _Told:
         self._found = found
         count = len(model.nodes)
         along = [len(x) for x in results.places.values()]
-        bounds = np.cumsum([0, 3 * count, *(3 * n for n in along)]).tolist()
+        curved = [15 * len(results.places[name]) for name in results.curved]
+        bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved]).tolist()
         nodes, *members = ca.vertsplit(rest, bounds)
+        sections = members[len(along) :]
+        self._sections = {n: ca.reshape(x, 15, -1) for n, x in zip(results.curved, sections, strict=True)}
         self._rest = ca.reshape(nodes, 3, count)
-        self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.places, members, strict=True)}
+        self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.places, members, strict=False)}
         if expressions.elements:
             self._tangents = expressions.tangents(self._q, program.given)
 
@@ -411,7 +458,20 @@ class _Told:
             return (self._along[member] + self._three(moved) * scales.length).T
         if key in ("quaternion", "angle"):
             return self._rotations(member)
+        if key == "curvature":
+            return self._curvature(member)
         return (self._force(member) * scales.force if key == "force" else self._moment(member) * scales.moment).T
+
+    def _curvature(self, member: str) -> ca.MX:
+        def turned(vectors: ca.MX) -> ca.MX:
+            if not self._model.space:
+                # About z nothing in the plane counts, and z turns to itself.
+                return vectors
+            function = self._expressions.many(turned_vector(True), vectors.shape[1])
+            return function(self._rotations(member).T, vectors)
+
+        moment = self._moment(member) * self._model.scales.moment
+        return self._results.curvature(member, moment, turned, self._sections[member])
 
     def _rotations(self, member: str) -> ca.MX:
         model, element = self._model, self._model.element

@@ -1,0 +1,95 @@
+"""What an answer of a program is worth: each case again by Newton's method, its stability, and half the elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..description.scene import Scene
+from ..equilibria.single import finished, unjudged
+from ..equilibria.solution import Equilibrium
+from ..errors import SolveError, Status
+from ..mathematics.arrays import Array
+from ..mechanics.accuracy import halving
+from ..mechanics.equations import State
+from ..mechanics.fields import transferred
+from ..mechanics.mesh import Mesh
+from ..mechanics.model import assemble
+from ..solvers.prepared import SOLVED, Prepared
+from .equations import CaseEquations
+from .formulation import labelled
+
+__all__ = ["Certified", "certified", "prepared_case"]
+
+MOVED = 1e-4
+"""How far Newton's method may lead from an answer of the program, rad: a thousand times its tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """A case with its certificate.
+
+    Attributes
+    ----------
+    equilibrium : Equilibrium
+        On the mesh of the program.
+    shape : ndarray
+        Its softest shape: rotations, then displacements.
+    smallest : float
+        The eigenvalue, dimensionless.
+    prepared : Prepared
+        What it was solved with.
+    error : float
+        Difference of positions to those on half the elements' length, over the size of the scene.
+    """
+
+    equilibrium: Equilibrium
+    shape: Array
+    smallest: float
+    prepared: Prepared
+    error: float
+
+
+def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -> Certified:
+    """A case that a program found, looked at by what knows nothing of the program.
+
+    Raises
+    ------
+    SolveError
+        The case is no equilibrium of its scene.
+    """
+    prepared = prepared_case(scene, equations, equations.mesh)
+    factor = float(scene.analysis.steps[-1])
+    loading = prepared.model.loading(factor)
+    found = prepared.correct(state, loading)
+    if not found.residual <= SOLVED or prepared.distance(found.state, state) > MOVED:
+        raise SolveError(Status.FAILED, labelled(case, "what was found is no equilibrium of the scene"), state)
+    stability = prepared.stability(found)
+    error, notes = _error(scene, equations, prepared, unjudged(prepared, found, loading, factor))
+    equilibrium = finished(prepared, found, loading, factor, stability, estimate=error, notes=notes)
+    return Certified(
+        equilibrium, np.concatenate([stability.shape, stability.travel]), stability.smallest, prepared, error
+    )
+
+
+def prepared_case(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepared:
+    """The scene of a case on a mesh, in the units of the program: those of multipliers, too."""
+    assembly: Any = equations.assembly
+    return Prepared(assemble(scene, mesh, assembly=assembly, scales=equations.scales))
+
+
+def _error(
+    scene: Scene, equations: CaseEquations, coarse: Prepared, here: Equilibrium
+) -> tuple[float, tuple[str, ...]]:
+    mesh = coarse.model.mesh.refined()
+    if mesh.same(coarse.model.mesh):
+        return 0.0, ()
+    fine = prepared_case(scene, equations, mesh)
+    loading = fine.model.loading(here.factor)
+    found = fine.correct(transferred(coarse.model, here.state, fine.model), loading, iterations=25, most=1.5)
+    if not found.converged:
+        return np.inf, ("an equilibrium of a coarse mesh only",)
+    difference, left = halving(here.fields, unjudged(fine, found, loading, here.factor).fields)
+    return difference + left, ()

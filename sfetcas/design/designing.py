@@ -1,0 +1,335 @@
+"""Inverse problems and design over several load cases: numbers of a scene as unknowns with bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import unknown as not_known
+from ..description.scene import Scene
+from ..equilibria.solution import Equilibrium
+from ..equilibria.statics import solve
+from ..errors import SceneError, SolveError
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Kernels
+from ..mathematics.nlp import Ipopt
+from ..parametric.arguments import Parameter
+from .formulation import Bounds, Formulation, labelled
+from .solving import Iterate, Solved, Solving
+
+__all__ = ["Design", "DesignAnswer", "DesignIterate", "find"]
+
+Told = Mapping[tuple[str, str, tuple[float, ...] | None], Array]
+"""Answers by case, name and places."""
+
+ONE = ""
+"""The name of the case of a problem that names none."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignIterate:
+    """Where an unconverged solution stood: never an answer.
+
+    Attributes
+    ----------
+    values : mapping of str to ndarray
+        All unknowns; those of cases are called ``case: name``.
+    told : mapping of (case, name, places) to ndarray
+        Answers that were asked for.
+    objective : float
+    iterations : int
+    """
+
+    values: Mapping[str, Array]
+    told: Told
+    objective: float
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class DesignAnswer:
+    """A design, or the solution of an inverse problem.
+
+    Attributes
+    ----------
+    values : mapping of str to ndarray or float
+        All unknowns; those of cases are called ``case: name``.
+    objective : float
+    cases : mapping of str to Equilibrium
+        Each with its certificate: stable or not, and the error of its mesh.
+    multipliers : mapping of str to ndarray
+        Of each relation.
+    notes : tuple of str
+    iterations : int
+    """
+
+    values: Mapping[str, Any]
+    objective: float
+    cases: Mapping[str, Equilibrium]
+    multipliers: Mapping[str, Array]
+    notes: tuple[str, ...]
+    iterations: int
+    told: Told
+    scenes: Mapping[str, Scene]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all cases are certified as stable."""
+        return all(case.certificate.stable is True for case in self.cases.values())
+
+    def answers(self, case: str, name: str, at: Sequence[float] | None = None) -> Array:
+        """An answer that expressions asked for, as the program has it.
+
+        Raises
+        ------
+        SceneError
+            It was not asked for.
+        """
+        key = case, name, None if at is None else tuple(at)
+        if key not in self.told:
+            known = [labelled(one, what) for one, what, _ in self.told]
+            raise SceneError(not_known(labelled(case, name), known, "answers"), ("answers",))
+        return self.told[key]
+
+    def scene(self, case: str = ONE) -> Scene:
+        """The scene of a case with what was found in it: ``solve(answer.scene("open"))`` is another way to it."""
+        if case not in self.scenes:
+            raise SceneError(not_known(case, list(self.scenes), "cases"), ("cases",))
+        return self.scenes[case]
+
+    def replayed(self, case: str = ONE) -> float:
+        """How far the nodes are from those that ``solve`` finds from the undeformed state, over the scene's size.
+
+        That may be another equilibrium under the same loads, where there are several.
+        """
+        here = self.cases[case]
+        there = solve(self.scene(case), accuracy=here.certificate.error_estimate or None).last
+        apart = [np.linalg.norm(here.position(n) - there.position(n)) for n in self.scene(case).nodes]
+        return float(max(apart)) / self.scene(case).size
+
+
+class Design:
+    """Numbers of a scene chosen for several load cases at once.
+
+    Parameters
+    ----------
+    scene : Scene
+        Static and without contact.
+    variables : mapping of str to (low, high) or Parameter
+        Numbers of the scene that are chosen once for all cases; infinite bounds where there are none.
+    cases : mapping of str to mapping of str to numbers
+        What differs from case to case; one case without.
+    inputs : mapping of str to (low, high)
+        Numbers that are unknown in each case by itself: loads, prescribed displacements.
+    guess : mapping of str to numbers
+        Where variables and inputs begin; the values of the scene, or of the case, without.
+    accuracy : float, optional
+        Wanted error of positions over the size of the scene; that of the scene without.
+    kernels : str
+        ``auto``, ``compiled`` or ``interpreted`` derivatives.
+
+    Raises
+    ------
+    SceneError
+        Numbers that the scene does not have, bounds that contradict each other, a scene with contact or in motion.
+
+    Example
+    -------
+    >>> design = Design(scene, variables={"sections.strip.EI3": (0.2, 5.0)})          # doctest: +SKIP
+    >>> design.subject_to(design.answer("", "nodes.tip.position")[1] == 0.3)         # doctest: +SKIP
+    >>> design.solve().values["sections.strip.EI3"]                                 # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        variables: Mapping[str, Bounds | Parameter] | None = None,
+        cases: Mapping[str, Mapping[str, ArrayLike]] | None = None,
+        *,
+        inputs: Mapping[str, Bounds] | None = None,
+        guess: Mapping[str, ArrayLike] | None = None,
+        accuracy: float | None = None,
+        kernels: Kernels = "auto",
+    ) -> None:
+        cases = cases if cases is not None else {ONE: {}}
+        self._formulation, self._kernels = Formulation(scene, list(cases), accuracy), kernels
+        self._guess = dict(guess or {})
+        for case, numbers in cases.items():
+            for name, value in numbers.items():
+                self.set(name, value, case=case)
+        for name, bounds in (variables or {}).items():
+            self._vary(name, name, bounds, None, self._guess.pop(name, None))
+        for name, bounds in (inputs or {}).items():
+            start = self._guess.pop(name, None)
+            for case in cases:
+                label = labelled(case, name)
+                self._vary(label, name, bounds, case, self._guess.pop(label, start))
+        if self._guess:
+            known = [*(variables or {}), *(inputs or {})]
+            raise SceneError(not_known(next(iter(self._guess)), known, "unknowns"), ("guess",))
+
+    def _vary(
+        self, label: str, name: str, bounds: Bounds | Parameter, case: str | None, guess: ArrayLike | None
+    ) -> None:
+        low, high = self._formulation.bounds(label, name, bounds, guess)
+        known = self._formulation.numbers(name)
+        start = np.array(known.default, dtype=float)
+        if case is not None:
+            set_to = self._formulation.settings[self._formulation.number(case)]
+            start = np.array([_number(set_to.get(n), x) for n, x in zip(known.names, start, strict=True)])
+        if guess is not None:
+            start = np.broadcast_to(np.asarray(guess, dtype=float), start.shape).copy()
+        elif low < high:
+            # A number of the scene outside of the bounds is as good a guess as the bound that is nearest.
+            start = np.clip(start, low, high)
+        symbol = self._formulation.unknown(label, start, low, high)
+        self._formulation.set(name, symbol, case=case, between=(low, high))
+
+    # -- expressions --------------------------------------------------------------------------------
+
+    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
+        """Free numbers under a name of their own, which :meth:`set` makes numbers of the scene of."""
+        return self._formulation.unknown(name, guess, low, high)
+
+    def set(
+        self, name: str, value: ArrayLike | ca.MX, *, case: str | None = None, between: Bounds | None = None
+    ) -> None:
+        """What a number of the scene is, in one case or in all: a number or an expression of unknowns.
+
+        ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``; ``between`` is the range of what the model is
+        no polynomial of, as places of joints.
+        """
+        self._formulation.set(name, value, case=case, between=between)
+
+    def variable(self, name: str, case: str | None = None) -> ca.MX:
+        """An unknown by its name; of an input with its case.
+
+        Raises
+        ------
+        SceneError
+            There is none of this name.
+        """
+        label = labelled(case or ONE, name)
+        if label not in self._formulation.free:
+            raise SceneError(not_known(label, list(self._formulation.free), "unknowns"), ("variable",))
+        return self._formulation.free[label].symbol
+
+    def answer(self, case: str, name: str, at: Sequence[float] | None = None) -> ca.MX:
+        """An answer of a case by its name: ``design.answer("open", "nodes.tip.position")``.
+
+        Parameters
+        ----------
+        case : name of a case, "" where there is one only
+        name : as in the answer of generated code: positions, rotations, reactions, section forces, springs, energies
+        at : fractions of the length, of members; 21 evenly spaced ones without
+
+        Returns
+        -------
+        casadi.MX - a column, along members a row for each place
+
+        Raises
+        ------
+        SceneError
+            No such case or answer.
+        """
+        number = self._formulation.number(case)
+        return self._formulation.ask(name, [number], labelled(case, name), at)
+
+    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
+        """Relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element."""
+        self._formulation.subject_to(*relations, name=name)
+
+    def minimise(self, expression: ca.MX | float) -> None:
+        """What shall be least; of further calls the sum."""
+        self._formulation.minimise(expression)
+
+    def stable(self, margin: float = 0.0) -> None:
+        """Only stable cases are answers, each lowest eigenvalue (``certificate.smallest``, N) at least the margin."""
+        self._formulation.stable(margin)
+
+    # -- the answer -----------------------------------------------------------------------------------
+
+    def solve(self, solver: Ipopt | None = None) -> DesignAnswer:
+        """The answer, every case certified.
+
+        Raises
+        ------
+        SceneError
+            What is asked for contradicts itself.
+        SolveError
+            None was found; ``last`` is the last :class:`DesignIterate`.
+        """
+        solving = Solving(self._formulation, solver, self._kernels)
+        try:
+            return self._answered(solving.solve(), solving.iterations)
+        except SolveError as error:
+            last = error.last
+            if isinstance(last, Iterate):
+                last = DesignIterate(last.values, self._told(last), last.objective, solving.iterations)
+            raise SolveError(error.status, error.detail, last) from None
+
+    def _told(self, iterate: Iterate) -> Told:
+        cases = self._formulation.cases
+        return {(cases[key[1][0]], key[0], key[2]): value for key, value in iterate.asked.items()}
+
+    def _answered(self, solved: Solved, iterations: int) -> DesignAnswer:
+        formulation, iterate = self._formulation, solved.iterate
+        names = formulation.cases
+        return DesignAnswer(
+            values={n: float(x[0]) if x.shape == (1,) else x for n, x in iterate.values.items()},
+            objective=iterate.objective,
+            cases={name: case.equilibrium for name, case in zip(names, solved.cases, strict=True)},
+            multipliers=solved.multipliers,
+            notes=solved.notes,
+            iterations=iterations,
+            told=self._told(iterate),
+            scenes={name: formulation.case_scene(i, iterate.values) for i, name in enumerate(names)},
+        )
+
+
+def _number(setting: Any, default: float) -> float:
+    return default if setting is None or isinstance(setting.value, ca.MX) else setting.value
+
+
+def find(
+    scene: Scene,
+    unknown: Mapping[str, Bounds] | Sequence[str],
+    wanted: Mapping[str, ArrayLike],
+    *,
+    guess: Mapping[str, ArrayLike] | None = None,
+    accuracy: float | None = None,
+) -> DesignAnswer:
+    """Numbers of a scene for which answers are as wanted.
+
+    ``find(scene, ["loads.tip.value"], {"nodes.tip.position": [0.8, 0.3]})``: the force for a tip position.
+
+    Parameters
+    ----------
+    unknown : names, or a mapping of them to bounds
+    wanted : answers by name; of vectors in a plane scene two numbers
+
+    Raises
+    ------
+    SceneError
+        No such numbers or answers, or more wanted than unknown.
+    SolveError
+        There are no such numbers.
+    """
+    free = (-np.inf, np.inf)
+    bounds = unknown if isinstance(unknown, Mapping) else dict.fromkeys(unknown, free)
+    design = Design(scene, bounds, guess=guess, accuracy=accuracy)
+    for name, value in wanted.items():
+        expression, values = design.answer(ONE, name), np.atleast_1d(np.asarray(value, dtype=float)).ravel()
+        flat = ca.vec(expression)
+        if scene.resolved_dimension == "plane" and flat.numel() == 3 and len(values) == 2:
+            flat = flat[:2]
+        if flat.numel() != len(values):
+            message = f"found {len(values)} numbers, accepted: {flat.numel()}"
+            raise SceneError(message, ("wanted", name))
+        design.subject_to(flat == ca.DM(values), name=name)
+    return design.solve()

@@ -1,0 +1,428 @@
+"""What is asked for: unknowns, what numbers of a scene are in each case, answers by name, relations, an objective."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import unknown as not_known
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mathematics.arrays import Array
+from ..mathematics.relations import Relation, relation
+from ..mechanics.mesh import first_mesh
+from ..mechanics.model import assemble
+from ..parametric.arguments import Argument, Parameter, argument, single_numbers
+from ..parametric.changing import changed
+from ..parametric.equilibrium import refuse_search
+from ..parametric.results import Results
+
+__all__ = ["Asked", "Bounds", "Formulation", "Free", "Parameter", "Required", "Setting", "labelled"]
+
+Bounds = tuple[float, float]
+"""Least and largest value; infinite where there is none."""
+
+EVENLY = tuple(np.linspace(0.0, 1.0, 21).tolist())
+"""Where members are told of without a word about it: not where elements end, which may change on the way."""
+
+
+@dataclass(frozen=True, eq=False)
+class Free:
+    """Free numbers.
+
+    Attributes
+    ----------
+    name : str
+    symbol : MX
+        In expressions, in the shape of the guess.
+    guess, low, high : ndarray
+        All of one shape.
+    """
+
+    name: str
+    symbol: ca.MX
+    guess: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What a number of the scene is in one case.
+
+    Attributes
+    ----------
+    value : float or MX
+        A number, or an expression of free ones, (1,).
+    between : tuple of float or None
+        Range, of what the model is no polynomial of.
+    """
+
+    value: float | ca.MX
+    between: Bounds | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """An answer that expressions may contain.
+
+    Attributes
+    ----------
+    name : str
+        ``nodes.tip.position``.
+    label : str
+        With the case: what rows are called.
+    at : tuple of float
+        Fractions of the length of a member.
+    cases : tuple of int
+    symbol : MX
+    shape : tuple of int
+        Of the symbol; the numbers of each case follow each other.
+    unit : str
+    """
+
+    name: str
+    label: str
+    at: tuple[float, ...]
+    cases: tuple[int, ...]
+    symbol: ca.MX
+    shape: tuple[int, ...]
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Required:
+    """Rows with bounds, and what they are called."""
+
+    name: str
+    relation: Relation
+
+
+def labelled(case: str, name: str) -> str:
+    """What something of a case is called; the case of a problem that has one only has no name."""
+    return f"{case}: {name}" if case else name
+
+
+class Formulation:
+    """What a problem asks for; :class:`~sfetcas.design.solving.Solving` finds it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Static; all cases are this scene with other numbers.
+    cases : sequence of str
+    accuracy : float, optional
+        Wanted error of positions over the size of the scene; that of the scene without.
+
+    Attributes
+    ----------
+    free : dict of str to Free
+    settings : list of dict
+        Of each case, by the names of single numbers.
+    """
+
+    def __init__(self, scene: Scene, cases: Sequence[str], accuracy: float | None = None) -> None:
+        refuse_search(scene)
+        if scene.analysis.type != "static":
+            message = f"found {scene.analysis.type!r}, accepted: static, an equilibrium for each case"
+            raise SceneError(message, ("analysis", "type"))
+        if not cases:
+            raise SceneError("found no case, accepted: one or more", ("cases",))
+        steps = (float(scene.analysis.steps[-1]),)
+        analysis = scene.analysis.model_copy(update={"steps": steps, "equilibria": "one"})
+        self.scene = scene.model_copy(update={"analysis": analysis, "expect": ()})
+        self.cases, self.accuracy = list(cases), accuracy or scene.analysis.accuracy
+        self.free: dict[str, Free] = {}
+        self.settings: list[dict[str, Setting]] = [{} for _ in self.cases]
+        self.asked: dict[Any, Asked] = {}
+        self.required: list[Required] = []
+        self.tied: dict[str, Argument] = {}
+        self.objective = ca.MX(0)
+        self.margin: float | None = None
+        self._results: Results | None = None
+
+    # -- unknowns -----------------------------------------------------------------------------------
+
+    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
+        """Free numbers under a name of their own, for :meth:`set` and for relations.
+
+        Parameters
+        ----------
+        guess : number, (n,) or (n, m): where to begin, and the shape
+        low, high : broadcast to it
+
+        Returns
+        -------
+        casadi.MX
+
+        Raises
+        ------
+        SceneError
+            A name that is there already, bounds that contradict each other, or a guess outside.
+        """
+        if name in self.free:
+            raise SceneError(f"found the unknown {name!r} twice, accepted: once")
+        start = np.atleast_1d(np.asarray(guess, dtype=float))
+        least, most = (np.broadcast_to(np.asarray(x, dtype=float), start.shape) for x in (low, high))
+        for a, x, b in zip(least.flat, start.flat, most.flat, strict=True):
+            if not a <= b:
+                raise SceneError(f"found the bounds {a:g} and {b:g}, accepted: the lower one first", (name,))
+            if not a <= x <= b:
+                raise SceneError(f"found the guess {x:g}, accepted: {a:g} to {b:g}, as its bounds say", (name,))
+        self.free[name] = Free(name, ca.MX.sym(name, *start.shape), start, least, most)
+        return self.free[name].symbol
+
+    def numbers(self, name: str) -> Argument:
+        """A number or vector of the scene by its name.
+
+        Raises
+        ------
+        SceneError
+            The scene has none of this name.
+        """
+        if name in self.tied:
+            return self.tied[name]
+        found = argument(self.scene, name)
+        if name.startswith("histories.") and name.count(".") == 1:
+            raise SceneError(f"found {name!r}, accepted: numbers of it, as {name}.value.0", ("variables",))
+        return found
+
+    def bounds(self, label: str, name: str, given: Bounds | Parameter, guess: ArrayLike | None) -> Bounds:
+        """Lower and upper bound of a variable; what is tied is made known.
+
+        Raises
+        ------
+        SceneError
+            What is given are no two numbers.
+        """
+        if isinstance(given, Parameter):
+            if given.low is None or given.high is None:
+                raise SceneError("found no bounds, accepted: a lower and an upper bound, low and high", (label,))
+            if not given.low < given.high:
+                message = f"found the bounds {given.low:g} and {given.high:g}, accepted: the lower one first"
+                raise SceneError(message, (label,))
+            start = given.value if guess is None else float(np.asarray(guess))
+            self.tie(name, given, start, (given.low, given.high))
+            return given.low, given.high
+        try:
+            low, high = (float(x) for x in given)
+        except (TypeError, ValueError):
+            raise SceneError(f"found {given!r}, accepted: a lower and an upper bound", (label,)) from None
+        return low, high
+
+    def tie(self, name: str, tied: Parameter, guess: float, bounds: Bounds) -> None:
+        """Let a name stand for what moves several numbers of the scene.
+
+        Raises
+        ------
+        SceneError
+            A name that is there already, or numbers that the scene does not have.
+        """
+        known = {n.partition(".")[0] for n in ("factor", "histories.x", *type(self.scene).model_fields)}
+        if name.partition(".")[0] in known or name in self.tied:
+            raise SceneError(f"found {name!r}, accepted: a name that is none of the scene", ("variables",))
+
+        single_numbers(self.scene, tied.numbers(guess))
+        self.tied[name] = Argument(name, (guess,), tied.unit, tied.meaning, *bounds, None, tied.numbers)
+
+    def set(
+        self, name: str, value: ArrayLike | ca.MX, *, case: str | None = None, between: Bounds | None = None
+    ) -> None:
+        """What a number of the scene is, in one case or in all: a number or an expression of unknowns.
+
+        ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``.
+
+        Parameters
+        ----------
+        name : as in the scene; of a vector an expression of as many numbers
+        case : all cases without
+        between : range of each, which places of joints and lengths need
+
+        Raises
+        ------
+        SceneError
+            The scene has no such number, or there are more or fewer values.
+        """
+        names = self.numbers(name).names
+        values = self._values(name, len(names), value)
+        for i in range(len(self.cases)) if case is None else [self.number(case)]:
+            for one, number in zip(names, values, strict=True):
+                self.settings[i][one] = Setting(number, between)
+
+    def _values(self, name: str, count: int, value: ArrayLike | ca.MX) -> list[float | ca.MX]:
+        if isinstance(value, ca.MX):
+            found: list[float | ca.MX] = list(ca.vertsplit(ca.vec(value)))
+        else:
+            found = np.asarray(value, dtype=float).ravel().tolist()
+        if len(found) != count:
+            accepted = "one number" if count == 1 else f"{count} numbers"
+            raise SceneError(f"found {len(found)} numbers, accepted: {accepted}", (name,))
+        return found
+
+    def number(self, case: str) -> int:
+        """The number of a case.
+
+        Raises
+        ------
+        SceneError
+            There is none of this name.
+        """
+        if case not in self.cases:
+            raise SceneError(not_known(case, self.cases, "cases"), ("cases",))
+        return self.cases.index(case)
+
+    # -- answers ------------------------------------------------------------------------------------
+
+    def ask(
+        self, name: str, cases: Sequence[int], label: str, at: Sequence[float] | None, *, rows: bool = False
+    ) -> ca.MX:
+        """The symbol of an answer; ``rows`` for a row of numbers a case."""
+        key = (name, tuple(cases), None if at is None else tuple(at), rows)
+        if key not in self.asked:
+            places = EVENLY if at is None else tuple(float(x) for x in at)
+            if not places or not all(0.0 <= x <= 1.0 for x in places):
+                raise SceneError(f"found {list(places)}, accepted: fractions of the length, 0 to 1", ("at", name))
+            result = self.result(name, places)
+            shape = (len(cases), result.size) if rows else result.shape or (1,)
+            symbol = ca.MX.sym(label, *shape)
+            self.asked[key] = Asked(name, label, places, tuple(cases), symbol, shape, result.unit)
+        return self.asked[key].symbol
+
+    def result(self, name: str, places: Sequence[float]) -> Any:
+        """What an answer is: shape, unit, meaning."""
+        if self._results is None:
+            self._results = Results(assemble(self.scene, first_mesh(self.scene, 4)), [], {})
+        members = [n for n, record in self.scene.members.items() if record.type == "flexible"]
+        return Results(self._results.model, [name], dict.fromkeys(members, tuple(places))).results[0]
+
+    # -- relations ----------------------------------------------------------------------------------
+
+    def subject_to(self, *given: ca.MX, name: str = "") -> None:
+        """Relations that have to hold, element by element: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``.
+
+        Parameters
+        ----------
+        name : what they are called in messages and among the multipliers; what they are made of without
+
+        Raises
+        ------
+        SceneError
+            What is given is no relation, or its bounds contradict each other.
+        """
+        for one in given:
+            try:
+                found = relation(one)
+            except ValueError as error:
+                raise SceneError(str(error), (name or "subject_to",)) from None
+            symbols = ", ".join(dict.fromkeys(symbol.name() for symbol in ca.symvar(found.expression)))
+            called = name or symbols or "subject_to"
+            wrong = found.low > found.high
+            if wrong.any():
+                low, high = found.low[wrong][0], found.high[wrong][0]
+                raise SceneError(f"found {low:g} <= ... <= {high:g}, accepted: the lower bound first", (called,))
+            self._refuse_strange(called, found.expression)
+            self.required.append(Required(self._once(called), found))
+
+    def minimise(self, expression: ca.MX | float) -> None:
+        """What shall be least; of further calls the sum.
+
+        Raises
+        ------
+        SceneError
+            More than one number, or a symbol that is none of this problem.
+        """
+        expression = ca.MX(expression)
+        if expression.numel() != 1:
+            raise SceneError(f"found {expression.numel()} numbers, accepted: one", ("minimise",))
+        self._refuse_strange("minimise", expression)
+        self.objective = self.objective + expression
+
+    def stable(self, margin: float = 0.0) -> None:
+        """Only stable cases are answers: each lowest eigenvalue, N, is at least the margin.
+
+        The eigenvalue is that of ``certificate.smallest``: energy over the integral of the squared rotations.
+        """
+        if not margin >= 0.0:
+            raise SceneError(f"found {margin}, accepted: zero or more", ("stable",))
+        self.margin = float(margin)
+
+    def _refuse_strange(self, name: str, expression: ca.MX) -> None:
+        known: list[Free | Asked] = [*self.free.values(), *self.asked.values()]
+        hashes = {one.symbol.__hash__() for one in known}
+        for symbol in ca.symvar(expression):
+            if symbol.__hash__() not in hashes:
+                accepted = "what variable, answer and unknown of this problem give"
+                raise SceneError(f"found the symbol {symbol.name()!r}, accepted: {accepted}", (name,))
+
+    def _once(self, name: str) -> str:
+        names = {one.name for one in self.required}
+        if name not in names:
+            return name
+        return next(f"{name} ({i})" for i in range(2, len(names) + 3) if f"{name} ({i})" not in names)
+
+    # -- what follows ---------------------------------------------------------------------------------
+
+    def value(self, expression: ca.MX, values: Mapping[str, Array]) -> Array:
+        """An expression of free numbers for values of them, column by column."""
+        symbols = ca.symvar(expression)
+        by_hash = {one.symbol.__hash__(): one.name for one in self.free.values()}
+        for symbol in symbols:
+            if symbol.__hash__() not in by_hash:
+                accepted = "an expression of unknowns"
+                raise SceneError(f"found {symbol.name()!r} in what a number is set to, accepted: {accepted}")
+        function = ca.Function("value", symbols, [ca.densify(ca.vec(expression))])
+        return np.array(function(*(values[by_hash[s.__hash__()]] for s in symbols))).ravel()
+
+    def numbers_of(self, case: int, values: Mapping[str, Array]) -> dict[str, float]:
+        """What is set in a case, for values of the free numbers."""
+        return {
+            name: float(self.value(one.value, values)[0]) if isinstance(one.value, ca.MX) else one.value
+            for name, one in self.settings[case].items()
+        }
+
+    def case_scene(self, case: int, values: Mapping[str, Array]) -> Scene:
+        """The scene of a case, for values of the free numbers."""
+        return self.scene_with(self.numbers_of(case, values))
+
+    def scene_with(self, numbers: Mapping[str, float]) -> Scene:
+        """The scene with other values of numbers, and of what moves several."""
+        found: dict[str, float] = {}
+        for name, value in numbers.items():
+            follow = self.tied[name].numbers if name in self.tied else None
+            found |= {name: value} if follow is None else single_numbers(self.scene, follow(value))
+        return changed(self.scene, found)
+
+    @property
+    def guesses(self) -> dict[str, Array]:
+        """Of all free numbers."""
+        return {name: one.guess for name, one in self.free.items()}
+
+    def varying(self) -> tuple[list[Argument], list[bool]]:
+        """Numbers that differ from case to case or are unknown, a name each, with ranges; and which are unknown."""
+        names = dict.fromkeys(name for setting in self.settings for name in setting)
+        chosen: list[Argument] = []
+        unknown: list[bool] = []
+        for name in names:
+            settings = [setting.get(name) for setting in self.settings]
+            unknown.append(any(one is not None and isinstance(one.value, ca.MX) for one in settings))
+            chosen.append(self._argument(name, settings))
+        return chosen, unknown
+
+    def _argument(self, name: str, settings: Sequence[Setting | None]) -> Argument:
+        found = self.numbers(name)
+        if re.fullmatch(r"factor|histories\.[^.]+", name):
+            return found
+        between = [one.between for one in settings if one is not None and one.between is not None]
+        values = [one.value for one in settings if one is not None and not isinstance(one.value, ca.MX)]
+        reach = [x for pair in between for x in pair if np.isfinite(x)]
+        if len(reach) < 2 * len(between) or not (between or values):
+            return found
+        reach += [*values, *found.default]
+        low, high = min(reach), max(reach)
+        return replace(found, low=low, high=high) if low < high else found

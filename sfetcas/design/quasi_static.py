@@ -1,0 +1,343 @@
+"""Quasi-static trajectories: a mechanism follows a path through equilibria, its inputs found all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..description.records import unknown as not_known
+from ..description.scene import Scene
+from ..equilibria.solution import Equilibrium
+from ..errors import SceneError, SolveError
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Kernels
+from ..mathematics.nlp import Ipopt
+from ..mechanics.equations import State
+from ..parametric.arguments import Parameter
+from .certifying import Certified, prepared_case
+from .formulation import Bounds, Formulation
+from .solving import Iterate, Solved, Solving
+
+__all__ = ["QuasiStatic", "QuasiStaticAnswer", "QuasiStaticIterate"]
+
+SAME = 1e-4
+"""Rotations, rad, by which the equilibrium that a neighbour leads to may differ: Newton's method is at rounding."""
+
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Steps from a point to the next where one does not lead there."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuasiStaticIterate:
+    """Where an unconverged solution stood: never an answer.
+
+    Attributes
+    ----------
+    inputs : mapping of str to ndarray (points, n)
+    values : mapping of str to ndarray
+        All other unknowns.
+    told : mapping of str to ndarray (points, n)
+    objective : float
+    iterations : int
+    """
+
+    inputs: Mapping[str, Array]
+    values: Mapping[str, Array]
+    told: Mapping[str, Array]
+    objective: float
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class QuasiStaticAnswer:
+    """A path through equilibria.
+
+    Attributes
+    ----------
+    s : ndarray (points,)
+        The path parameter from 0 to 1.
+    inputs : mapping of str to ndarray (points, n)
+    values : mapping of str to ndarray
+        Variables that are the same at all points.
+    told : mapping of str to ndarray (points, n)
+        Answers that were asked for.
+    objective : float
+    cases : tuple of Equilibrium
+        Of each point, with its certificate.
+    jumps : tuple of int
+        Points that their predecessor does not lead to: there the mechanism would snap.
+    multipliers : mapping of str to ndarray
+    notes : tuple of str
+    iterations : int
+    """
+
+    s: Array
+    inputs: Mapping[str, Array]
+    values: Mapping[str, Array]
+    told: Mapping[str, Array]
+    objective: float
+    cases: tuple[Equilibrium, ...]
+    jumps: tuple[int, ...]
+    multipliers: Mapping[str, Array]
+    notes: tuple[str, ...]
+    iterations: int
+    scenes: tuple[Scene, ...]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all points are certified as stable."""
+        return all(case.certificate.stable is True for case in self.cases)
+
+    def answers(self, name: str) -> Array:
+        """An answer that expressions asked for, (points, n), rows of places one after the other.
+
+        Raises
+        ------
+        SceneError
+            It was not asked for.
+        """
+        if name not in self.told:
+            raise SceneError(not_known(name, list(self.told), "answers"), ("answers",))
+        return self.told[name]
+
+    def scene(self, point: int) -> Scene:
+        """The scene of a point with what was found."""
+        return self.scenes[point]
+
+
+class QuasiStatic:
+    """Inputs that lead a mechanism along a path of equilibria, slowly.
+
+    Parameters
+    ----------
+    scene : Scene
+        Static and without contact.
+    inputs : mapping of str to (low, high)
+        Numbers of the scene that may change along the path.
+    points : int
+        Points of the path, evenly spaced from 0 to 1.
+    variables : mapping of str to (low, high) or Parameter
+        Numbers of the scene that are unknown, but the same everywhere.
+    guess : mapping of str to numbers
+        Where they begin: of an input (n,) or (points, n); the values of the scene without.
+    accuracy, kernels : as of :class:`~sfetcas.design.designing.Design`
+
+    Attributes
+    ----------
+    s : ndarray (points,)
+
+    Raises
+    ------
+    SceneError
+        Numbers that the scene does not have, contradictory bounds, fewer than three points.
+
+    Example
+    -------
+    >>> path = QuasiStatic(scene, {"loads.tip.value": (-50.0, 50.0)}, points=21)    # doctest: +SKIP
+    >>> tip = path.answer("nodes.tip.position")                                     # doctest: +SKIP
+    >>> path.subject_to(tip[:, 1] == 0.2 + 0.3 * path.s)                            # doctest: +SKIP
+    >>> path.smooth("loads.tip.value")                                              # doctest: +SKIP
+    >>> path.solve().inputs["loads.tip.value"]                                      # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        inputs: Mapping[str, Bounds],
+        points: int = 21,
+        *,
+        variables: Mapping[str, Bounds | Parameter] | None = None,
+        guess: Mapping[str, ArrayLike] | None = None,
+        accuracy: float | None = None,
+        kernels: Kernels = "auto",
+    ) -> None:
+        if points < 3:
+            raise SceneError(f"found {points}, accepted: three or more", ("points",))
+        if not inputs:
+            raise SceneError("found none, accepted: one number of the scene or more", ("inputs",))
+        self.s = np.linspace(0.0, 1.0, points)
+        self._formulation = Formulation(scene, [f"s = {x:.4g}" for x in self.s], accuracy)
+        self._kernels, self._inputs = kernels, list(inputs)
+        starts = dict(guess or {})
+        for name, bounds in inputs.items():
+            self._vary(name, bounds, starts.pop(name, None), everywhere=False)
+        for name, given in (variables or {}).items():
+            self._vary(name, given, starts.pop(name, None), everywhere=True)
+        if starts:
+            known = [*inputs, *(variables or {})]
+            raise SceneError(not_known(next(iter(starts)), known, "unknowns"), ("guess",))
+
+    def _vary(self, name: str, bounds: Bounds | Parameter, guess: ArrayLike | None, *, everywhere: bool) -> None:
+        low, high = self._formulation.bounds(name, name, bounds, guess)
+        known = self._formulation.numbers(name)
+        start = np.array(known.default, dtype=float)
+        shape = start.shape if everywhere else (len(self.s), len(start))
+        if guess is not None:
+            start = np.asarray(guess, dtype=float)
+        elif low < high:
+            start = np.clip(start, low, high)
+        symbol = self._formulation.unknown(name, np.broadcast_to(start, shape), low, high)
+        self.set(name, symbol, between=(low, high))
+
+    # -- expressions --------------------------------------------------------------------------------
+
+    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
+        """Free numbers under a name of their own, which :meth:`set` makes numbers of the scene of."""
+        return self._formulation.unknown(name, guess, low, high)
+
+    def set(self, name: str, value: ArrayLike | ca.MX, *, between: Bounds | None = None) -> None:
+        """What a number of the scene is: everywhere, or with a row for each point.
+
+        Raises
+        ------
+        SceneError
+            The scene has no such number, or there are more or fewer values.
+        """
+        count, points = len(self._formulation.numbers(name).names), len(self.s)
+        shape = value.shape if isinstance(value, ca.MX) else np.shape(value)
+        every = shape in ((points, count), *([(points,), (points, 1)] if count == 1 else []))
+        for i, case in enumerate(self._formulation.cases):
+            own: ArrayLike | ca.MX = value
+            if every:
+                own = value[i, :] if isinstance(value, ca.MX) else np.asarray(value)[i]
+            self._formulation.set(name, own, case=case, between=between)
+
+    def input(self, name: str) -> ca.MX:
+        """An input, (points, n)."""
+        if name not in self._inputs:
+            raise SceneError(not_known(name, self._inputs, "inputs"), ("inputs",))
+        return self._formulation.free[name].symbol
+
+    def variable(self, name: str) -> ca.MX:
+        """An unknown by its name, as it was declared."""
+        if name not in self._formulation.free:
+            raise SceneError(not_known(name, list(self._formulation.free), "unknowns"), ("variable",))
+        return self._formulation.free[name].symbol
+
+    def answer(self, name: str, at: Sequence[float] | None = None) -> ca.MX:
+        """An answer along the path, (points, n); along members the numbers of a place after those of the one before."""
+        return self._formulation.ask(name, range(len(self.s)), name, at, rows=True)
+
+    def at(self, expression: ca.MX, place: float) -> ca.MX:
+        """The row of an expression at a point of the path, from 0 to 1, as a column.
+
+        Raises
+        ------
+        SceneError
+            No point is there.
+        """
+        number = int(np.argmin(np.abs(self.s - place)))
+        if abs(self.s[number] - place) > 1e-9:
+            spacing = 1.0 / (len(self.s) - 1)
+            raise SceneError(f"found {place:g}, accepted: a multiple of {spacing:g} from 0 to 1", ("at",))
+        return expression[number, :].T
+
+    def rate(self, expression: ca.MX) -> ca.MX:
+        """Derivative by the path parameter between the points, (points - 1, n)."""
+        return ca.diff(expression, 1, 0) * (len(self.s) - 1)
+
+    def smooth(self, name: str, weight: float = 1.0, order: int = 2) -> None:
+        """A cost: the mean square of the first or second derivative of an input by the path parameter.
+
+        Raises
+        ------
+        SceneError
+            Another order.
+        """
+        if order not in (1, 2):
+            raise SceneError(f"found {order}, accepted: 1 or 2", ("smooth", name))
+        derivative = self.rate(self.input(name))
+        if order == 2:
+            derivative = self.rate(derivative)
+        self._formulation.minimise(weight * ca.sumsqr(derivative) / derivative.shape[0])
+
+    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
+        """Relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element."""
+        self._formulation.subject_to(*relations, name=name)
+
+    def minimise(self, expression: ca.MX | float) -> None:
+        """What shall be least; of further calls the sum."""
+        self._formulation.minimise(expression)
+
+    def stable(self, margin: float = 0.0) -> None:
+        """Only paths of stable equilibria are answers, see :meth:`sfetcas.design.designing.Design.stable`."""
+        self._formulation.stable(margin)
+
+    # -- the answer -----------------------------------------------------------------------------------
+
+    def solve(self, solver: Ipopt | None = None) -> QuasiStaticAnswer:
+        """The path, every point certified.
+
+        Raises
+        ------
+        SceneError
+            What is asked for contradicts itself.
+        SolveError
+            None was found; ``last`` is the last :class:`QuasiStaticIterate`.
+        """
+        solving = Solving(self._formulation, solver, self._kernels)
+        try:
+            return self._answered(solving.solve(), solving.iterations)
+        except SolveError as error:
+            last = error.last
+            if isinstance(last, Iterate):
+                inputs, values = self._parted(last)
+                told = self._told(last)
+                last = QuasiStaticIterate(inputs, values, told, last.objective, solving.iterations)
+            raise SolveError(error.status, error.detail, last) from None
+
+    def _parted(self, iterate: Iterate) -> tuple[dict[str, Array], dict[str, Array]]:
+        inputs = {name: x for name, x in iterate.values.items() if name in self._inputs}
+        return inputs, {name: x for name, x in iterate.values.items() if name not in self._inputs}
+
+    def _told(self, iterate: Iterate) -> dict[str, Array]:
+        return {key[0]: value for key, value in iterate.asked.items()}
+
+    def _answered(self, solved: Solved, iterations: int) -> QuasiStaticAnswer:
+        inputs, values = self._parted(solved.iterate)
+        jumps = tuple(i for i in range(1, len(self.s)) if not self._leads(solved, i))
+        notes = list(solved.notes)
+        if jumps:
+            places = ", ".join(f"{self.s[i]:.4g}" for i in jumps)
+            notes.append(f"the equilibrium at s = {places} is not the one that the point before leads to")
+        count = len(self.s)
+        return QuasiStaticAnswer(
+            s=self.s,
+            inputs=inputs,
+            values=values,
+            told=self._told(solved.iterate),
+            objective=solved.iterate.objective,
+            cases=tuple(case.equilibrium for case in solved.cases),
+            jumps=jumps,
+            multipliers=solved.multipliers,
+            notes=tuple(notes),
+            iterations=iterations,
+            scenes=tuple(self._formulation.case_scene(i, solved.iterate.values) for i in range(count)),
+        )
+
+    def _leads(self, solved: Solved, i: int) -> bool:
+        """Whether the equilibrium before leads to this one: at once, or by smaller steps of all numbers."""
+        before, here = solved.cases[i - 1], solved.cases[i]
+        if _arrives(before.equilibrium.state, here):
+            return True
+        names = [one.name for one in solved.equations.arguments.arguments]
+        state = before.equilibrium.state
+        for share in SHARES:
+            numbers = (1.0 - share) * solved.numbers[i - 1] + share * solved.numbers[i]
+            scene = self._formulation.scene_with(dict(zip(names, numbers.tolist(), strict=True)))
+            prepared = prepared_case(scene, solved.equations, solved.mesh)
+            found = prepared.correct(state, prepared.model.loading(here.equilibrium.factor), most=1.0)
+            if not found.converged:
+                return False
+            state = found.state
+        return here.prepared.distance(state, here.equilibrium.state) < SAME
+
+
+def _arrives(state: State, here: Certified) -> bool:
+    loading = here.prepared.model.loading(here.equilibrium.factor)
+    found = here.prepared.correct(state, loading, most=1.0)
+    return found.converged and here.prepared.distance(found.state, here.equilibrium.state) < SAME

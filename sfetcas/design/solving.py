@@ -1,0 +1,397 @@
+"""A formulation solved: all equilibria at once by IPOPT, each certified, meshes and stability seen to in rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..description.records import counted
+from ..equilibria.settings import Settings
+from ..equilibria.solution import Equilibrium
+from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import Array
+from ..mathematics.kernels import Kernels
+from ..mathematics.nlp import NLP, Ipopt, NLPResult
+from ..mathematics.threads import single_threaded
+from ..mechanics.fields import transferred
+from ..mechanics.mesh import SAME, Mesh
+from ..parametric.equilibrium import asked_mesh
+from .assembled import REQUIRED, Assembled, Pair, places_asked
+from .bounds import refuse_contradictions
+from .certifying import Certified, certified
+from .equations import CaseEquations
+from .formulation import Formulation, labelled
+
+__all__ = ["Iterate", "Solved", "Solving"]
+
+ROUNDS = 6
+"""Meshes, references and sets of eigenvalues that are tried one after the other."""
+
+TURN = 0.5
+"""Rotation of a node, rad, in one step of the way at most: a step that turns more may have left its branch."""
+
+FAR = 1.0
+"""Rotation from a reference, rad, beyond which the next step of the way begins from another one."""
+
+FIRST, LEAST = 0.2, 1e-3
+"""Share of the way from the guess in the first step, and in the last one before giving up."""
+
+SHORT = 60
+"""Iterations at most from one step to the next."""
+
+ENOUGH = {"acceptable_tol": 1e-7, "acceptable_constr_viol_tol": 1e-9, "acceptable_iter": 5}
+"""Of objectives rounding leaves less than of rows."""
+
+WARM = {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6, "warm_start_init_point": "yes"}
+"""IPOPT begun near a solution."""
+
+PILOTS = 5
+"""Cases that are solved from the undeformed state, spread over all; the others follow from their neighbours."""
+
+VIOLATED = 1e-6
+"""Rows that miss by less, in their units, are not named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate:
+    """Where a program stood.
+
+    Attributes
+    ----------
+    values : mapping of str to ndarray
+        Of all unknowns by their names.
+    asked : mapping
+        Answers in the shapes of their symbols.
+    states : ndarray (cases, states)
+    objective : float
+    message : str
+        What IPOPT said.
+    iterations : int
+    """
+
+    values: Mapping[str, Array]
+    asked: Mapping[Any, Array]
+    states: Array
+    objective: float
+    message: str
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """An answer of a formulation.
+
+    Attributes
+    ----------
+    iterate : Iterate
+    cases : tuple of Certified
+    multipliers : mapping of str to ndarray
+        Of what is required: by how much the objective falls where an upper bound is raised by one.
+    notes : tuple of str
+    mesh : Mesh
+    equations : CaseEquations
+    numbers : ndarray (cases, numbers)
+    """
+
+    iterate: Iterate
+    cases: tuple[Certified, ...]
+    multipliers: Mapping[str, Array]
+    notes: tuple[str, ...]
+    mesh: Mesh
+    equations: CaseEquations
+    numbers: Array
+
+
+class Solving:
+    """One run over the rounds.
+
+    Parameters
+    ----------
+    formulation : Formulation
+    solver : Ipopt
+    kernels : str
+    """
+
+    def __init__(self, formulation: Formulation, solver: Ipopt | None = None, kernels: Kernels = "auto") -> None:
+        self.formulation, self._kernels = formulation, kernels
+        self._solver = solver or Ipopt(tolerance=1e-11, iterations=300, extra=ENOUGH)
+        self.iterations = 0
+
+    # -- the beginning ------------------------------------------------------------------------------
+
+    def _pilots(self) -> dict[int, Equilibrium]:
+        count = len(self.formulation.cases)
+        chosen = sorted({round(x) for x in np.linspace(0, count - 1, min(PILOTS, count))})
+        settings = Settings(accuracy=self.formulation.accuracy)
+        found: dict[int, Equilibrium] = {}
+        self._meshes: list[Mesh] = []
+        for i in chosen:
+            scene = self._scene(i, self.formulation.guesses)
+            try:
+                mesh, self._assembly, found[i] = asked_mesh(scene, settings)
+            except SceneError as error:
+                raise SceneError(labelled(self.formulation.cases[i], str(error)), ("guess",)) from None
+            self._meshes.append(mesh)
+        return found
+
+    def _scene(self, case: int, values: Mapping[str, Array]) -> Any:
+        try:
+            return self.formulation.case_scene(case, values)
+        except SceneError as error:
+            raise SceneError(labelled(self.formulation.cases[case], str(error))) from None
+
+    def _equations(self, mesh: Mesh) -> CaseEquations:
+        arguments, unknown = self.formulation.varying()
+        names, places = places_asked(self.formulation)
+        free = np.flatnonzero(unknown).tolist()
+        return CaseEquations(self.formulation.scene, mesh, self._assembly, arguments, free, names, places)
+
+    def _begun(self, equations: CaseEquations, pilots: Mapping[int, Equilibrium]) -> Array:
+        """Equilibria at the guess, those without a pilot from the case before."""
+        formulation, program = self.formulation, equations.program
+        names = [one.name for one in equations.arguments.arguments]
+        states: list[Array] = []
+        for i, case in enumerate(formulation.cases):
+            own = formulation.numbers_of(i, formulation.guesses)
+            defaults = equations.arguments.defaults
+            numbers = np.array([own.get(name, x) for name, x in zip(names, defaults, strict=True)])
+            starts = [transferred(pilots[i].model, pilots[i].state, equations.model)] if i in pilots else []
+            starts += [program.state(states[-1])] if states else []
+            found = next((s for s in (equations.equilibrium(numbers, x)[0] for x in starts) if s is not None), None)
+            if found is None:
+                detail = labelled(case, "no equilibrium was found at the guess, accepted: a guess that has one")
+                raise SolveError(Status.FAILED, detail)
+            states.append(found)
+        return np.stack(states)
+
+    # -- rounds -------------------------------------------------------------------------------------
+
+    @single_threaded
+    def solve(self) -> Solved:
+        """The answer.
+
+        Raises
+        ------
+        SceneError
+            What is asked for contradicts itself, or is more than there are unknowns.
+        SolveError
+            None was found; ``last`` is the last :class:`Iterate`.
+        """
+        refuse_contradictions(self.formulation)
+        pilots = self._pilots()
+        mesh = _united(self._meshes)
+        equations = self._equations(mesh)
+        states, values = self._begun(equations, pilots), self.formulation.guesses
+        pairs: list[Pair] = []
+        for _ in range(ROUNDS):
+            program = Assembled(self.formulation, equations, states, values, pairs, self._kernels)
+            self._refuse_too_many(program)
+            result, cases = self._best(program)
+            states, values = program.arrived(result.x), program.values(result.x)
+            error = max(case.error for case in cases)
+            if error > self.formulation.accuracy:
+                mesh = mesh.refined()
+                finer = self._equations(mesh)
+                states, equations = _onto(equations, finer, states), finer
+                pairs = []
+                continue
+            more = self._unstable(cases, program, result, pairs)
+            if not more:
+                return self._answer(program, result, cases)
+            pairs = more
+        if error > self.formulation.accuracy:
+            detail = f"positions differ by {error:.1e} on half the elements after {counted(ROUNDS, 'mesh', 'meshes')}"
+            raise SolveError(Status.FAILED, detail, self._iterate(program, result))
+        cases_kept = dict.fromkeys(self.formulation.cases[pair.case] for pair in pairs)
+        detail = labelled(", ".join(cases_kept), "cannot be kept stable")
+        raise SolveError(Status.UNMET, detail, self._iterate(program, result))
+
+    def _refuse_too_many(self, program: Assembled) -> None:
+        free, rows = program.freedom
+        if rows > free:
+            found = f"found {counted(rows, 'equation')} for {counted(free, 'free number')}"
+            raise SceneError(f"{found}, accepted: no more equations than free numbers, or their squares minimised")
+
+    def _best(self, program: Assembled) -> tuple[NLPResult, list[Certified]]:
+        """The solution in one go; step by step from the guess where that fails or leads to what is unstable.
+
+        Under the same loads there may be several equilibria: a program takes any, a path of small steps the one that
+        the guess belongs to.
+        """
+        nlp = program.nlp()
+        method = self._solver.prepare(nlp)
+        rows = ca.Function("rows", [nlp.x, nlp.p], [nlp.g])
+        result = method()
+        self.iterations += result.iterations
+        if result.status is Status.SOLVED:
+            cases = self._certified(program, result)
+            if self.formulation.margin is not None or not _unstable(cases):
+                return result, cases
+        begun = program.states
+        followed = self._followed(program, nlp, rows)
+        if followed is not None:
+            along = self._certified(program, followed)
+            if result.status is not Status.SOLVED or _unstable(along) < _unstable(cases):
+                return followed, along
+        program.recentre(begun)
+        if result.status is not Status.SOLVED:
+            lines = np.array(rows(result.x, nlp.p_value)).ravel()
+            self._refuse(program, result, np.maximum(lines - nlp.upper, nlp.lower - lines))
+        return result, cases
+
+    def _followed(self, program: Assembled, nlp: NLP, rows: ca.Function) -> NLPResult | None:
+        """The solution along programs whose bounds go from what the guess fulfils to what is asked for."""
+        method = replace(self._solver, iterations=SHORT, extra={**self._solver.extra, **WARM}).prepare(nlp)
+        first = np.array(rows(nlp.guess, nlp.p_value)).ravel()
+        missed = np.clip(first, nlp.lower, nlp.upper) - first
+        share, step, x, lam, p = 0.0, FIRST, nlp.guess, None, nlp.p_value
+        while step > LEAST:
+            there = min(1.0, share + step)
+            rest = (1.0 - there) * missed
+            result = method(p=p, guess=x, lam=lam, lower=nlp.lower - rest, upper=nlp.upper - rest)
+            self.iterations += result.iterations
+            if result.status is not Status.SOLVED or program.turned(x, result.x) > TURN:
+                step *= 0.5
+                continue
+            share, x, lam, step = there, result.x, result.lam, 1.5 * step
+            if share == 1.0:
+                return result
+            if program.turned(nlp.guess, x) > FAR:
+                x = program.recentred(x)
+                p = program.pieces.constants()
+        return None
+
+    def _refuse(self, program: Assembled, result: NLPResult, missed: Array) -> None:
+        """Say what could not be met.
+
+        Raises
+        ------
+        SolveError
+            Always.
+        """
+        found = zip(missed.tolist(), program.pieces.row_owners(), strict=True)
+        # What was asked for by name comes first: what answers miss follows from it.
+        named = sorted((not piece.startswith(REQUIRED), -x, label) for x, (piece, label) in found if not x <= VIOLATED)
+        worst = list(dict.fromkeys(label.removeprefix(REQUIRED) for _, _, label in named))[:3]
+        last = self._iterate(program, result)
+        status = Status.UNMET if result.status is Status.INFEASIBLE else result.status
+        detail = f"IPOPT: {result.message} after {counted(result.iterations, 'iteration')}"
+        if worst:
+            detail = f"most is missed at {'; '.join(worst)}; {detail}"
+        raise SolveError(status, detail, last)
+
+    def _certified(self, program: Assembled, result: NLPResult) -> list[Certified]:
+        equations, found = program.equations, []
+        states, values = program.arrived(result.x), program.values(result.x)
+        for i, case in enumerate(self.formulation.cases):
+            state = equations.program.state(states[i])
+            try:
+                found.append(certified(self._scene(i, values), equations, state, case))
+            except SolveError as error:
+                raise SolveError(error.status, error.detail, self._iterate(program, result)) from None
+        return found
+
+    # -- stability ------------------------------------------------------------------------------------
+
+    def _unstable(
+        self, cases: Sequence[Certified], program: Assembled, result: NLPResult, pairs: Sequence[Pair]
+    ) -> list[Pair]:
+        """Eigenvalues to keep above the margin: those kept up to now, and those found below; none where all are."""
+        if self.formulation.margin is None:
+            return []
+        margin = self.formulation.margin / program.equations.scales.force
+        new = []
+        for i, case in enumerate(cases):
+            if case.equilibrium.certificate.stable == "not defined":
+                message = "found a margin of stability, accepted: none, as its loads have no potential"
+                raise SceneError(message, ("stable", self.formulation.cases[i]))
+            if case.smallest < margin - BELOW * max(margin, 1.0):
+                new.append(self._pair(i, case, program, margin))
+        if not new:
+            return []
+        kept = (
+            [
+                replace(pair, shape=shape, value=float(value))
+                for pair, shape, value in zip(
+                    pairs, program.shapes(result.x), program.eigenvalues(result.x), strict=True
+                )
+            ]
+            if pairs
+            else []
+        )
+        return [*kept, *new]
+
+    @staticmethod
+    def _pair(number: int, case: Certified, program: Assembled, margin: float) -> Pair:
+        mass = program.equations.mass
+        shape = np.zeros(len(mass))
+        shape[: len(case.shape)] = case.shape
+        shape /= np.sqrt(shape @ (mass * shape))
+        return Pair(number, shape, case.smallest, margin)
+
+    # -- the answer -----------------------------------------------------------------------------------
+
+    def _iterate(self, program: Assembled, result: NLPResult) -> Iterate:
+        told = {
+            key: program.pieces.value(program.pieces.blocks[f"answer {i}"], result.x)
+            for i, key in enumerate(self.formulation.asked)
+        }
+        return Iterate(
+            values=program.values(result.x),
+            asked=told,
+            states=program.arrived(result.x),
+            objective=result.f / program.weight,
+            message=result.message,
+            iterations=self.iterations,
+        )
+
+    def _answer(self, program: Assembled, result: NLPResult, cases: Sequence[Certified]) -> Solved:
+        multipliers: dict[str, Array] = {}
+        pieces = np.array([piece for piece, _ in program.pieces.row_owners()])
+        for one in self.formulation.required:
+            kept, unit = program.lines[one.name]
+            found = np.zeros(len(one.relation.low))
+            found[kept] = result.lam[pieces == REQUIRED + one.name] / unit / program.weight
+            multipliers[one.name] = found
+        unstable = [self.formulation.cases[i] for i, c in enumerate(cases) if c.equilibrium.certificate.stable is False]
+        told = [*unstable[:3], *([counted(len(unstable) - 3, "other", "others")] if unstable[3:] else [])]
+        notes = [labelled(", ".join(told), "unstable")] if unstable else []
+        return Solved(
+            iterate=self._iterate(program, result),
+            cases=tuple(cases),
+            multipliers=multipliers,
+            notes=tuple(notes),
+            mesh=program.equations.mesh,
+            equations=program.equations,
+            numbers=program.numbers(result.x),
+        )
+
+
+BELOW = 1e-6
+"""Share of a margin, or of the unit of eigenvalues, that one may miss: what IPOPT leaves."""
+
+
+def _unstable(cases: Sequence[Certified]) -> int:
+    """How many cases are unstable."""
+    return sum(case.equilibrium.certificate.stable is False for case in cases)
+
+
+def _united(meshes: Sequence[Mesh]) -> Mesh:
+    """One mesh with the cuts of all."""
+    first = max(meshes, key=lambda mesh: mesh.elements)
+    cuts = {}
+    for name in first.cuts:
+        every = np.unique(np.concatenate([mesh.cuts[name] for mesh in meshes]))
+        cuts[name] = every[np.append(True, np.diff(every) > SAME)]
+    return replace(first, cuts=cuts)
+
+
+def _onto(coarse: CaseEquations, fine: CaseEquations, states: Array) -> Array:
+    """States on another mesh."""
+    source, target = coarse.program, fine.program
+    moved = [transferred(coarse.model, source.state(flat), fine.model) for flat in states]
+    return np.stack([target.flat(state) for state in moved])
