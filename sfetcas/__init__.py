@@ -54,6 +54,10 @@ from .sweeps.cases import Cases, grid, sampled
 from .sweeps.distributions import LogNormal, Normal, Uniform
 from .sweeps.result import Sweep
 from .sweeps.sweeping import sweep
+from .trajectories.controlled_motion import Check, ControlledMotion
+from .trajectories.functions import MotionFunctions, motion_functions
+from .trajectories.optimal_control import OptimalControl
+from .trajectories.replay import Response, respond
 
 __version__ = "0.1.0"
 
@@ -64,7 +68,9 @@ __all__ = [
     "Branch",
     "Cases",
     "Certificate",
+    "Check",
     "Contact",
+    "ControlledMotion",
     "CrossSection",
     "Curvature",
     "Derivatives",
@@ -87,11 +93,13 @@ __all__ = [
     "Model",
     "Modes",
     "Motion",
+    "MotionFunctions",
     "NLPResult",
     "Node",
     "Normal",
     "OpenAnswer",
     "OpenProblem",
+    "OptimalControl",
     "Parameter",
     "ParametricAnswer",
     "ParametricEquilibrium",
@@ -101,6 +109,7 @@ __all__ = [
     "Prepared",
     "QuasiStatic",
     "QuasiStaticAnswer",
+    "Response",
     "Scene",
     "SceneError",
     "Settings",
@@ -129,7 +138,9 @@ __all__ = [
     "fitting",
     "grid",
     "load",
+    "motion_functions",
     "parametric",
+    "respond",
     "sampled",
     "solve",
     "solve_model",
