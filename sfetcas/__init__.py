@@ -8,7 +8,11 @@ The flow, in the order of the names below:
    follows other branches from its bifurcations; :class:`Modes` has frequencies and shapes, a :class:`Trajectory` the
    states of a motion, each an :class:`Instant`;
 4. :func:`parametric` makes equilibria a function of numbers of the scene, with exact first and second derivatives;
-   :func:`fit` finds such numbers from measurements, with bounds of confidence.
+   :func:`fit` finds such numbers from measurements, with bounds of confidence;
+5. :class:`Design` looks for numbers of a scene under several load cases at once, :func:`find` for those with wanted
+   answers, :class:`QuasiStatic` for inputs along a path of equilibria;
+6. :class:`OptimalControl` looks for the motion that is best, replayed by :func:`respond`; :func:`motion_functions` gives
+   the equations as plain CasADi Functions.
 
 :func:`sweep` does this for many cases of a scene at once, from a :func:`grid` or :func:`sampled`.
 
