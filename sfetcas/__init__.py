@@ -11,8 +11,8 @@ The flow, in the order of the names below:
    :func:`fit` finds such numbers from measurements, with bounds of confidence;
 5. :class:`Design` looks for numbers of a scene under several load cases at once, :func:`find` for those with wanted
    answers, :class:`QuasiStatic` for inputs along a path of equilibria;
-6. :class:`OptimalControl` looks for the motion that is best, replayed by :func:`respond`; :func:`motion_functions` gives
-   the equations as plain CasADi Functions.
+6. :class:`OptimalControl` looks for the motion that is best, replayed by :func:`respond`; :func:`motion_functions`
+   gives the equations as plain CasADi Functions.
 
 :func:`sweep` does this for many cases of a scene at once, from a :func:`grid` or :func:`sampled`.
 

@@ -71,6 +71,7 @@ class ControlledSystem:
     ) -> None:
         simulation = motion_of(scene, settings or Settings())
         self.scene = simulation.scene
+        self._refuse(controls, variables)
         base = assemble(self.scene, mesh or simulation.mesh, assembly="nodal")
         members = [n for n, member in self.scene.members.items() if member.type == "flexible"]
         known = [argument(self.scene, one.name) for one in controls]
@@ -88,7 +89,6 @@ class ControlledSystem:
         self.model, self.time = self.arguments.model, own.time
         self.begin, self.notes = simulation.begun(StageEquations(Equations(base), own, "interpreted"))
         self.total, self.quantities = self.system.total, self.system.layout.x
-        self._refuse(controls, variables)
 
     def _refuse(self, controls: Sequence[Control], variables: Sequence[Variable]) -> None:
         scene, names = self.scene, [one.name for one in controls]

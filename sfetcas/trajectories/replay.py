@@ -16,10 +16,10 @@ import numpy as np
 from ..description.loads import History
 from ..description.records import plain, unknown
 from ..description.scene import Scene
-from ..dynamics.motion import Instant
+from ..dynamics.motion import Instant, Trajectory
 from ..dynamics.simulation import Simulation
 from ..equilibria.settings import Settings
-from ..errors import SceneError, SolveError
+from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
 from ..mechanics.mesh import Mesh
@@ -71,6 +71,22 @@ class Response:
     def energies(self, kind: str = "total") -> Array:
         """Energies, (times,) N m: kinetic, elastic, loads or total."""
         return np.array([one.energy[kind] for one in self.instants])
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The states as the answer of a motion, for pictures and films."""
+        first = self.instants[0].model
+        return Trajectory(
+            scene=first.scene,
+            status=Status.SOLVED,
+            steps=self.instants,
+            seconds={},
+            integrator="",
+            count=self.count,
+            error_estimate=self.error_estimate,
+            error_of="",
+            violation={},
+        )
 
     @property
     def after(self) -> Array:
