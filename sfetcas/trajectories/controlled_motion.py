@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import casadi as ca
 import numpy as np
 
 from ..description.loads import History
@@ -21,7 +20,7 @@ from .transcription import Course, Transcription
 if TYPE_CHECKING:
     from ..description.scene import Scene
 
-__all__ = ["Check", "ControlledMotion", "value_of"]
+__all__ = ["Check", "ControlledMotion"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,9 +207,3 @@ class ControlledMotion:
     def with_variables(self, scene: Scene) -> Scene:
         """A scene with what was found for the variables."""
         return changed(scene, self.variables) if self.variables else scene
-
-
-def value_of(expression: ca.MX, transcription: Transcription, x: Array) -> float:
-    """An expression that does not change with time."""
-    function, index = transcription.expression("value", expression)
-    return float(function((x * transcription.pieces.units)[index[0]]))

@@ -20,7 +20,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.mesh import Mesh
 from ..parametric.equilibrium import Place
 from .controlled import ControlledSystem
-from .controlled_motion import ControlledMotion, value_of
+from .controlled_motion import ControlledMotion
 from .statement import Statement, Variable, bounds_of, controls_of
 from .transcription import Course, Transcription
 from .warm import at_rest, carried_over, rigid, straight
@@ -274,7 +274,15 @@ class _Run:
         end = _clipped(statement.duration, end)
         found = self._rigid(end, values) if guess == "rigid" else None
         self.seconds["warm start"] = clock.perf_counter() - begin
-        return found or at_rest(statement, problem._plain, end, values)
+        if found is not None:
+            return found
+        rest = at_rest(statement, problem._plain, end, values)
+        # What cannot move rigidly may still turn to what is asked.
+        return (
+            rest
+            if guess == "rest"
+            else straight(statement, problem._system(problem.scene, self.names, problem._mesh), rest)
+        )
 
     def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> Course | None:
         """The motion of the rigid scene, if it has one."""
@@ -333,7 +341,7 @@ class _Run:
         pieces = transcription.pieces
         values = [float(pieces.value(block, result.x).flat[0]) for block in transcription.variables]
         variables = dict(zip([one.name for one in statement.variables], values, strict=True))
-        cost = sum((value_of(term, transcription, result.x) for term in statement.costs), 0.0)
+        cost = sum((transcription.value(term, result.x) for term in statement.costs), 0.0)
         bare = ControlledMotion(
             status=result.status,
             scene=problem.scene,

@@ -238,8 +238,12 @@ class Transcription:
     def _ask(self) -> None:
         statement = self.statement
         self.integrals: dict[int, Index] = {}
-        for number, (symbol, expression) in enumerate(statement.integrals):
-            self._integrate(number, symbol, expression)
+        cost, summed = self._split_cost()
+        bounded = {symbol.__hash__() for _, found in statement.rows for symbol in ca.symvar(found.expression)}
+        bounded |= {symbol.__hash__() for symbol in ca.symvar(cost)}
+        for number, (symbol, _) in enumerate(statement.integrals):
+            if symbol.__hash__() in bounded:
+                self._integrate(number, symbol)
         for number, (name, found) in enumerate(statement.rows):
             label = name or f"constraint {number}"
             varying = _varying(label, found)
@@ -248,9 +252,7 @@ class Transcription:
             function, index = self.expression(label, varying.expression)
             unit = self._sizes(function, index)
             self.pieces.add_rows(label, function, index, None, varying.low, varying.high, unit)
-        for cost in statement.costs:
-            function, index = self.expression("cost", cost)
-            self.pieces.add_cost("cost", function, index, weight=1.0 / self._typical(function, index))
+        self._cost(cost, summed)
         if statement.resting:
             self._rest()
 
@@ -263,27 +265,58 @@ class Transcription:
         size = np.max([each.max(axis=1, initial=0.0) for each in seen], axis=0)
         return np.asarray(np.where(size > 0.0, size, 1.0))
 
-    def _typical(self, function: ca.Function, index: Index) -> float:
-        """What a cost is divided by: its size where unknowns are those of the guess, or differ by their units."""
-        guess, units = self.pieces.guess[index[0]], self.pieces.units[index[0]]
-        first, second = (float(function(at)) for at in (guess, guess + units))
-        return max(abs(first), abs(second - first)) or 1.0
+    def _split_cost(self) -> tuple[ca.MX, dict[int, float]]:
+        """The cost without the integrals that stand in it linearly, and by what these are multiplied.
 
-    def _integrate(self, number: int, symbol: ca.MX, expression: ca.MX) -> None:
-        """A running integral by the quadrature of the stages, exact as the motion is."""
+        An integral that is an unknown of its own would hide from the solver that its integrand is convex.
+        """
+        cost = sum(self.statement.costs, ca.MX(0))
+        symbols = [symbol for symbol, _ in self.statement.integrals]
+        slopes = {i: ca.jacobian(cost, symbol) for i, symbol in enumerate(symbols)}
+        linear = {i: slope for i, slope in slopes.items() if not ca.symvar(slope)}
+        summed = {i: float(ca.evalf(ca.densify(slope))) for i, slope in linear.items()}
+        chosen = [symbols[i] for i in linear]
+        return ca.substitute([cost], chosen, [ca.MX(0)] * len(chosen))[0], {i: x for i, x in summed.items() if x}
+
+    def _cost(self, cost: ca.MX, summed: dict[int, float]) -> None:
+        """What is to be least, over its size: all pieces by the same."""
+        shares = self.statement.shares[:, None]
+        pieces: list[tuple[ca.Function, Index, Array | None, float]]
+        pieces = [(*self._quadrature(i), shares, x) for i, x in summed.items()]
+        if ca.symvar(cost):
+            pieces.append((*self.expression("cost", cost), None, 1.0))
+        first = second = 0.0
+        guess, units = self.pieces.guess, self.pieces.units
+        for function, index, constants, factor in pieces:
+            for k, row in enumerate(index):
+                more = [] if constants is None else [constants[k]]
+                first += factor * float(function(guess[row], *more))
+                second += factor * float(function(guess[row] + units[row], *more))
+        size = max(abs(first), abs(second - first)) or 1.0
+        for function, index, constants, factor in pieces:
+            self.pieces.add_cost("cost", function, index, constants, weight=COST * factor / size)
+
+    def _quadrature(self, number: int) -> tuple[ca.Function, Index]:
+        """(unknowns of an interval and the end time, share) -> integral over it, and places (intervals, w)."""
         weights = integration(self.places, np.array([1.0]))[0]
-        function, index = self.expression("integral", expression)
+        function, index = self.expression("integral", self.statement.integrals[number][1])
         n, width = self.intervals, index.shape[1]
         index = np.broadcast_to(index, (n * self.stages, width)).reshape(n, -1)
-        name = f"integral {number}"
-        values = self.pieces.unknowns(name, np.zeros(n))
-        before = np.append(self._constant(f"{name} at t0", np.zeros(1)).index, values.index[:-1])
-        w, c = ca.MX.sym("w", index.shape[1] + 3), ca.MX.sym("c")
+        w, c = ca.MX.sym("w", index.shape[1] + 1), ca.MX.sym("c")
         parts = [w[i * width : (i + 1) * width] for i in range(self.stages)]
         gained = sum((weights[i] * function(part) for i, part in enumerate(parts)), ca.MX(0))
-        row = w[-2] - w[-3] - w[-1] * c * gained
-        end = np.full(n, self.end.index.flat[0])
-        places = np.concatenate([index, np.stack([before, values.index, end], axis=1)], axis=1)
+        places = np.concatenate([index, np.full((n, 1), self.end.index.flat[0])], axis=1)
+        return ca.Function("integral", [w, c], [w[-1] * c * gained]), places
+
+    def _integrate(self, number: int, symbol: ca.MX) -> None:
+        """A running integral by the quadrature of the stages, exact as the motion is."""
+        gained, index = self._quadrature(number)
+        n, name = self.intervals, f"integral {number}"
+        values = self.pieces.unknowns(name, np.zeros(n))
+        before = np.append(self._constant(f"{name} at t0", np.zeros(1)).index, values.index[:-1])
+        w, c = ca.MX.sym("w", index.shape[1] + 2), ca.MX.sym("c")
+        row = w[-1] - w[-2] - gained(w[:-2], c)
+        places = np.concatenate([index, np.stack([before, values.index], axis=1)], axis=1)
         self.pieces.add_rows(name, ca.Function("integral", [w, c], [row]), places, self.statement.shares[:, None])
         self.integrals[symbol.__hash__()] = values.index[-1:]
 
@@ -442,6 +475,18 @@ class Transcription:
             variables=np.array([value(block, x)[0] for block in self.variables]),
         )
 
+    def value(self, expression: ca.MX, x: Array) -> float:
+        """What does not change with time, integrals among it, in an answer ``x`` of the program."""
+        physical = x * self.pieces.units
+        known, values = [], []
+        for number, (symbol, _) in enumerate(self.statement.integrals):
+            function, index = self._quadrature(number)
+            shares = self.statement.shares
+            known.append(symbol)
+            values.append(ca.MX(sum(float(function(physical[row], c)) for row, c in zip(index, shares, strict=True))))
+        function, index = self.expression("value", ca.substitute([ca.MX(expression)], known, values)[0])
+        return float(function(physical[index[0]]))
+
     def rotations(self, d: Array, x: Array) -> tuple[Array, Array]:
         """Rotations (stages, rotations, components) and angles that count turns."""
         n = self.system.system.layout
@@ -460,6 +505,9 @@ class Transcription:
         found[1:, picked] = inside.reshape(len(found) - 1, -1)
         return found
 
+
+COST = 5.0
+"""Size of a cost as IPOPT sees it."""
 
 RESOLVED = 2.0
 """Turns in rad of a vibration in an interval up to which it is followed: Radau IIA of three stages then keeps it."""

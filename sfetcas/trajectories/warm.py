@@ -131,6 +131,8 @@ def _end_shape(statement: Statement, system: ControlledSystem) -> Array | None:
         used = np.unique(np.array(ca.jacobian_sparsity(expression, d.symbol).row(), dtype=np.intp))
         if len(used):
             pieces.add_expression("end", expression[used.tolist()], row.low[used], row.high[used])
+    if len(pieces.row_names()) > pieces.size:
+        return None
     pieces.add_term("turns", ca.sumsqr(d.symbol[:turning]))
     result = Ipopt(1e-6, 100).solve(pieces.nlp())
     return pieces.value(d, result.x)[:turning] if result.status is Status.SOLVED else None
