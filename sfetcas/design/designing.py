@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
@@ -70,12 +70,12 @@ class DesignAnswer:
 
     values: Mapping[str, Any]
     objective: float
-    cases: Mapping[str, Equilibrium]
-    multipliers: Mapping[str, Array]
+    cases: Mapping[str, Equilibrium] = field(repr=False)
+    multipliers: Mapping[str, Array] = field(repr=False)
     notes: tuple[str, ...]
     iterations: int
-    told: Told
-    scenes: Mapping[str, Scene]
+    told: Told = field(repr=False)
+    scenes: Mapping[str, Scene] = field(repr=False)
 
     @property
     def stable(self) -> bool:

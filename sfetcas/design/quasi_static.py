@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -75,17 +75,17 @@ class QuasiStaticAnswer:
     iterations : int
     """
 
-    s: Array
-    inputs: Mapping[str, Array]
-    values: Mapping[str, Array]
-    told: Mapping[str, Array]
+    s: Array = field(repr=False)
+    inputs: Mapping[str, Array] = field(repr=False)
+    values: Mapping[str, Array] = field(repr=False)
+    told: Mapping[str, Array] = field(repr=False)
     objective: float
-    cases: tuple[Equilibrium, ...]
+    cases: tuple[Equilibrium, ...] = field(repr=False)
     jumps: tuple[int, ...]
-    multipliers: Mapping[str, Array]
+    multipliers: Mapping[str, Array] = field(repr=False)
     notes: tuple[str, ...]
     iterations: int
-    scenes: tuple[Scene, ...]
+    scenes: tuple[Scene, ...] = field(repr=False)
 
     @property
     def stable(self) -> bool:

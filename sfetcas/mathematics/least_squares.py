@@ -56,6 +56,7 @@ def least_squares(
     low: Array,
     high: Array,
     *,
+    positive: Array | None = None,
     tolerance: float = 1e-8,
     iterations: int = 100,
 ) -> Minimum | None:
@@ -67,6 +68,8 @@ def least_squares(
         Residuals at x; None where there are none: the step is then shortened.
     x, low, high : ndarray (n,)
         Of the size of one.
+    positive : (n,) of bool, optional
+        What is above zero without a lower bound near which it would be sensible: no step takes it below a fifth.
     tolerance : float
         Steps shorter than this have converged.
     """
@@ -79,6 +82,8 @@ def least_squares(
         count += 1
         step = _step(jacobian, here.residuals, damping, _held(x, jacobian.T @ here.residuals, low, high))
         there = np.clip(x + step, low, high)
+        if positive is not None:
+            there = np.where(positive, np.maximum(there, 0.2 * x), there)
         length = float(np.abs(there - x).max(initial=0.0))
         found = function(there)
         if found is not None and found.residuals @ found.residuals <= here.residuals @ here.residuals:

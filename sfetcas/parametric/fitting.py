@@ -296,7 +296,8 @@ class Fitting:
         scale = np.maximum(np.abs(begin), width)
         scale = np.where(scale > 0.0, scale, 1.0)
         search = _Search(self, measured, scale)
-        found = least_squares(search, begin / scale, low / scale, high / scale)
+        positive = (low > 0.0) & (low < TINY)
+        found = least_squares(search, begin / scale, low / scale, high / scale, positive=positive)
         if found is None:
             raise search.failure or SolveError(Status.FAILED, "the search found no start")
         if not found.converged:
@@ -337,6 +338,9 @@ class _Search:
         rows = whole[self._of._cases, self._of._row] * self._scale
         return np.asarray(rows / self._of.deviations[:, None])
 
+
+TINY = 1e-300
+"""Lower limits below this say no more than that a number is above zero."""
 
 UNDETERMINED = 1e-7
 """Share of the largest singular value, of parameters over their size, below which a direction is not determined."""

@@ -103,7 +103,7 @@ class Sweep:
         """
         found: dict[str, Array] = dict(self.cases.columns)
         for name, values in self.quantities.items():
-            names = [name] if values.shape[1] == 1 else [f"{name}.{i}" for i in range(values.shape[1])]
+            names = [name] if values.shape[1] == 1 else [_component(name, i) for i in range(values.shape[1])]
             for column, numbers in zip(names, values.T, strict=True):
                 found[f"answer.{column}" if column in self.cases.columns else column] = numbers
         for key in ("status", "reason", "notes"):
@@ -239,3 +239,9 @@ def gathered(
         found.flags.writeable = False
         quantities[one.text] = found
     return Sweep(scene, cases, MappingProxyType(quantities), tuple(outcomes), wall, interrupted)
+
+
+def _component(name: str, number: int) -> str:
+    """A component of a quantity: its number stands before its place, ``members.beam.moment.2 at 0``."""
+    quantity, gap, place = name.partition(" ")
+    return f"{quantity}.{number}{gap}{place}"
