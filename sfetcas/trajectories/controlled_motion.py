@@ -164,13 +164,13 @@ class ControlledMotion:
         later = self.time + np.linspace(0.0, tail, 101)[1:] if tail > 0.0 else np.zeros(0)
         times = np.concatenate([self.ends, later])
         given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "tail": tail, "times": times, **more}
-        response, name = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
+        response, used = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
         places = self._node_positions()
         size, difference = system.scene.size, 0.0
         for name, own in places.items():
             other = response.positions(name)[: len(self.ends)]
             difference = max(difference, float(np.linalg.norm(own - other, axis=1).max()) / size)
-        return Check(response, difference, response.error_estimate, name, response.residual_vibration())
+        return Check(response, difference, response.error_estimate, used, response.residual_vibration())
 
     def _responded(self, integrator: str | None, given: Mapping[str, Any]) -> tuple[Response, str]:
         for name, halvings in ((integrator, HALVINGS),) if integrator else (("conserving", 4), ("radau-3", HALVINGS)):
