@@ -121,6 +121,10 @@ class ControlledMotion:
             raise SceneError(f"answer: {unknown(name, names, 'answers in the problem')}")
         return self.transcription.answer(name, self.x)
 
+    def value(self, expression: ca.MX) -> float:
+        """What the problem knows as one number: ``time``, an integral made before the search, ``at_tf(...)``."""
+        return value_of(ca.MX(expression), self.transcription, self.x)
+
     @functools.cached_property
     def course(self) -> Course:
         """The motion on the grid, dimensionless: also where another search may begin."""
