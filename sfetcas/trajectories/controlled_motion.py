@@ -179,7 +179,8 @@ class ControlledMotion:
     def _responded(self, integrator: str | None, given: Mapping[str, Any]) -> tuple[Response, str]:
         for name, halvings in ((integrator, HALVINGS),) if integrator else (("conserving", 4), ("radau-3", HALVINGS)):
             try:
-                found = respond(self.scene, self.commands, self.time, integrator=name, halvings=halvings, **given)
+                one = {"integrator": name, "halvings": halvings, **given}
+                found = respond(self.scene, self.commands, self.time, **one)
             except (SceneError, SolveError):
                 if name == (integrator or "radau-3"):
                     raise
