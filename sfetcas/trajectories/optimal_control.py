@@ -277,12 +277,13 @@ class _Run:
         return found or at_rest(statement, problem._plain, end, values)
 
     def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> Course | None:
-        """The motion of the rigid scene, if it has one."""
+        """The motion of the rigid scene, if it has one; where all is rigid, where its search would begin."""
         problem, statement = self.problem, self.problem.statement
         try:
             scene = rigid(problem.scene)
             if scene is None:
-                return None
+                own = problem._system(problem.scene, self.names, problem._mesh)
+                return straight(statement, own, at_rest(statement, own, end, values))
             stiff = problem._system(scene, self.names)
             start = straight(statement, stiff, at_rest(statement, stiff, end, values))
             transcription = Transcription(statement, stiff, start)
