@@ -16,7 +16,7 @@ from __future__ import annotations
 import functools
 import sys
 import time as clock
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -76,8 +76,7 @@ def smooth() -> History:
     return History(t=[0.0, TIME, 2.0 * TIME], polynomial=[[0.0, 60.0 * size, -180.0 * size, 120.0 * size], [0.0]])
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """A motion that was looked for, and the work of its torque, N m."""
 
     motion: ControlledMotion

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,8 +44,7 @@ TOLERANCE = 1e-2
 are met within 1e-3."""
 
 
-@dataclass(frozen=True)
-class Swing:
+class Swing(NamedTuple):
     """A motion, and the work of its motor, N m."""
 
     motion: ControlledMotion
