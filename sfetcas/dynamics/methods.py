@@ -21,7 +21,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.interpolation import integration
 from .stages import StageEquations
 
-__all__ = ["Begin", "GeneralisedAlpha", "Method", "Radau", "Relations", "StageMethod"]
+__all__ = ["RADAU", "Begin", "GeneralisedAlpha", "Method", "Radau", "Relations", "StageMethod"]
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from .transcription import Course, Transcription
 if TYPE_CHECKING:
     from ..description.scene import Scene
 
-__all__ = ["Check", "ControlledMotion"]
+__all__ = ["Check", "ControlledMotion", "value_of"]
 
 
 @dataclass(frozen=True, eq=False)

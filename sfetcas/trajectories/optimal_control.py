@@ -235,6 +235,12 @@ EXTRA = {"mumps_pivot_order": 5, "mumps_pivtol": 1e-2}
 """Options of IPOPT (measured): nested dissection leaves half the fill of MUMPS' own choice on these chains, and larger
 pivots keep the signs right that IPOPT counts: 5 iterations in the place of 24."""
 
+BROKEN = ("Error_In_Step_Computation", "Restoration_Failed", "Search_Direction_Becomes_Too_Small")
+"""Messages of IPOPT after steps that regularisation has made nothing of: rounding had turned signs of pivots."""
+
+UNCOUNTED = {"neg_curv_test_tol": 1e-11, "neg_curv_test_reg": "no"}
+"""Options by which IPOPT judges curvature along its step, in the place of signs of pivots."""
+
 ROUNDS = 4
 """Programs at most, each about the answer of the one before, until that stands."""
 
@@ -310,9 +316,14 @@ class _Run:
             solve = self.solver.prepare(nlp)
             built = clock.perf_counter()
             result = solve()
+            self.iterations += result.iterations
+            if any(word in result.message for word in BROKEN):
+                self.notes.append("IPOPT broke off, and began again without counting signs of pivots")
+                extra = {**self.solver.extra, **UNCOUNTED}
+                result = replace(self.solver, extra=extra).solve(nlp)
+                self.iterations += result.iterations
             self.seconds["build"] += built - begin
             self.seconds["solve"] += clock.perf_counter() - built
-            self.iterations += result.iterations
             found = self._motion(transcription, result)
             if result.status is not Status.SOLVED:
                 raise SolveError(result.status, _why(transcription, nlp, result, problem.statement), found)

@@ -25,7 +25,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.mesh import Mesh
 from ..parametric.arguments import argument
 
-__all__ = ["Response", "commanded", "respond"]
+__all__ = ["HALVINGS", "Response", "commanded", "respond"]
 
 ORDERS = {"conserving": 2, "radau-2": 3, "radau-3": 5, "generalised-alpha": 2}
 """Orders of the integrators that take steps of equal length."""

@@ -19,7 +19,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.relations import Relation, relation
 
-__all__ = ["Control", "Kind", "Signal", "Statement", "Variable"]
+__all__ = ["Control", "Kind", "Signal", "Statement", "Variable", "bounds_of", "controls_of"]
 
 Kind = Literal["control", "rate", "answer", "time"]
 """What a signal is of."""
