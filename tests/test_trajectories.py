@@ -1,5 +1,7 @@
 """Motions as optimal control: refusals, the order of the collocation, and answers against closed forms."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from sfetcas import (
     Settings,
     SolveError,
     Spring,
+    Status,
 )
 from sfetcas.dynamics.simulation import Simulation
 from sfetcas.trajectories.optimal_control import OptimalControl
@@ -305,3 +308,19 @@ def test_kinks_a_rounding_apart_are_one():
         analysis={"type": "dynamic", "end": end},
     )
     assert Simulation(scene, Settings(), None, None)._breaks(1.0) == [0.25, end]
+
+
+def test_a_search_that_broke_off_begins_again(flexible, monkeypatch):
+    prepare = Ipopt.prepare
+
+    def breaking(self, nlp):
+        solve = prepare(self, nlp)
+        if "neg_curv_test_tol" in self.extra:
+            return solve
+        return lambda *a, **more: replace(solve(*a, **more), status=Status.FAILED, message="Error_In_Step_Computation")
+
+    monkeypatch.setattr(Ipopt, "prepare", breaking)
+    motion = solved(turning(arm()), guess=flexible)
+    assert any("began again" in note for note in motion.notes)
+    # What vibrates too fast to be brought to rest is judged about another guess.
+    assert motion.cost == pytest.approx(flexible.cost, rel=1e-4)
