@@ -98,6 +98,10 @@ class _Run:
     interrupted: bool = False
 
 
+SAME = 1e-12
+"""Share of the duration within which kinks are one: no step fits between them."""
+
+
 class Simulation:
     """A motion: its runs on finer and finer meshes."""
 
@@ -131,7 +135,11 @@ class Simulation:
     def _breaks(self, unit: float) -> list[float]:
         """Times at which loads or motions have a kink, and the end, dimensionless."""
         end = self.scene.analysis.duration
-        return [t / unit for t in sorted({*(t for t in self._kinks if 0.0 < t < end), end})]
+        found: list[float] = []
+        for t in sorted(t for t in self._kinks if SAME * end < t < end - SAME * end):
+            if not found or t - found[-1] > SAME * end:
+                found.append(t)
+        return [t / unit for t in (*found, end)]
 
     @property
     def _kinks(self) -> set[float]:

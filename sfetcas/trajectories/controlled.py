@@ -76,7 +76,9 @@ class ControlledSystem:
         members = [n for n, member in self.scene.members.items() if member.type == "flexible"]
         known = [argument(self.scene, one.name) for one in controls]
         # Where it is varied its range says where the model has to be known.
-        spans = [(one.low, one.high) if np.isfinite([one.low, one.high]).all() else None for one in variables]
+        spans = [
+            (one.low, one.high) if np.isfinite(one.high - one.low) and one.low < one.high else None for one in variables
+        ]
         known += [argument(self.scene, one.name, span) for one, span in zip(variables, spans, strict=True)]
         for one in known:
             if len(one.default) != 1:

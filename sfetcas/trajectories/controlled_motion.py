@@ -20,7 +20,7 @@ from .transcription import Course, Transcription
 if TYPE_CHECKING:
     from ..description.scene import Scene
 
-__all__ = ["Check", "ControlledMotion"]
+__all__ = ["Check", "ControlledMotion", "value_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +120,10 @@ class ControlledMotion:
             raise SceneError(f"answer: {unknown(name, names, 'answers in the problem')}")
         return self.transcription.answer(name, self.x)
 
+    def value(self, expression: ca.MX) -> float:
+        """What the problem knows as one number: ``time``, an integral made before the search, ``at_tf(...)``."""
+        return value_of(ca.MX(expression), self.transcription, self.x)
+
     @functools.cached_property
     def course(self) -> Course:
         """The motion on the grid, dimensionless: also where another search may begin."""
@@ -163,18 +167,19 @@ class ControlledMotion:
         later = self.time + np.linspace(0.0, tail, 101)[1:] if tail > 0.0 else np.zeros(0)
         times = np.concatenate([self.ends, later])
         given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "tail": tail, "times": times, **more}
-        response, name = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
+        response, used = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
         places = self._node_positions()
         size, difference = system.scene.size, 0.0
         for name, own in places.items():
             other = response.positions(name)[: len(self.ends)]
             difference = max(difference, float(np.linalg.norm(own - other, axis=1).max()) / size)
-        return Check(response, difference, response.error_estimate, name, response.residual_vibration())
+        return Check(response, difference, response.error_estimate, used, response.residual_vibration())
 
     def _responded(self, integrator: str | None, given: Mapping[str, Any]) -> tuple[Response, str]:
         for name, halvings in ((integrator, HALVINGS),) if integrator else (("conserving", 4), ("radau-3", HALVINGS)):
             try:
-                found = respond(self.scene, self.commands, self.time, integrator=name, halvings=halvings, **given)
+                one = {"integrator": name, "halvings": halvings, **given}
+                found = respond(self.scene, self.commands, self.time, **one)
             except (SceneError, SolveError):
                 if name == (integrator or "radau-3"):
                     raise

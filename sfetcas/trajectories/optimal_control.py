@@ -235,6 +235,12 @@ EXTRA = {"mumps_pivot_order": 5, "mumps_pivtol": 1e-2}
 """Options of IPOPT (measured): nested dissection leaves half the fill of MUMPS' own choice on these chains, and larger
 pivots keep the signs right that IPOPT counts: 5 iterations in the place of 24."""
 
+BROKEN = ("Error_In_Step_Computation", "Restoration_Failed", "Search_Direction_Becomes_Too_Small")
+"""Messages of IPOPT after steps that regularisation has made nothing of: rounding had turned signs of pivots."""
+
+UNCOUNTED = {"neg_curv_test_tol": 1e-11, "neg_curv_test_reg": "no"}
+"""Options by which IPOPT judges curvature along its step, in the place of signs of pivots."""
+
 ROUNDS = 4
 """Programs at most, each about the answer of the one before, until that stands."""
 
@@ -285,12 +291,13 @@ class _Run:
         )
 
     def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> Course | None:
-        """The motion of the rigid scene, if it has one."""
+        """The motion of the rigid scene, if it has one; where all is rigid, where its search would begin."""
         problem, statement = self.problem, self.problem.statement
         try:
             scene = rigid(problem.scene)
             if scene is None:
-                return None
+                own = problem._system(problem.scene, self.names, problem._mesh)
+                return straight(statement, own, at_rest(statement, own, end, values))
             stiff = problem._system(scene, self.names)
             start = straight(statement, stiff, at_rest(statement, stiff, end, values))
             transcription = Transcription(statement, stiff, start)
@@ -317,9 +324,14 @@ class _Run:
             solve = self.solver.prepare(nlp)
             built = clock.perf_counter()
             result = solve()
+            self.iterations += result.iterations
+            if any(word in result.message for word in BROKEN):
+                self.notes.append("IPOPT broke off, and began again without counting signs of pivots")
+                extra = {**self.solver.extra, **UNCOUNTED}
+                result = replace(self.solver, extra=extra).solve(nlp)
+                self.iterations += result.iterations
             self.seconds["build"] += built - begin
             self.seconds["solve"] += clock.perf_counter() - built
-            self.iterations += result.iterations
             found = self._motion(transcription, result)
             if result.status is not Status.SOLVED:
                 raise SolveError(result.status, _why(transcription, nlp, result, problem.statement), found)

@@ -1,0 +1,326 @@
+"""Motions as optimal control: refusals, the order of the collocation, and answers against closed forms."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from sfetcas import (
+    CrossSection,
+    History,
+    Ipopt,
+    Load,
+    Member,
+    Motion,
+    Node,
+    Scene,
+    SceneError,
+    Settings,
+    SolveError,
+    Spring,
+    Status,
+)
+from sfetcas.dynamics.simulation import Simulation
+from sfetcas.trajectories.optimal_control import OptimalControl
+from sfetcas.trajectories.replay import respond
+
+TORQUE = "loads.motor.value"
+INERTIA = 0.1 + 1.0 / 3.0 + 0.2
+"""Of the rigid arm about its hub, kg m2."""
+
+ANGLE, TIME = np.pi / 2.0, 2.0
+LEAST = 12.0 * INERTIA**2 * ANGLE**2 / TIME**3
+"""Least integral of the squared torque that turns the rigid arm from rest to rest."""
+
+
+def arm(elements=2, **more):
+    """A hub with inertia, an arm, a mass at its tip; rigid of no elements."""
+    member = {"element": "SFET3", "elements": elements} if elements else {"type": "rigid"}
+    given = {
+        "sections": {"strip": CrossSection(EI3=1.0, rhoA=1.0)},
+        "nodes": {
+            "hub": Node(position=[0, 0], support="hinge", inertia=[0, 0, 0.1]),
+            "tip": Node(position=[1, 0], mass=0.2),
+        },
+        "members": {"arm": Member(nodes=["hub", "tip"], section="strip", **member)},
+        "loads": {"motor": Load(type="moment", node="hub", value=0.0)},
+    }
+    return Scene(**(given | more))
+
+
+def turning(scene, name=TORQUE, limit=5.0, intervals=10, unit=1.0, end=TIME, **more):
+    """Least effort to turn the arm by 90 degrees, from rest to rest; `unit` of torque."""
+    problem = OptimalControl(scene, {name: (-limit, limit)}, time=end, intervals=intervals, **more)
+    problem.minimise(problem.integral((problem.control(name) / unit) ** 2))
+    problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == ANGLE, "turned")
+    problem.rest_at_end()
+    return problem
+
+
+def solved(problem, **more):
+    return problem.solve(replay=False, ipopt=Ipopt(1e-9, 100), **more)
+
+
+@pytest.fixture(scope="module")
+def flexible():
+    return solved(turning(arm()))
+
+
+# -- what is refused ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: OptimalControl(arm(), {"loads.none.value": (-1, 1)}, time=1.0), "none"),
+        (lambda: OptimalControl(arm(), {}, time=1.0), "controls: found none"),
+        (lambda: OptimalControl(arm(), {TORQUE: (1, -1)}, time=1.0), "from the least to the largest"),
+        (lambda: OptimalControl(arm(), {TORQUE: 3.0}, time=1.0), "a pair"),
+        (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=-1.0), "a positive time"),
+        (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, intervals=0), "at least 1"),
+        (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, intervals=[1, -1]), "positive shares"),
+        (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, stages=4), "2 or 3 stages"),
+        (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, order=0, rates={TORQUE: 1}), "controls that jump"),
+        (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, rates={"loads.moter.value": 1}), "moter"),
+        (lambda: OptimalControl(arm(), {"sections.strip.EI3": (1, 2)}, time=1.0), "a component of the value of a load"),
+        (lambda: OptimalControl(arm(gravity=[0, -9.81]), {"gravity.1": (-9, 9)}, time=1.0), "value of a load"),
+    ],
+)
+def test_problems_that_cannot_be_are_refused(make, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        make()
+
+
+def test_loads_and_motions_that_nobody_controls_are_refused():
+    history = {"histories": {"pulse": History(t=[0, 1], value=[0, 1])}}
+    loads = {
+        "motor": Load(type="moment", node="hub", value=0.0),
+        "tip": Load(type="force", node="tip", value=[0, 1], history="pulse"),
+    }
+    with pytest.raises(SceneError, match=r"the history 'pulse'.*constant or controlled"):
+        OptimalControl(arm(loads=loads, **history), {TORQUE: (-1, 1)}, time=1.0)
+    history = {"histories": {"pulse": History(t=[0, 1], polynomial=[[0, 0, 0, 1]])}}
+    moved = {"lift": Motion(node="hub", displacement=[0, 0.1], history="pulse")}
+    with pytest.raises(SceneError, match="motions that stand still"):
+        OptimalControl(arm(motions=moved, **history), {TORQUE: (-1, 1)}, time=1.0)
+
+
+def test_what_is_asked_wrongly_is_refused():
+    problem = OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0)
+    torque = problem.control(TORQUE)
+    with pytest.raises(SceneError, match="what changes with time"):
+        problem.minimise(torque**2)
+    with pytest.raises(SceneError, match="tpi"):
+        problem.answer("nodes.tpi.position")
+    with pytest.raises(SceneError, match="did you mean 'loads"):
+        problem.control("loads.moter.value")
+    with pytest.raises(SceneError, match="accepted: none"):
+        problem.variable("sections.strip.EI3")
+    with pytest.raises(SceneError, match="do not contradict"):
+        problem.subject_to(1.0 <= (torque <= -1.0), "torn")  # noqa: SIM300
+    with pytest.raises(SceneError, match="line: "):
+        problem.subject_to(torque, "line")
+    problem.minimise(ca.MX.sym("stranger"))
+    with pytest.raises(SceneError, match="stranger"):
+        problem.solve()
+
+
+def test_a_constraint_that_nothing_changes_and_does_not_hold_is_refused():
+    problem = turning(arm())
+    # In a plane scene z of the tip is 0 at all times.
+    problem.subject_to(problem.answer("nodes.tip.position")[2] == 1.0, "height")
+    with pytest.raises(SceneError, match=r"height: found 0, which nothing changes, accepted: 1"):
+        problem.solve()
+
+
+def test_too_short_a_time_is_told_with_the_last_iterate():
+    # A rigid arm needs 1.45 N m for it.
+    problem = turning(arm(0), limit=1.0)
+    with pytest.raises(SolveError, match=r"the horizon of 2 s may be too short") as told:
+        problem.solve(ipopt=Ipopt(1e-8, 60))
+    last = told.value.last
+    assert last.status is not None
+    assert last.check is None
+    # Not turned: no answer.
+    assert np.abs(last.control(TORQUE)).max() <= 1.0 + 1e-6
+    assert "violated most" in str(told.value)
+
+
+# -- closed forms ---------------------------------------------------------------------------------------------
+
+
+def test_effort_of_a_rigid_arm_is_that_of_the_closed_form():
+    motion = solved(turning(arm(0)))
+    # The best torque is linear in time, as controls are; the circle of the tip is met to order 5 in 10 intervals.
+    assert motion.cost == pytest.approx(LEAST, rel=1e-5)
+    torque = 6.0 * INERTIA * ANGLE / TIME**2 * (1.0 - 2.0 * motion.ends / TIME)
+    np.testing.assert_allclose(motion.control(TORQUE), torque, atol=1e-4)
+    angle = ANGLE * (3.0 * (motion.times / TIME) ** 2 - 2.0 * (motion.times / TIME) ** 3)
+    np.testing.assert_allclose(motion.answer("nodes.hub.angle").ravel(), angle, atol=1e-4)
+
+
+def test_effort_of_a_flexible_arm_tends_to_that_of_the_rigid_one(flexible):
+    stiff = solved(turning(arm(sections={"strip": CrossSection(EI3=1e3, rhoA=1.0)})))
+    assert flexible.cost > 1.1 * LEAST
+    # What bends is the thousandth part.
+    assert stiff.cost == pytest.approx(LEAST, rel=1e-3)
+
+
+def test_impulse_and_work_of_a_motion_from_rest_to_rest_vanish(flexible):
+    torque, size = flexible.control(TORQUE), 2.0 * TIME
+    # Nothing asks for it: the arm's momentum is 0 at both ends, but for the vibrations too fast for 10 intervals.
+    assert abs(np.trapezoid(torque, flexible.ends)) < 1e-3 * size
+
+
+def test_limits_of_the_rate_of_a_torque_and_of_the_speed_of_the_tip_hold():
+    free = 12.0 * INERTIA * ANGLE / TIME**3, 1.5 * ANGLE / TIME
+    problem = turning(arm(0), rates={TORQUE: 4.0}, intervals=20)
+    speed = problem.answer("nodes.tip.velocity")
+    problem.subject_to(ca.sumsqr(speed) <= 1.0, "speed")
+    motion = solved(problem)
+    rate = np.diff(motion.control(TORQUE)) / np.diff(motion.ends)
+    assert free[0] < np.abs(rate).max() <= 4.0 + 1e-6
+    fastest = np.linalg.norm(motion.answer("nodes.tip.velocity"), axis=1).max()
+    assert fastest == pytest.approx(1.0, abs=1e-6)
+    assert free[1] > 1.1
+    assert motion.cost > 1.01 * LEAST
+
+
+def test_least_time_of_a_rigid_arm():
+    problem = OptimalControl(arm(0), {TORQUE: (-1, 1)}, time=(0.5, 6.0), intervals=10, order=0)
+    problem.minimise(problem.time)
+    problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == ANGLE)
+    problem.rest_at_end()
+    motion = solved(problem, time=3.0)
+    assert motion.time == pytest.approx(2.0 * np.sqrt(ANGLE * INERTIA), rel=1e-6)
+    np.testing.assert_allclose(motion.control(TORQUE), [1.0] * 5 + [-1.0] * 5, atol=1e-4)
+
+
+# -- the same problem told in other words ---------------------------------------------------------------------
+
+
+def test_controlled_histories_cost_what_controlled_values_cost(flexible):
+    loads = {"motor": Load(type="moment", node="hub", value=2.0, history="torque")}
+    scene = arm(loads=loads, histories={"torque": History(t=[0, 1], value=[0, 0])})
+    motion = solved(turning(scene, name="histories.torque", unit=0.5))
+    # IPOPT's tolerance
+    assert motion.cost == pytest.approx(flexible.cost, rel=1e-6)
+    np.testing.assert_allclose(2.0 * motion.control("histories.torque"), flexible.control(TORQUE), atol=1e-4)
+
+
+def test_units_do_not_matter(flexible):
+    # Lengths in mm, forces in mN.
+    mm, mn = 1e3, 1e3
+    nodes = {
+        "hub": Node(position=[0, 0], support="hinge", inertia=[0, 0, 0.1 * mn * mm]),
+        "tip": Node(position=[mm, 0], mass=0.2 * mn / mm),
+    }
+    sections = {"strip": CrossSection(EI3=mn * mm**2, rhoA=mn / mm**2)}
+    motion = solved(turning(arm(nodes=nodes, sections=sections), limit=5.0 * mn * mm, unit=mn * mm))
+    assert motion.cost == pytest.approx(flexible.cost, rel=1e-6)
+
+
+def to_the_side(scene, name):
+    """Least effort to bring the tip from y = 0 to y = 0.8."""
+    problem = OptimalControl(scene, {name: (-5, 5)}, time=TIME, intervals=20)
+    problem.minimise(problem.integral(problem.control(name) ** 2))
+    problem.subject_to(problem.at_tf(problem.answer("nodes.tip.position")[1]) == 0.8, "side")
+    problem.rest_at_end()
+    return solved(problem)
+
+
+def test_space_costs_what_the_plane_does():
+    scene = arm(
+        dimension="space",
+        sections={"strip": CrossSection(EI2=1.0, EI3=1.0, GJ=1.0, rhoA=1.0, rhoI=[2e-4, 1e-4, 1e-4])},
+        nodes={
+            "hub": Node(position=[0, 0, 0], support="hinge", axis=[0, 0, 1], inertia=[0, 0, 0.1]),
+            "tip": Node(position=[1, 0, 0], mass=0.2),
+        },
+        loads={"motor": Load(type="moment", node="hub", value=[0, 0, 0])},
+    )
+    space, plane = to_the_side(scene, f"{TORQUE}.2"), to_the_side(arm(), TORQUE)
+    # Rotary inertia, which the plane rod lacks, counts by 1e-3.
+    assert space.cost == pytest.approx(plane.cost, rel=3e-3)
+    np.testing.assert_allclose(space.positions("tip"), plane.positions("tip"), atol=3e-3)
+
+
+def test_a_spring_is_chosen_together_with_the_torque():
+    spring = {"hub": Spring(node="hub", stiffness=1.0, axis=[0, 0, 1], between=["ground", "arm"])}
+    scene = arm(0, springs=spring)
+    costs = {}
+    for low, high in ((0.5, 0.5), (0.6, 0.6), (0.1, 3.0)):
+        problem = turning(scene, variables={"springs.hub.stiffness": (low, high)})
+        motion = solved(problem)
+        costs[motion.variables["springs.hub.stiffness"]] = motion.cost
+    assert len(costs) == 3
+    best = min(costs, key=costs.get)
+    assert best not in (0.5, 0.6)
+    assert 0.1 - 1e-6 <= best <= 3.0
+
+
+# -- collocation and replay -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("stages", "order"), [(2, 3), (3, 5)])
+def test_the_motion_errs_by_the_order_of_the_method(stages, order):
+    # A rigid pendulum under gravity and a constant torque; nothing is left to choose.
+    scene, torque = arm(0, gravity=[0, -9.81]), 3.0
+    command = {TORQUE: History(t=[0.0, 1.0, 2.0], polynomial=[[torque], [0.0]])}
+    exact = respond(scene, command, 1.0, times=np.array([0.0, 1.0]), integrator="radau-3", accuracy=1e-9, step=0.02)
+    errors = []
+    for intervals in (5, 10):
+        fixed = {TORQUE: (torque, torque)}
+        problem = OptimalControl(scene, fixed, time=1.0, intervals=intervals, stages=stages, order=0)
+        motion = solved(problem, guess="rest")
+        errors.append(np.linalg.norm(motion.positions("tip")[-1] - exact.positions("tip")[-1]))
+    # Halved steps: the factor 2^order, reached to about half a power on grids as coarse as these.
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.6)
+
+
+def test_replay_agrees_and_names_its_integrator(flexible):
+    check = flexible.replayed(tail=0.5, accuracy=1e-3, halvings=1)
+    assert check.integrator == "conserving"
+    # Two elements and 10 intervals of an effort that jumps at both ends: a few thousandths.
+    assert check.difference < 2e-2
+    assert check.response.after.sum() == 101
+
+
+def test_a_known_answer_is_where_another_search_begins(flexible):
+    with pytest.raises(SceneError, match="another grid or mesh"):
+        solved(turning(arm(), intervals=12), guess=flexible)
+    again = solved(turning(arm()), guess=flexible)
+    # What vibrates too fast to be brought to rest is judged about the guess.
+    assert again.cost == pytest.approx(flexible.cost, rel=1e-4)
+
+
+def test_kinks_a_rounding_apart_are_one():
+    end = 0.5
+    near = np.nextafter(end, 0.0)
+    command = {TORQUE: History(t=[0.0, 0.25, near], value=[0.0, 1.0, 0.0])}
+    found = respond(arm(0), command, end, step=0.05, accuracy=1.0, halvings=1)
+    assert np.isfinite(found.positions("tip")).all()
+    scene = arm(
+        0,
+        loads={"motor": Load(type="moment", node="hub", value=1.0, history="h")},
+        histories={"h": command[TORQUE]},
+        analysis={"type": "dynamic", "end": end},
+    )
+    assert Simulation(scene, Settings(), None, None)._breaks(1.0) == [0.25, end]
+
+
+def test_a_search_that_broke_off_begins_again(flexible, monkeypatch):
+    prepare = Ipopt.prepare
+
+    def breaking(self, nlp):
+        solve = prepare(self, nlp)
+        if "neg_curv_test_tol" in self.extra:
+            return solve
+        return lambda *a, **more: replace(solve(*a, **more), status=Status.FAILED, message="Error_In_Step_Computation")
+
+    monkeypatch.setattr(Ipopt, "prepare", breaking)
+    motion = solved(turning(arm()), guess=flexible)
+    assert any("began again" in note for note in motion.notes)
+    # What vibrates too fast to be brought to rest is judged about another guess.
+    assert motion.cost == pytest.approx(flexible.cost, rel=1e-4)
