@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import casadi as ca
 import numpy as np
 
 from ..description.loads import History
@@ -20,7 +21,7 @@ from .transcription import Course, Transcription
 if TYPE_CHECKING:
     from ..description.scene import Scene
 
-__all__ = ["Check", "ControlledMotion", "value_of"]
+__all__ = ["Check", "ControlledMotion"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +122,8 @@ class ControlledMotion:
         return self.transcription.answer(name, self.x)
 
     def value(self, expression: ca.MX) -> float:
-        """What the problem knows as one number: ``time``, an integral made before the search, ``at_tf(...)``."""
-        return value_of(ca.MX(expression), self.transcription, self.x)
+        """What the problem knows as one number: ``time``, an integral, ``at_tf(...)``."""
+        return self.transcription.value(expression, self.x)
 
     @functools.cached_property
     def course(self) -> Course:
