@@ -88,13 +88,13 @@ def optimal(elements: int = ELEMENTS, intervals: int = INTERVALS, effort: bool =
     """The torque of least rate, 0 at both ends, or of least effort, that brings the arm to rest at the angle."""
     problem = OptimalControl(arm(elements), {TORQUE: (-5.0, 5.0)}, time=TIME, intervals=intervals)
     torque, angle = problem.control(TORQUE), problem.answer("nodes.hub.angle")
-    problem.subject_to(problem.at_tf(angle) == ANGLE, "turned")
+    problem.subject_to(problem.at_tf(angle) == ANGLE, name="turned")
     problem.rest_at_end()
     if effort:
         problem.minimise(problem.integral(torque**2))
     else:
-        problem.subject_to(problem.at_t0(torque) == 0.0, "torque at the begin")
-        problem.subject_to(problem.at_tf(torque) == 0.0, "torque at the end")
+        problem.subject_to(problem.at_t0(torque) == 0.0, name="torque at the begin")
+        problem.subject_to(problem.at_tf(torque) == 0.0, name="torque at the end")
         problem.minimise(problem.integral(problem.rate(TORQUE) ** 2))
     # Of torque over angle, by parts.
     work = problem.at_tf(torque * angle) - problem.integral(problem.rate(TORQUE) * angle)

@@ -69,9 +69,9 @@ def swing(elements: int = ELEMENTS, intervals: int = INTERVALS) -> Swing:
     """The torque that swings the rod up."""
     problem = OptimalControl(pendulum(elements), {TORQUE: (-LIMIT, LIMIT)}, time=TIME, intervals=intervals)
     torque, angle, rate = problem.control(TORQUE), problem.answer("nodes.hinge.angle"), problem.rate(TORQUE)
-    problem.subject_to(problem.at_t0(torque) == 0.0, "torque at the begin")
-    problem.subject_to(problem.at_tf(torque) == 0.0, "torque at the end")
-    problem.subject_to(problem.at_tf(angle) == np.pi, "upright")
+    problem.subject_to(problem.at_t0(torque) == 0.0, name="torque at the begin")
+    problem.subject_to(problem.at_tf(torque) == 0.0, name="torque at the end")
+    problem.subject_to(problem.at_tf(angle) == np.pi, name="upright")
     problem.rest_at_end()
     problem.minimise(problem.integral(torque**2 + RATE * rate**2))
     # Of torque over angle, by parts; the torque vanishes at both ends.

@@ -69,7 +69,7 @@ def slew(elements: int = ELEMENTS, intervals: int = INTERVALS, part: float = 1.0
     limit = part * LIMIT
     controls = {TORQUE: (-limit, limit)}
     problem = OptimalControl(arm(elements), controls, time=(0.5, 6.0), intervals=intervals, order=0)
-    problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == part * ANGLE, "turned")
+    problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == part * ANGLE, name="turned")
     problem.rest_at_end()
     problem.minimise(problem.time)
     return problem.solve(time=2.0, replay=False, ipopt=Ipopt(1e-8, 200))

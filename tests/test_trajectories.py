@@ -53,7 +53,7 @@ def turning(scene, name=TORQUE, limit=5.0, intervals=10, unit=1.0, end=TIME, **m
     """Least effort to turn the arm by 90 degrees, from rest to rest; `unit` of torque."""
     problem = OptimalControl(scene, {name: (-limit, limit)}, time=end, intervals=intervals, **more)
     problem.minimise(problem.integral((problem.control(name) / unit) ** 2))
-    problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == ANGLE, "turned")
+    problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == ANGLE, name="turned")
     problem.rest_at_end()
     return problem
 
@@ -118,9 +118,9 @@ def test_what_is_asked_wrongly_is_refused():
     with pytest.raises(SceneError, match="accepted: none"):
         problem.variable("sections.strip.EI3")
     with pytest.raises(SceneError, match="do not contradict"):
-        problem.subject_to(1.0 <= (torque <= -1.0), "torn")  # noqa: SIM300
+        problem.subject_to(1.0 <= (torque <= -1.0), name="torn")  # noqa: SIM300
     with pytest.raises(SceneError, match="line: "):
-        problem.subject_to(torque, "line")
+        problem.subject_to(torque, name="line")
     problem.minimise(ca.MX.sym("stranger"))
     with pytest.raises(SceneError, match="stranger"):
         problem.solve()
@@ -129,7 +129,7 @@ def test_what_is_asked_wrongly_is_refused():
 def test_a_constraint_that_nothing_changes_and_does_not_hold_is_refused():
     problem = turning(arm())
     # In a plane scene z of the tip is 0 at all times.
-    problem.subject_to(problem.answer("nodes.tip.position")[2] == 1.0, "height")
+    problem.subject_to(problem.answer("nodes.tip.position")[2] == 1.0, name="height")
     with pytest.raises(SceneError, match=r"height: found 0, which nothing changes, accepted: 1"):
         problem.solve()
 
@@ -137,7 +137,7 @@ def test_a_constraint_that_nothing_changes_and_does_not_hold_is_refused():
 def test_too_short_a_time_is_told_with_the_last_iterate():
     # A rigid arm needs 1.45 N m for it.
     problem = turning(arm(0), limit=1.0)
-    with pytest.raises(SolveError, match=r"the horizon of 2 s may be too short") as told:
+    with pytest.raises(SolveError, match=r"turned by.*or 2 s be too short for the limits") as told:
         problem.solve(ipopt=Ipopt(1e-8, 60))
     last = told.value.last
     assert last.status is not None
@@ -177,7 +177,7 @@ def test_limits_of_the_rate_of_a_torque_and_of_the_speed_of_the_tip_hold():
     free = 12.0 * INERTIA * ANGLE / TIME**3, 1.5 * ANGLE / TIME
     problem = turning(arm(0), rates={TORQUE: 4.0}, intervals=20)
     speed = problem.answer("nodes.tip.velocity")
-    problem.subject_to(ca.sumsqr(speed) <= 1.0, "speed")
+    problem.subject_to(ca.sumsqr(speed) <= 1.0, name="speed")
     motion = solved(problem)
     rate = np.diff(motion.control(TORQUE)) / np.diff(motion.ends)
     assert free[0] < np.abs(rate).max() <= 4.0 + 1e-6
@@ -225,7 +225,7 @@ def to_the_side(scene, name):
     """Least effort to bring the tip from y = 0 to y = 0.8."""
     problem = OptimalControl(scene, {name: (-5, 5)}, time=TIME, intervals=20)
     problem.minimise(problem.integral(problem.control(name) ** 2))
-    problem.subject_to(problem.at_tf(problem.answer("nodes.tip.position")[1]) == 0.8, "side")
+    problem.subject_to(problem.at_tf(problem.answer("nodes.tip.position")[1]) == 0.8, name="side")
     problem.rest_at_end()
     return solved(problem)
 
@@ -324,3 +324,76 @@ def test_a_search_that_broke_off_begins_again(flexible, monkeypatch):
     assert any("began again" in note for note in motion.notes)
     # What vibrates too fast to be brought to rest is judged about another guess.
     assert motion.cost == pytest.approx(flexible.cost, rel=1e-4)
+
+
+def bar(length):
+    """A rigid arm whose least effort for 1.5 rad in 2 s is 12 J^2 1.5^2 / 8."""
+    scene = Scene(
+        sections={"bar": CrossSection(rhoA=1.0)},
+        nodes={"hub": Node(position=[0, 0], support="hinge"), "tip": Node(position=[length, 0])},
+        members={"arm": Member(nodes=["hub", "tip"], section="bar", type="rigid")},
+        loads={"motor": Load(type="moment", member="arm", at=0.0, value=0.0)},
+    )
+    inertia = length**3 / 3.0
+    problem = OptimalControl(scene, {TORQUE: (-8.0 * inertia, 8.0 * inertia)}, time=2.0, intervals=12)
+    tip = problem.answer("nodes.tip.position")
+    problem.subject_to(problem.at_tf(tip)[1] == length * np.sin(1.5))
+    problem.rest_at_end()
+    return problem, problem.integral(problem.control(TORQUE) ** 2), 12.0 * inertia**2 * 1.5**2 / 8.0
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e-2, 1.0, 1e3])
+def test_the_least_effort_of_a_bar_does_not_depend_on_its_size(length):
+    problem, effort, least = bar(length)
+    problem.minimise(effort)
+    motion = problem.solve(replay=False)
+    # Torques that are linear in an interval are what the least effort takes; bounds of IPOPT give by 1e-8.
+    assert motion.cost / least == pytest.approx(1.0, abs=2e-6)
+
+
+@pytest.mark.parametrize("length", [1e-3, 1.0])
+def test_a_bound_of_the_effort_holds_in_small_units(length):
+    problem, effort, least = bar(length)
+    problem.subject_to(effort <= 0.5 * least, name="effort")
+    with pytest.raises(SolveError, match=r"meet all that is asked for .*effort by"):
+        problem.solve(replay=False)
+
+
+def test_an_answer_that_its_replay_contradicts_says_so():
+    scene, _, _ = bar(1.0)[0].scene, None, None
+    problem = OptimalControl(scene, {TORQUE: (-3.0, 3.0)}, time=2.0, intervals=1)
+    problem.subject_to(problem.at_tf(problem.answer("nodes.tip.position"))[1] == np.sin(1.5))
+    problem.rest_at_end()
+    motion = problem.solve()
+    assert motion.status is Status.SHORT
+    assert "does not rest" in motion.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"intervals": 1.5}, "intervals: found 1.5"),
+        ({"intervals": "a"}, "intervals: found 'a'"),
+        ({"rates": {TORQUE: float("nan")}}, "rates: found nan"),
+        ({"rates": {TORQUE: (-1, 1)}}, "rates: found"),
+        ({"time": (3.0, 1.0)}, "from the least to the largest"),
+    ],
+)
+def test_numbers_that_are_none_are_refused(given, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        OptimalControl(arm(0), {TORQUE: (-1, 1)}, **{"time": 1.0, **given})
+
+
+def test_commands_that_are_none_are_refused():
+    with pytest.raises(SceneError, match=r"commands: found 3\.0 for loads\.motor\.value"):
+        respond(arm(0), {TORQUE: 3.0}, 1.0)
+    with pytest.raises(SceneError, match="tail of -1 s"):
+        respond(arm(0), {TORQUE: History(t=[0, 1], value=[0, 1])}, 1.0, tail=-1.0)
+
+
+def test_targets_that_are_no_numbers_are_refused():
+    problem = OptimalControl(arm(0), {TORQUE: (-1, 1)}, time=1.0)
+    with pytest.raises(SceneError, match="not a finite number as a bound"):
+        problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == float("nan"))
+    with pytest.raises(SceneError, match="cost: found 'x'"):
+        problem.minimise("x")

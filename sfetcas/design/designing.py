@@ -324,7 +324,11 @@ def find(
     bounds = unknown if isinstance(unknown, Mapping) else dict.fromkeys(unknown, free)
     design = Design(scene, bounds, guess=guess, accuracy=accuracy)
     for name, value in wanted.items():
-        expression, values = design.answer(ONE, name), np.atleast_1d(np.asarray(value, dtype=float)).ravel()
+        expression = design.answer(ONE, name)
+        try:
+            values = np.atleast_1d(np.asarray(value, dtype=float)).ravel()
+        except (TypeError, ValueError):
+            raise SceneError(f"found {value!r}, accepted: numbers", ("wanted", name)) from None
         flat = ca.vec(expression)
         if scene.resolved_dimension == "plane" and flat.numel() == 3 and len(values) == 2:
             flat = flat[:2]

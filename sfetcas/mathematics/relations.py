@@ -33,8 +33,15 @@ def relation(given: ca.MX) -> Relation:
     Raises
     ------
     ValueError
-        What is given is no relation, or one of constants only.
+        What is given is no relation, one of constants only, or one with what is no number.
     """
+    found = _rows(given)
+    if np.isnan([*found.low, *found.high]).any() or (np.isinf(found.low) & (found.low == found.high)).any():
+        raise ValueError("found not a finite number as a bound, accepted: numbers")
+    return found
+
+
+def _rows(given: ca.MX) -> Relation:
     if not isinstance(given, ca.MX):
         raise ValueError(f"found {given!r}, accepted: a relation of expressions as x == 2, x <= 3 or -1 <= (x <= 1)")
     if given.is_binary() and given.op() == ca.OP_EQ:

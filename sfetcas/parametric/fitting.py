@@ -223,6 +223,8 @@ class Fitting:
         spread = np.broadcast_to(deviation, value.shape) if np.size(deviation) in (1, len(value)) else np.zeros(1)
         if one.deviation is not None and not (np.isfinite(spread) & (spread > 0.0)).all():
             raise SceneError(f"found {one.deviation!r}, accepted: above zero", (*where, "deviation"))
+        if np.isinf(value).any():
+            raise SceneError(f"found {one.value!r}, accepted: numbers, nan of what was not measured", (*where, "value"))
         there = np.flatnonzero(np.isfinite(value)).tolist()
         return [first + chosen[i] for i in there], value[there].tolist(), spread[there].tolist()
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -73,6 +74,11 @@ class ControlledSystem:
         self.scene = simulation.scene
         self._refuse(controls, variables)
         base = assemble(self.scene, mesh or simulation.mesh, assembly="nodal")
+        if _nothing_bends(self.scene):
+            # Then the time is that of the motion, so that units of the scene do not matter.
+            share = masses_of(base).time / self.scene.analysis.duration
+            scales = replace(base.scales, moment=base.scales.moment * share**2)
+            base = assemble(self.scene, base.mesh, assembly="nodal", scales=scales)
         members = [n for n, member in self.scene.members.items() if member.type == "flexible"]
         known = [argument(self.scene, one.name) for one in controls]
         # Where it is varied its range says where the model has to be known.
@@ -261,6 +267,11 @@ class ControlledSystem:
         balance, quantities, _ = self.stage.call(list(s.values()))
         found = [ca.jacobian(balance, s["d"]), ca.jacobian(balance, s["a"]), ca.jacobian(quantities, s["d"])]
         return ca.Function("linear", list(s.values()), [ca.densify(part) for part in found])
+
+
+def _nothing_bends(scene: Scene) -> bool:
+    """Whether nothing resists a motion by its stiffness."""
+    return not scene.springs and all(member.type == "rigid" for member in scene.members.values())
 
 
 def _null_space(rows: Array) -> Array:

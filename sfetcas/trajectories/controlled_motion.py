@@ -12,6 +12,7 @@ import numpy as np
 
 from ..description.loads import History
 from ..description.records import unknown
+from ..dynamics.motion import Trajectory
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..parametric.changing import changed
@@ -167,13 +168,11 @@ class ControlledMotion:
         tail = self.time if tail is None else tail
         later = self.time + np.linspace(0.0, tail, 101)[1:] if tail > 0.0 else np.zeros(0)
         times = np.concatenate([self.ends, later])
-        given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "tail": tail, "times": times, **more}
-        response, used = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
         places = self._node_positions()
-        size, difference = system.scene.size, 0.0
-        for name, own in places.items():
-            other = response.positions(name)[: len(self.ends)]
-            difference = max(difference, float(np.linalg.norm(own - other, axis=1).max()) / size)
+        given: dict[str, Any] = {"mesh": system.model.mesh.refined(), "tail": tail, "times": times}
+        given |= {"against": places, **more}
+        response, used = self._responded(integrator, {"accuracy": accuracy, "step": self.time / 400.0, **given})
+        difference = self._off(response, places)
         return Check(response, difference, response.error_estimate, used, response.residual_vibration())
 
     def _responded(self, integrator: str | None, given: Mapping[str, Any]) -> tuple[Response, str]:
@@ -185,9 +184,32 @@ class ControlledMotion:
                 if name == (integrator or "radau-3"):
                     raise
                 continue
-            if integrator or name == "radau-3" or found.error_estimate <= given["accuracy"]:
+            if integrator or name == "radau-3" or found.error_estimate <= self._enough(found, given):
                 break
         return found, name
+
+    def _enough(self, found: Response, given: Mapping[str, Any]) -> float:
+        """What a replay may be off: little of what the trajectory is."""
+        return max(given["accuracy"], 0.1 * self._off(found, given["against"]))
+
+    def _off(self, found: Response, places: Mapping[str, Array]) -> float:
+        """Largest distance of nodes from where the trajectory has them, over the size of the scene."""
+        size = self.transcription.system.scene.size
+        pairs = [(own, found.positions(name)[: len(own)]) for name, own in places.items()]
+        return max(float(np.linalg.norm(own - other, axis=1).max()) for own, other in pairs) / size
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The replay as the answer of a motion, for pictures and films.
+
+        Raises
+        ------
+        SceneError
+            It was not replayed.
+        """
+        if self.check is None:
+            raise SceneError("found no replay, accepted: an answer of solve(replay=True)")
+        return self.check.response.trajectory
 
     def _node_positions(self) -> dict[str, Array]:
         """Positions of all nodes at the begin and the ends of the intervals, (intervals + 1, 3) m."""

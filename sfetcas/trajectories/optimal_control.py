@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.mesh import Mesh
 from ..parametric.equilibrium import Place
 from .controlled import ControlledSystem
-from .controlled_motion import ControlledMotion
+from .controlled_motion import Check, ControlledMotion
 from .statement import Statement, Variable, bounds_of, controls_of
 from .transcription import Course, Transcription
 from .warm import at_rest, carried_over, rigid, straight
@@ -85,6 +85,8 @@ class OptimalControl:
         places: Place | None = None,
         settings: Settings | None = None,
     ) -> None:
+        if not isinstance(scene, Scene):
+            raise SceneError(f"scene: found {scene!r}, accepted: a Scene")
         duration = _duration(time)
         known = [Variable(name, *bounds_of(name, pair)) for name, pair in (variables or {}).items()]
         if not controls and not known:
@@ -177,12 +179,13 @@ class OptimalControl:
 
     # -- what is asked ------------------------------------------------------------------------------------
 
-    def subject_to(self, relation: ca.MX, name: str = "") -> None:
-        """A constraint: a relation at all times, or once where nothing in it changes with time.
+    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
+        """Constraints: relations at all times, or once where nothing in them changes with time.
 
         ``problem.subject_to(-1 <= (torque <= 1))``, ``problem.subject_to(problem.at_tf(angle) == 1.5)``.
         """
-        self.statement.subject_to(relation, name or f"constraint {len(self.statement.rows) + 1}")
+        for given in relations:
+            self.statement.subject_to(given, name or f"constraint {len(self.statement.rows) + 1}")
 
     def minimise(self, cost: ca.MX) -> None:
         """A term of the cost: of ``time``, ``integral(...)``, ``at_tf(...)``, variables."""
@@ -228,12 +231,18 @@ class OptimalControl:
             begin = clock.perf_counter()
             check = found.replayed()
             found = replace(found, check=check, seconds={**found.seconds, "replay": clock.perf_counter() - begin})
+            notes = list(_short_of(check, self.scene.size, self.statement))
+            if notes:
+                found = replace(found, status=Status.SHORT, notes=(*found.notes, *notes))
         return found
 
 
 EXTRA = {"mumps_pivot_order": 5, "mumps_pivtol": 1e-2}
 """Options of IPOPT (measured): nested dissection leaves half the fill of MUMPS' own choice on these chains, and larger
 pivots keep the signs right that IPOPT counts: 5 iterations in the place of 24."""
+
+FAR = 1e-2
+"""Distance of a replay over the size of the scene beyond which an answer is told to be short of what was asked."""
 
 BROKEN = ("Error_In_Step_Computation", "Restoration_Failed", "Search_Direction_Becomes_Too_Small")
 """Messages of IPOPT after steps that regularisation has made nothing of: rounding had turned signs of pivots."""
@@ -304,10 +313,10 @@ class _Run:
             nlp = transcription.pieces.nlp()
             result = self.solver.solve(nlp)
         except SceneError as error:
-            self.notes.append(f"the search begins at rest, as the scene cannot move rigidly: {error}")
+            self.notes.append(f"the search does not begin with the rigid scene: {error}")
             return None
         if result.status is not Status.SOLVED:
-            self.notes.append("the search begins at rest, as no motion of the rigid scene was found")
+            self.notes.append("the search does not begin with the rigid scene, of which no motion was found")
             return None
         return carried_over(statement, stiff, transcription.course(result.x), problem._plain)
 
@@ -334,7 +343,8 @@ class _Run:
             self.seconds["solve"] += clock.perf_counter() - built
             found = self._motion(transcription, result)
             if result.status is not Status.SOLVED:
-                raise SolveError(result.status, _why(transcription, nlp, result, problem.statement), found)
+                status = Status.UNMET if result.status is Status.INFEASIBLE else result.status
+                raise SolveError(status, _why(transcription, nlp, result, problem.statement), found)
             if self._stands(transcription, course, found.course) or number == ROUNDS - 1:
                 break
             course = found.course
@@ -369,16 +379,30 @@ class _Run:
         return replace(bare, scene=bare.with_variables(problem.scene))
 
 
+def _short_of(check: Check, size: float, statement: Statement) -> Iterator[str]:
+    """What a replay says against an answer."""
+    if check.difference > FAR:
+        yield f"the replay is off by {check.difference:.2g} of the size: more intervals or elements are needed"
+    left = check.residual_vibration / size
+    if statement.resting and left > FAR:
+        yield f"after the end the replay does not rest: nodes move by {left:.2g} of the size"
+
+
 def _why(transcription: Transcription, nlp: NLP, result: NLPResult, statement: Statement) -> str:
     """What IPOPT reported, what is violated most, and what may help."""
     worst = transcription.pieces.violated(nlp, result.x)
+    # What was asked for first: equations are missed along with it.
+    own = {name for name, _ in statement.rows} | {"rest at the end"}
+    worst.sort(key=lambda item: item[0] not in own)
     told = "; ".join(f"{name} by {amount:.3g}" for name, amount in worst[:3])
     parts = [f"IPOPT: {result.message.replace('_', ' ')} after {result.iterations} iterations"]
     if told:
         parts.append(f"violated most, over their units: {told}")
     if statement.duration[0] == statement.duration[1] or result.status is Status.INFEASIBLE:
         high = statement.duration[1]
-        parts.append(f"the horizon of {high:.6g} s may be too short for the limits of the controls")
+        parts.append(
+            f"what is asked may contradict itself, or {high:.6g} s be too short for the limits of the controls"
+        )
     return ", ".join(parts)
 
 
@@ -400,11 +424,14 @@ def _duration(given: Any) -> tuple[float, float]:
 
 def _shares(given: Any) -> Array:
     """Shares of the intervals in the time."""
-    if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
-        if given < 1:
-            raise SceneError(f"intervals: found {given}, accepted: at least 1")
+    if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+        if not (np.isfinite(given) and given >= 1 and int(given) == given):
+            raise SceneError(f"intervals: found {given}, accepted: a whole number, at least 1, or shares of the time")
         return np.full(int(given), 1.0 / int(given))
-    shares = np.asarray(given, dtype=float).ravel()
+    try:
+        shares = np.asarray(given, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise SceneError(f"intervals: found {given!r}, accepted: their number, or shares of the time") from None
     if not len(shares) or not np.isfinite(shares).all() or (shares <= 0.0).any():
         raise SceneError(f"intervals: found {given!r}, accepted: their number, or positive shares of the time")
     return np.asarray(shares / shares.sum())

@@ -168,6 +168,7 @@ def respond(
     mesh: Mesh | None = None,
     accuracy: float = 1e-5,
     integrator: str = "conserving",
+    against: Mapping[str, Array] | None = None,
     halvings: int = HALVINGS,
     settings: Settings | None = None,
 ) -> Response:
@@ -184,6 +185,7 @@ def respond(
     mesh : that of the scene's accuracy, refined, without
     accuracy : by which positions over the size of the scene may still change when the step is halved
     integrator : conserving (not with loads that follow), radau-2, radau-3 or generalised-alpha
+    against : positions of nodes at the first times, (some times, 3) m; a tenth of what they are off is accurate enough
     halvings : of the step at most
 
     Raises
@@ -193,6 +195,11 @@ def respond(
     SolveError
         A step does not converge, other than the last halved ones.
     """
+    for name, history in commands.items():
+        if not isinstance(history, History):
+            raise SceneError(f"commands: found {history!r} for {name}, accepted: History(t=[...], value=[...])")
+    if not tail >= 0.0 or not end > 0.0:
+        raise SceneError(f"found an end of {end:g} s and a tail of {tail:g} s, accepted: above zero, and zero or more")
     if integrator not in ORDERS:
         raise SceneError(f"integrator: {unknown(integrator, list(ORDERS), 'integrators')}")
     if times is None:
@@ -218,7 +225,10 @@ def respond(
         # Of the first extrapolation only what it changed is known.
         change = _apart(better, best) if np.isfinite(error) else _apart(better, fine)
         best, coarse, error = better, fine, change / scene.size
-        if error <= accuracy:
+        off = 0.0
+        if against is not None:
+            off = _apart(against, {n: best[n][: len(one)] for n, one in against.items()}) / scene.size
+        if error <= max(accuracy, 0.1 * off):
             break
     return Response(replays.times, best, tuple(run.instants), end, error, run.count)
 

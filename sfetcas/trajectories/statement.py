@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -140,8 +140,11 @@ class Statement:
 
     def integral(self, expression: ca.MX) -> ca.MX:
         """The integral of an expression over the time, by a symbol."""
+        given = _expression(expression, "integral")
+        if given.numel() != 1:
+            raise SceneError(f"integral: found {given.numel()} numbers, accepted: one")
         symbol = ca.MX.sym(f"integral {len(self.integrals)}")
-        self.integrals.append((symbol, ca.MX(expression)))
+        self.integrals.append((symbol, given))
         return symbol
 
     def along(self, expression: ca.MX) -> bool:
@@ -177,7 +180,7 @@ class Statement:
         SceneError
             It changes with time.
         """
-        cost = ca.MX(cost)
+        cost = _expression(cost, "cost")
         if cost.numel() != 1:
             raise SceneError(f"cost: found {cost.numel()} numbers, accepted: one")
         if self.along(cost):
@@ -206,7 +209,23 @@ def bounds_of(name: str, given: object) -> tuple[float, float]:
 
 def controls_of(given: Mapping[str, object], rates: Mapping[str, float]) -> list[Control]:
     """Controls by their bounds and largest rates."""
-    strange = [name for name in rates if name not in given]
-    if strange:
-        raise SceneError(f"rates: {unknown(strange[0], list(given), 'such controls')}")
+    for name, rate in rates.items():
+        if name not in given:
+            raise SceneError(f"rates: {unknown(name, list(given), 'such controls')}")
+        if not isinstance(rate, (int, float)) or not rate > 0.0:
+            raise SceneError(f"rates: found {rate!r} for {name}, accepted: the largest rate, a number above zero")
     return [Control(name, *bounds_of(name, pair), rate=float(rates.get(name, np.inf))) for name, pair in given.items()]
+
+
+def _expression(given: Any, what: str) -> ca.MX:
+    """What CasADi takes for an expression.
+
+    Raises
+    ------
+    SceneError
+        It takes it for none.
+    """
+    try:
+        return ca.MX(given)
+    except NotImplementedError:
+        raise SceneError(f"{what}: found {given!r}, accepted: an expression of CasADi or a number") from None

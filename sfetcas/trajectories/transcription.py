@@ -12,6 +12,7 @@ integrators of the same name.  Everything nonlinear is the function of one stage
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -285,6 +286,12 @@ class Transcription:
         pieces = [(*self._quadrature(i), shares, x) for i, x in summed.items()]
         if ca.symvar(cost):
             pieces.append((*self.expression("cost", cost), None, 1.0))
+        size = self._size(pieces)
+        for function, index, constants, factor in pieces:
+            self.pieces.add_cost("cost", function, index, constants, weight=COST * factor / size)
+
+    def _size(self, pieces: Sequence[tuple[ca.Function, Index, Array | None, float]]) -> float:
+        """Size of a sum of pieces: as in the guess, or by how much it changes when all unknowns do by their units."""
         first = second = 0.0
         guess, units = self.pieces.guess, self.pieces.units
         for function, index, constants, factor in pieces:
@@ -292,9 +299,7 @@ class Transcription:
                 more = [] if constants is None else [constants[k]]
                 first += factor * float(function(guess[row], *more))
                 second += factor * float(function(guess[row] + units[row], *more))
-        size = max(abs(first), abs(second - first)) or 1.0
-        for function, index, constants, factor in pieces:
-            self.pieces.add_cost("cost", function, index, constants, weight=COST * factor / size)
+        return max(abs(first), abs(second - first)) or 1.0
 
     def _quadrature(self, number: int) -> tuple[ca.Function, Index]:
         """(unknowns of an interval and the end time, share) -> integral over it, and places (intervals, w)."""
@@ -312,12 +317,14 @@ class Transcription:
         """A running integral by the quadrature of the stages, exact as the motion is."""
         gained, index = self._quadrature(number)
         n, name = self.intervals, f"integral {number}"
-        values = self.pieces.unknowns(name, np.zeros(n))
+        unit = self._size([(gained, index, self.statement.shares[:, None], 1.0)])
+        values = self.pieces.unknowns(name, np.zeros(n), unit=unit)
         before = np.append(self._constant(f"{name} at t0", np.zeros(1)).index, values.index[:-1])
         w, c = ca.MX.sym("w", index.shape[1] + 2), ca.MX.sym("c")
         row = w[-1] - w[-2] - gained(w[:-2], c)
         places = np.concatenate([index, np.stack([before, values.index], axis=1)], axis=1)
-        self.pieces.add_rows(name, ca.Function("integral", [w, c], [row]), places, self.statement.shares[:, None])
+        shares = self.statement.shares[:, None]
+        self.pieces.add_rows(name, ca.Function("integral", [w, c], [row]), places, shares, unit=unit)
         self.integrals[symbol.__hash__()] = values.index[-1:]
 
     def _rest(self) -> None:
