@@ -223,7 +223,7 @@ def test_units_do_not_matter(flexible):
 
 def to_the_side(scene, name):
     """Least effort to bring the tip from y = 0 to y = 0.8."""
-    problem = OptimalControl(scene, {name: (-5, 5)}, time=TIME, intervals=20)
+    problem = OptimalControl(scene, {name: (-5, 5)}, time=TIME, intervals=10)
     problem.minimise(problem.integral(problem.control(name) ** 2))
     problem.subject_to(problem.at_tf(problem.answer("nodes.tip.position")[1]) == 0.8, name="side")
     problem.rest_at_end()
@@ -231,19 +231,21 @@ def to_the_side(scene, name):
 
 
 def test_space_costs_what_the_plane_does():
+    sections = {"strip": CrossSection(EI2=1.0, EI3=1.0, GJ=1.0, rhoA=1.0, rhoI=[2e-4, 1e-4, 1e-4])}
     scene = arm(
+        1,
         dimension="space",
-        sections={"strip": CrossSection(EI2=1.0, EI3=1.0, GJ=1.0, rhoA=1.0, rhoI=[2e-4, 1e-4, 1e-4])},
+        sections=sections,
         nodes={
             "hub": Node(position=[0, 0, 0], support="hinge", axis=[0, 0, 1], inertia=[0, 0, 0.1]),
             "tip": Node(position=[1, 0, 0], mass=0.2),
         },
         loads={"motor": Load(type="moment", node="hub", value=[0, 0, 0])},
     )
-    space, plane = to_the_side(scene, f"{TORQUE}.2"), to_the_side(arm(), TORQUE)
-    # Rotary inertia, which the plane rod lacks, counts by 1e-3.
-    assert space.cost == pytest.approx(plane.cost, rel=3e-3)
-    np.testing.assert_allclose(space.positions("tip"), plane.positions("tip"), atol=3e-3)
+    space, plane = to_the_side(scene, f"{TORQUE}.2"), to_the_side(arm(1, sections=sections), TORQUE)
+    # Quaternions and angles between the nodes of the one element differ, by the error that either has.
+    assert space.cost == pytest.approx(plane.cost, rel=3e-4)
+    np.testing.assert_allclose(space.positions("tip"), plane.positions("tip"), atol=4e-3)
 
 
 def test_a_spring_is_chosen_together_with_the_torque():
