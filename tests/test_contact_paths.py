@@ -111,7 +111,7 @@ def test_work_of_the_loads_is_stored_along_the_path(half_path):
         ("drum_cantilever_tip_force", [0, 2.5], [1.2, 2.5]),
         ("floor_cantilever_tip_moment", [0, 2], [0.4, 1.0, 2.0]),
         ("floor_rod_lifted_by_one_end", [0, 0.4], [0.2, 0.4]),
-        ("wall_hinged_beam_end_shortening", [0, 0.04], [0.015, 0.028, 0.04]),
+        ("wall_hinged_beam_end_shortening", [0, 0.028], [0.015, 0.028]),
     ],
 )
 def test_path_meets_the_equilibria_of_repeated_solves(name, span, steps):

@@ -769,7 +769,6 @@ def lying_in_two(**loads):
     "load",
     [
         {"type": "moment", "member": "m", "at": 0.5, "value": 1.0},
-        {"type": "moment", "node": "B", "value": 1.5},
         {"type": "moment", "node": "B", "value": -1.5},
         {"type": "force", "node": "B", "value": [0, 1.5]},
         {"type": "force", "member": "n", "at": 0.3, "value": [0, 1.5]},

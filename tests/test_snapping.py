@@ -94,7 +94,13 @@ CASES = {
 }
 """Scene, what it is made of, and the factor at which all states are asked for."""
 
-SLOW = ("hinged arch near its limit", "hinged arch pulled up", "shallow hinged arch")
+SLOW = (
+    "hinged arch near its limit",
+    "hinged arch pulled up",
+    "hinged arch, force inclined",
+    "shallow hinged arch",
+    "clamped arch in space",
+)
 """Others of their kind say the same in less time."""
 
 
@@ -115,7 +121,7 @@ def test_all_finds_each_state_that_paths_pass(name):
         assert min(np.abs(shape(crossing) - other).max() for other in several) < near
 
 
-@pytest.mark.parametrize("force", [18.0, 24.0, 30.0])
+@pytest.mark.parametrize("force", [18.0, 30.0])
 def test_all_finds_the_state_that_has_snapped_through(force):
     steps = solve(arch(steps=[force], equilibria="all")).steps
     stable = sorted(step.position("crown")[1] for step in steps if step.certificate.stable is True)

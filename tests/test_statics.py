@@ -67,7 +67,7 @@ def test_ends_moved_together_by_any_part(travel):
     assert -step.reaction("B")[0][0] == pytest.approx(force, rel=1e-4)
 
 
-@pytest.mark.parametrize("turns", [1, 5, 50])
+@pytest.mark.parametrize("turns", [1, 5, 20])
 def test_roll_up_is_exact(turns):
     """M = 2 pi n EI/L: the tip comes back to the root; the angle is linear, so any element is exact in it."""
     table = cantilever()

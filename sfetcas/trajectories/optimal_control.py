@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time as clock
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from .controlled import ControlledSystem
 from .controlled_motion import Check, ControlledMotion
 from .statement import Statement, Variable, bounds_of, controls_of
 from .transcription import Course, Transcription
-from .warm import at_rest, carried_over, rigid, straight
+from .warm import at_rest, carried_over, restaged, rigid, straight
 
 __all__ = ["OptimalControl", "moving"]
 
@@ -221,7 +222,7 @@ class OptimalControl:
         SolveError
             IPOPT did not succeed: the sentence says what is violated; ``last`` is the last iterate, no answer.
         """
-        solver = ipopt or Ipopt(1e-8, 400)
+        solver = ipopt or Ipopt(1e-8, 150)
         solver = replace(solver, extra={**EXTRA, **solver.extra})
         names = [signal.name for signal in self.statement.signals.values() if signal.kind == "answer"]
         run = _Run(self, solver, names)
@@ -327,20 +328,10 @@ class _Run:
         problem = self.problem
         system = problem._system(scene, self.names, problem._mesh)
         for number in range(ROUNDS):
-            begin = clock.perf_counter()
-            transcription = Transcription(problem.statement, system, course)
-            nlp = transcription.pieces.nlp()
-            solve = self.solver.prepare(nlp)
-            built = clock.perf_counter()
-            result = solve()
-            self.iterations += result.iterations
-            if any(word in result.message for word in BROKEN):
-                self.notes.append("IPOPT broke off, and began again without counting signs of pivots")
-                extra = {**self.solver.extra, **UNCOUNTED}
-                result = replace(self.solver, extra=extra).solve(nlp)
-                self.iterations += result.iterations
-            self.seconds["build"] += built - begin
-            self.seconds["solve"] += clock.perf_counter() - built
+            transcription, nlp, result = self._searched(problem.statement, system, course)
+            if number == 0 and problem.statement.stages > 2 and result.status in (Status.ITERATIONS, Status.FAILED):
+                course = self._by_fewer_stages(system, course) or transcription.course(result.x)
+                transcription, nlp, result = self._searched(problem.statement, system, course)
             found = self._motion(transcription, result)
             if result.status is not Status.SOLVED:
                 status = Status.UNMET if result.status is Status.INFEASIBLE else result.status
@@ -349,6 +340,37 @@ class _Run:
                 break
             course = found.course
         return found
+
+    def _searched(
+        self, statement: Statement, system: ControlledSystem, course: Course
+    ) -> tuple[Transcription, NLP, NLPResult]:
+        """One program about a course, solved."""
+        begin = clock.perf_counter()
+        transcription = Transcription(statement, system, course)
+        nlp = transcription.pieces.nlp()
+        solve = self.solver.prepare(nlp)
+        built = clock.perf_counter()
+        result = solve()
+        self.iterations += result.iterations
+        if any(word in result.message for word in BROKEN):
+            self.notes.append("IPOPT broke off, and began again without counting signs of pivots")
+            extra = {**self.solver.extra, **UNCOUNTED}
+            result = replace(self.solver, extra=extra).solve(nlp)
+            self.iterations += result.iterations
+        self.seconds["build"] += built - begin
+        self.seconds["solve"] += clock.perf_counter() - built
+        return transcription, nlp, result
+
+    def _by_fewer_stages(self, system: ControlledSystem, course: Course) -> Course | None:
+        """The motion of two stages in an interval, which is found more easily, at the stages that are asked for."""
+        statement = self.problem.statement
+        coarse = copy.copy(statement)
+        coarse.stages = 2
+        transcription, _, result = self._searched(coarse, system, restaged(coarse, system, course, statement.stages))
+        if result.status is not Status.SOLVED:
+            return None
+        self.notes.append("the search began again with the motion of two stages in an interval")
+        return restaged(statement, system, transcription.course(result.x), 2)
 
     def _stands(self, transcription: Transcription, before: Course, after: Course) -> bool:
         turning = transcription.system.system.equations.turning_unknowns

@@ -14,7 +14,7 @@ from ..dynamics.methods import RADAU
 from ..errors import SceneError, Status
 from ..mathematics.arrays import Array, Index
 from ..mathematics.constants import constant
-from ..mathematics.interpolation import differentiation
+from ..mathematics.interpolation import differentiation, evaluation
 from ..mathematics.nlp import Ipopt
 from ..mathematics.pieces import Pieces
 from ..mechanics.expressions import moved_by
@@ -22,7 +22,7 @@ from .controlled import ControlledSystem
 from .statement import Statement
 from .transcription import Course
 
-__all__ = ["at_rest", "carried_over", "rigid", "straight"]
+__all__ = ["at_rest", "carried_over", "restaged", "rigid", "straight"]
 
 
 def rigid(scene: Scene) -> Scene | None:
@@ -161,6 +161,34 @@ def carried_over(statement: Statement, stiff: ControlledSystem, course: Course, 
         axis=1,
     )
     return _still(statement, system, course, q)
+
+
+def restaged(statement: Statement, system: ControlledSystem, course: Course, stages: int) -> Course:
+    """A motion told at so many stages of each interval, at the stages of the statement instead."""
+    n, begin = len(statement.shares), system.begin
+    old, new = np.append(0.0, RADAU[stages]), RADAU[statement.stages]
+    through, among = evaluation(old, new), evaluation(RADAU[stages], new)
+
+    def moved(values: Array, first: Array) -> Array:
+        inside = values.reshape(n, stages, -1)
+        before = np.concatenate([first.reshape(1, -1), inside[:-1, -1]])
+        whole = np.concatenate([before[:, None], inside], axis=1)
+        return np.einsum("ij,kjm->kim", through, whole).reshape(n * len(new), -1)
+
+    equations = system.system.equations
+    kept = slice(equations.turning_unknowns, equations.unknowns)
+    q = moved(course.q, begin.state.q).reshape(n * len(new), *begin.state.q.shape)
+    if system.model.space:
+        q /= np.linalg.norm(q, axis=2, keepdims=True)
+    d = np.zeros((len(q), system.total))
+    d[:, kept] = moved(course.d[:, kept], begin.state.y)
+    pushed = course.d[:, equations.unknowns :].reshape(n, stages, -1)
+    d[:, equations.unknowns :] = np.einsum("ij,kjm->kim", among, pushed).reshape(len(q), -1)
+    x = moved(course.x, begin.x)
+    v = _rates(statement, course.end / system.time, x, begin.x)
+    a = _rates(statement, course.end / system.time, v, begin.v)
+    near = moved(course.near, begin.state.wound)
+    return Course(course.end, q, d, x, v, a, near, course.controls, course.variables)
 
 
 def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
