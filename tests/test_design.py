@@ -314,6 +314,10 @@ WALL = {"wall": Contact(member="beam", type="plane", point=[0, -1], normal=[0, 1
             "accepted: a name that is none of the scene",
         ),
         (lambda: find(SCENE, ["loads.tip.value.0"], {"nodes.tip.position": [0, 1]}), "2 equations for 1 free number"),
+        (
+            lambda: find(SCENE, ["loads.tip.value"], {"nodes.tip.angle": 0.5}),
+            "found 2 free numbers for 1 that are wanted",
+        ),
         (lambda: find(SCENE, ["loads.tip.value"], {"nodes.tip.position": [0, 1, 2, 3]}), "found 4 numbers"),
         (lambda: Design(SCENE.replace(analysis=Analysis(type="path", range=[0, 1]))), "found 'path', accepted: static"),
         (lambda: Design(SCENE.replace(contacts=WALL)), "contact is found by a search"),

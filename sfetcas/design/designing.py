@@ -316,13 +316,14 @@ def find(
     Raises
     ------
     SceneError
-        No such numbers or answers, or more wanted than unknown.
+        No such numbers or answers, or not as many wanted as unknown.
     SolveError
         There are no such numbers.
     """
     free = (-np.inf, np.inf)
     bounds = unknown if isinstance(unknown, Mapping) else dict.fromkeys(unknown, free)
     design = Design(scene, bounds, guess=guess, accuracy=accuracy)
+    count = 0
     for name, value in wanted.items():
         expression = design.answer(ONE, name)
         try:
@@ -336,4 +337,9 @@ def find(
             message = f"found {len(values)} numbers, accepted: {flat.numel()}"
             raise SceneError(message, ("wanted", name))
         design.subject_to(flat == ca.DM(values), name=name)
+        count += len(values)
+    most = sum(len(design._formulation.numbers(name).default) for name in bounds)
+    if most > count:
+        accepted = "as many, or a Design, which makes something least"
+        raise SceneError(f"found {most} free numbers for {count} that are wanted, accepted: {accepted}", ("unknown",))
     return design.solve()

@@ -294,11 +294,9 @@ class _Run:
             return found
         rest = at_rest(statement, problem._plain, end, values)
         # What cannot move rigidly may still turn to what is asked.
-        return (
-            rest
-            if guess == "rest"
-            else straight(statement, problem._system(problem.scene, self.names, problem._mesh), rest)
-        )
+        if guess == "rest":
+            return rest
+        return straight(statement, problem._system(problem.scene, self.names, problem._mesh), rest)
 
     def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> Course | None:
         """The motion of the rigid scene, if it has one; where all is rigid, where its search would begin."""
@@ -336,7 +334,7 @@ class _Run:
             if result.status is not Status.SOLVED:
                 status = Status.UNMET if result.status is Status.INFEASIBLE else result.status
                 raise SolveError(status, _why(transcription, nlp, result, problem.statement), found)
-            if self._stands(transcription, course, found.course) or number == ROUNDS - 1:
+            if self._stands(transcription, found.course) or number == ROUNDS - 1:
                 break
             course = found.course
         return found
@@ -372,7 +370,8 @@ class _Run:
         self.notes.append("the search began again with the motion of two stages in an interval")
         return restaged(statement, system, transcription.course(result.x), 2)
 
-    def _stands(self, transcription: Transcription, before: Course, after: Course) -> bool:
+    def _stands(self, transcription: Transcription, after: Course) -> bool:
+        """Whether rotations are near what they are counted from, and the end is where its shapes are known."""
         turning = transcription.system.system.equations.turning_unknowns
         turned = float(np.abs(after.d[:, :turning]).max(initial=0.0))
         if transcription.system.model.space and turned > TURNED:
