@@ -54,8 +54,8 @@ def beam(**more):
 
 
 @needs_compiler
-# Every fifth: many are variations of each other, and all are compared by the check that comes with an export.
-@pytest.mark.parametrize("file", STATIC[::5], ids=lambda file: file.stem)
+# Every eighth: many are variations of each other, and all are compared by the check that comes with an export.
+@pytest.mark.parametrize("file", STATIC[::8], ids=lambda file: file.stem)
 def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
     scene = load(file)
     solver = export(scene, tmp_path / "c", name="structure")

@@ -62,7 +62,7 @@ def test_all_equilibria_under_an_inclined_force_and_no_other(force, degrees):
     np.testing.assert_allclose([tip for tip, _ in found], [tip for tip, _ in known], atol=1e-3)
 
 
-@pytest.mark.parametrize("times", [0.5, 1.5, 10.0, 26.0])
+@pytest.mark.parametrize("times", [0.5, 1.5, 26.0])
 def test_column_has_a_pair_for_each_critical_load_that_it_is_beyond(times):
     found = tips(solve(column(times)))
     pairs = sum((2 * n - 1) ** 2 < times for n in range(1, 9))
