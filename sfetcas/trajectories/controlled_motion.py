@@ -97,7 +97,7 @@ class ControlledMotion:
     @property
     def times(self) -> Array:
         """Times at which answers are told: the begin and all stages, s."""
-        return self.time * np.append(0.0, self.transcription.fractions.ravel())
+        return self.time * np.append(0.0, self.transcription.statement.fractions.ravel())
 
     # -- what was found ---------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..description.records import unknown
+from ..dynamics.methods import RADAU
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.relations import Relation, relation
@@ -115,6 +116,12 @@ class Statement:
 
     def __post_init__(self) -> None:
         self.constants = {one.name: ca.MX.sym(one.name) for one in self.variables}
+
+    @property
+    def fractions(self) -> Array:
+        """Of the time, at which the stages are, (intervals, stages)."""
+        before = np.cumsum(self.shares) - self.shares
+        return np.asarray(before[:, None] + self.shares[:, None] * RADAU[self.stages])
 
     # -- symbols --------------------------------------------------------------------------------------
 

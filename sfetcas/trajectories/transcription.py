@@ -87,13 +87,6 @@ class Transcription:
         self._tell()
         self._ask()
 
-    @property
-    def fractions(self) -> Array:
-        """Of the time, at which the stages are, (intervals, stages)."""
-        shares = self.statement.shares
-        before = np.cumsum(shares) - shares
-        return np.asarray(before[:, None] + shares[:, None] * self.places)
-
     # -- unknowns ---------------------------------------------------------------------------------------
 
     def _unknowns(self) -> None:
@@ -245,14 +238,13 @@ class Transcription:
         for number, (symbol, _) in enumerate(statement.integrals):
             if symbol.__hash__() in bounded:
                 self._integrate(number, symbol)
-        for number, (name, found) in enumerate(statement.rows):
-            label = name or f"constraint {number}"
-            varying = _varying(label, found)
+        for name, found in statement.rows:
+            varying = _varying(name, found)
             if not len(varying.low):
                 continue
-            function, index = self.expression(label, varying.expression)
+            function, index = self.expression(name, varying.expression)
             unit = self._sizes(function, index)
-            self.pieces.add_rows(label, function, index, None, varying.low, varying.high, unit)
+            self.pieces.add_rows(name, function, index, None, varying.low, varying.high, unit)
         self._cost(cost, summed)
         if statement.resting:
             self._rest()
@@ -416,7 +408,7 @@ class Transcription:
 
     def _time(self) -> Unknown:
         if "time" not in self._lifted:
-            fractions = self.fractions
+            fractions = self.statement.fractions
             block = self.pieces.unknowns("time", self.guess.end * fractions, unit=self.guess.end)
             w, c = ca.SX.sym("w", 2), ca.SX.sym("c")
             function = ca.Function("time", [w, c], [w[0] - c * w[1]])

@@ -92,18 +92,11 @@ def straight(statement: Statement, system: ControlledSystem, start: Course) -> C
     turned = _end_shape(statement, system)
     if turned is None:
         return start
-    fractions = _fractions(statement)
     own = system.system
     phi, q0 = ca.MX.sym("phi", len(turned)), ca.DM(system.begin.state.q.T)
     moved = ca.Function("moved", [phi], [moved_by(own, ca.MX(q0), own.spins(phi))])
-    q = np.stack([np.array(moved(share * turned)).T for share in fractions])
+    q = np.stack([np.array(moved(share * turned)).T for share in statement.fractions.ravel()])
     return _still(statement, system, start, q)
-
-
-def _fractions(statement: Statement) -> Array:
-    shares = statement.shares
-    before = np.cumsum(shares) - shares
-    return np.asarray((before[:, None] + shares[:, None] * RADAU[statement.stages]).ravel())
 
 
 def _end_shape(statement: Statement, system: ControlledSystem) -> Array | None:
@@ -170,10 +163,7 @@ def restaged(statement: Statement, system: ControlledSystem, course: Course, sta
     through, among = evaluation(old, new), evaluation(RADAU[stages], new)
 
     def moved(values: Array, first: Array) -> Array:
-        inside = values.reshape(n, stages, -1)
-        before = np.concatenate([first.reshape(1, -1), inside[:-1, -1]])
-        whole = np.concatenate([before[:, None], inside], axis=1)
-        return np.einsum("ij,kjm->kim", through, whole).reshape(n * len(new), -1)
+        return np.einsum("ij,kjm->kim", through, _whole(values, first, n, stages)).reshape(n * len(new), -1)
 
     equations = system.system.equations
     kept = slice(equations.turning_unknowns, equations.unknowns)
@@ -241,12 +231,16 @@ def _placed(system: ControlledSystem, q: Array, near: Array, numbers: Array) -> 
     return np.array(ys), np.array(xs)
 
 
+def _whole(values: Array, begin: Array, intervals: int, stages: int) -> Array:
+    """Values before each interval and at its stages, (intervals, 1 + stages, n), of those at all stages."""
+    inside = values.reshape(intervals, stages, -1)
+    before = np.concatenate([begin.reshape(1, -1), inside[:-1, -1]])
+    return np.concatenate([before[:, None], inside], axis=1)
+
+
 def _rates(statement: Statement, span: float, values: Array, begin: Array) -> Array:
     """Derivatives of the collocation polynomials at all stages."""
     slopes = differentiation(np.append(0.0, RADAU[statement.stages]))[1:]
     n, s = len(statement.shares), statement.stages
-    inside = values.reshape(n, s, -1)
-    before = np.concatenate([begin[None, :], inside[:-1, -1]])
-    whole = np.concatenate([before[:, None], inside], axis=1)
-    found = np.einsum("ij,kjm->kim", slopes, whole) / (span * statement.shares)[:, None, None]
+    found = np.einsum("ij,kjm->kim", slopes, _whole(values, begin, n, s)) / (span * statement.shares)[:, None, None]
     return found.reshape(n * s, -1)
