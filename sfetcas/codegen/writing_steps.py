@@ -16,7 +16,7 @@ __all__ = ["StepWriter"]
 
 DONE = (
     ("DONE", 0, "the step was taken"),
-    ("NOT_CONVERGED", 1, "no step: Newton's method did not converge, try a shorter one"),
+    ("NOT_CONVERGED", 1, "no step: Newton's method did not converge or a result is not finite, try a shorter one"),
     (
         "BAD_ARGUMENT",
         2,

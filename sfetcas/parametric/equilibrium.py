@@ -123,10 +123,11 @@ class EquilibriumSolver:
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return outcome, nothing
         try:
-            return outcome, np.array(self.tell(p, outcome.state, given)).ravel()
+            told = np.array(self.tell(p, outcome.state, given)).ravel()
         except RuntimeError:
             # A stiffness of what is singular.
-            return outcome, nothing
+            told = nothing
+        return (outcome, told) if np.isfinite(told).all() else (replace(outcome, code=Code.NOT_FINITE), nothing)
 
     @property
     def unique(self) -> bool:

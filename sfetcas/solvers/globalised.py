@@ -43,7 +43,7 @@ MEANINGS = {
     Code.UNSTABLE: "an equilibrium, but an unstable one, from which no way led to a stable one",
     Code.ITERATIONS: "no equilibrium within the iterations allowed",
     Code.STALLED: "no equilibrium: no step led further",
-    Code.NOT_FINITE: "no equilibrium: the numbers left what can be computed",
+    Code.NOT_FINITE: "no equilibrium, or a result of it is not finite: the numbers left what can be computed",
     Code.BAD_ARGUMENT: "an argument or the start is not a finite number, or an argument outside of its range",
 }
 """What the codes say."""

@@ -421,17 +421,19 @@ int @name@_solve(@name@_memory *m, const double *arguments, double *state, int w
   }
   if ((status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) && !sf_all_finite(here.state, SF_STATE))
     status = @NAME@_NOT_FINITE;
+  if (results && (status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) &&
+      (sf_call(m, @name@_results, arguments, here.state, m->given, results) ||
+       !sf_all_finite(results, @NAME@_RESULTS))) {
+    /* A result beyond what numbers can say, or a stiffness of what is singular. */
+    sf_none(results, @NAME@_RESULTS);
+    status = @NAME@_NOT_FINITE;
+  }
   if (report) {
     report->status = status;
     report->iterations = SF_ITERATIONS - run.left;
     report->negative = status == @NAME@_SOLVED || status == @NAME@_UNSTABLE ? negative : SF_NOT_DEFINED;
     report->residual = here.size;
   }
-  if (status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) {
-    sf_copy(state, here.state, SF_STATE);
-    if (results && sf_call(m, @name@_results, arguments, state, m->given, results))
-      /* A stiffness of what is singular. */
-      sf_none(results, @NAME@_RESULTS);
-  }
+  if (status == @NAME@_SOLVED || status == @NAME@_UNSTABLE) sf_copy(state, here.state, SF_STATE);
   return status;
 }

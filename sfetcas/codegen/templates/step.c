@@ -46,15 +46,19 @@ int @name@_step_through(@name@_memory *m, double h, const double *arguments, dou
         !sf_all_finite(m->after, @NAME@_STATE))
       status = @NAME@_NOT_CONVERGED;
   }
+  if (results && status == @NAME@_DONE) {
+    @name@_tell(m, arguments + (@NAME@_TIMES - 1) * @NAME@_ARGUMENTS, m->after, results);
+    if (!sf_all_finite(results, @NAME@_RESULTS)) {
+      for (i = 0; i < @NAME@_RESULTS; ++i) results[i] = NAN;
+      status = @NAME@_NOT_CONVERGED;
+    }
+  }
   if (report) {
     report->status = status;
     report->iterations = m->iterations - m->iterations == 0.0 ? (int)m->iterations : 0;
     report->gap = m->gap;
   }
-  if (status == @NAME@_DONE) {
-    sf_copy(state, m->after, @NAME@_STATE);
-    if (results) @name@_tell(m, arguments + (@NAME@_TIMES - 1) * @NAME@_ARGUMENTS, state, results);
-  }
+  if (status == @NAME@_DONE) sf_copy(state, m->after, @NAME@_STATE);
   return status;
 }
 
