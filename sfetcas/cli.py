@@ -29,6 +29,7 @@ from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
 from .outputs import outputs_of, outputs_of_sweep, outputs_of_trade
+from .quoting import printable
 from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
 from .sweeps.sweeping import sweep
@@ -279,7 +280,7 @@ def _check(options: argparse.Namespace) -> int:
     worst = SOLVED
     for file in options.files:
         scene = load(file)
-        print(f"{file}: {scene.title}")
+        print(printable(f"{file}: {scene.title}"))
         code = _verdict(*_answered(file, scene, _settings(options)))
         if code == INTERRUPTED:
             return code
@@ -292,7 +293,7 @@ def _info(options: argparse.Namespace) -> int:
     _named(options.file, lambda: check_resistance(scene))
     mesh = pilot_of(scene, settings)
     model = assemble(scene, mesh, assembly=settings.assembly)
-    print(scene.title or "untitled scene")
+    print(printable(scene.title) or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(f"  begins with {flexible(model)}; {model.assembly} assembly")
     for block in model.blocks:
@@ -326,7 +327,8 @@ def _export(options: argparse.Namespace) -> int:
             overwrite=options.overwrite,
         ),
     )
-    print(f"{options.folder}: {name}.c, {name}.h and what belongs to them; `make check` there builds and compares")
+    folder = printable(str(options.folder))
+    print(f"{folder}: {name}.c, {name}.h and what belongs to them; `make check` there builds and compares")
     print(f"  {flexible(solver.model)}, {counted(solver.arguments.expressions.total, 'unknown')}")
     for one in solver.arguments.arguments:
         print(f"  argument {one.name} [{one.unit}]: {', '.join(f'{x:.6g}' for x in one.default)}")

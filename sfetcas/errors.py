@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import enum
 
+from .quoting import printable
+
 __all__ = ["SceneError", "SolveError", "Status"]
 
 
@@ -17,7 +19,7 @@ class SceneError(ValueError):
     """
 
     def __init__(self, message: str, where: tuple[str, ...] = ()) -> None:
-        super().__init__(message if not where else f"{'.'.join(where)}: {message}")
+        super().__init__(printable(message if not where else f"{'.'.join(where)}: {message}"))
         self.bare = message
         self.where = where
 

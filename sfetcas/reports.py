@@ -15,6 +15,7 @@ from .equilibria.solution import Equilibrium
 from .mechanics.model import Model
 from .paths.path import Branch, FlutterPoint
 from .paths.path import Path as Course
+from .quoting import printable
 from .sweeps.result import Sweep
 
 __all__ = ["flexible", "print_checks", "report", "report_sweep"]
@@ -32,7 +33,7 @@ UNITS = {"moment": "N m", "force": "N"}
 def report(solution: Answer, seconds: float) -> None:
     """Print an answer that took so many seconds, file and report included."""
     model = solution.last.model
-    print(solution.scene.title or "untitled scene")
+    print(printable(solution.scene.title) or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
     print(f"  {flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
     if isinstance(solution, Course):
@@ -281,7 +282,7 @@ def print_checks(checks: Sequence[Check]) -> None:
 
 def report_sweep(found: Sweep) -> None:
     """Print what became of the cases of a sweep: how many, failures, and of each quantity what it comes to."""
-    print(found.scene.title or "untitled scene")
+    print(printable(found.scene.title) or "untitled scene")
     solved = int(found.solved.sum())
     print(f"  {counted(len(found), 'case')} of {', '.join(found.cases.columns)}: {solved} solved")
     _report_statuses(found)
@@ -342,7 +343,14 @@ def _row(c: Check) -> tuple[str, ...]:
         step += "" if number is None else f" {key.replace('_', ' ')} {number}"
     tolerance = "exact" if expect.tolerance is None else f"{expect.tolerance:.1e}"
     verdict = "ok" if c.passed else "FAILED"
-    return expect.quantity + place + step, _short(c.value), _short(expect.value), f"{c.error:.1e}", tolerance, verdict
+    return (
+        printable(expect.quantity) + place + step,
+        _short(c.value),
+        _short(expect.value),
+        f"{c.error:.1e}",
+        tolerance,
+        verdict,
+    )
 
 
 def _short(value: Any) -> str:

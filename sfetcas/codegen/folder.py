@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import keyword
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..description.records import say
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
@@ -30,9 +32,10 @@ RESERVED = (
     " auto break case char const continue default do double else enum extern float for goto if inline int long "
     " register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while "
     " class namespace template this throw new delete public private protected virtual operator using bool true false "
-    " main check sf casadi m math test all clean install help json os sys ctypes "
+    " main check sf casadi m test all clean install help "
+    " complex fenv inttypes limits math setjmp stdarg stdbool stddef stdint stdio stdlib tgmath wchar wctype features "
 )
-"""Words that are no names in C or C++, and names of files of the folder."""
+"""Words that are no names in C or C++, names of files of the folder, and headers that its own would hide."""
 
 
 def export(
@@ -144,9 +147,11 @@ def check_name(name: str) -> None:
         Says so.
     """
     plain = re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII)
-    if not plain or f" {name} " in RESERVED or keyword.iskeyword(name) or len(name) > 60:
-        accepted = "a name of letters, digits and _ that begins with a letter and is no word of C"
-        raise SceneError(f"found {name!r}, accepted: {accepted}", ("name",))
+    # Constants begin with the name in capitals; a loader may not hide what Python itself imports.
+    taken = f" {name} " in RESERVED or name.lower() == "sf" or name in sys.stdlib_module_names
+    if not plain or taken or keyword.iskeyword(name) or len(name) > 60:
+        accepted = "a name of letters, digits and _ that begins with a letter and is no word of C or module of Python"
+        raise SceneError(f"found {say(name)}, accepted: {accepted}", ("name",))
 
 
 def check_folder(path: Path, *, overwrite: bool) -> None:

@@ -6,7 +6,7 @@ import abc
 import json
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -19,8 +19,18 @@ from ..mathematics.source import functions_in_c, sizes_of
 from ..mechanics.model import Model
 from ..parametric.arguments import Arguments
 from ..parametric.results import Results
+from ..quoting import (
+    c_comment,
+    c_string,
+    identifiers,
+    in_docstring,
+    markdown,
+    markdown_cell,
+    python_string,
+    shell_word,
+)
 
-__all__ = ["Status", "Writer", "enumerated", "filled", "identifiers", "numbers", "row", "rows", "template"]
+__all__ = ["Status", "Writer", "enumerated", "filled", "numbers", "row", "rows", "template"]
 
 Status = tuple[str, int, str]
 """How a call may end: name, number, meaning."""
@@ -42,28 +52,13 @@ def filled(text: str, values: dict[str, object]) -> str:
     return re.sub(r"@(\w+)@", lambda match: str(values[match.group(1)]), text)
 
 
-def identifiers(names: Iterable[str]) -> list[str]:
-    """Names as parts of C identifiers, no two alike."""
-    found: list[str] = []
-    for name in names:
-        plain = re.sub(r"\W", "_", name, flags=re.ASCII).upper()
-        count, unique = 2, plain
-        while unique in found:
-            unique, count = f"{plain}_{count}", count + 1
-        found.append(unique)
-    return found
-
-
 def enumerated(values: Sequence[Status]) -> str:
     """Constants of an enum with what they mean."""
     last = len(values) - 1
     ends = ["," if i < last else "" for i in range(len(values))]
-    return "\n".join(f"  {n} = {v}{end} /* {_comment(what)} */" for (n, v, what), end in zip(values, ends, strict=True))
-
-
-def _comment(text: str) -> str:
-    """A text that no comment of C ends in, on one line."""
-    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+    return "\n".join(
+        f"  {n} = {v}{end} /* {c_comment(what)} */" for (n, v, what), end in zip(values, ends, strict=True)
+    )
 
 
 def numbers(values: Array) -> str:
@@ -202,6 +197,7 @@ class Writer(abc.ABC):
 
     def _values(self) -> dict[str, object]:
         name, upper = self.name, self.name.upper()
+        title = self.scene.title.strip() or "an untitled scene"
         known, told = self.arguments.arguments, self.results.results
         sizes = sizes_of(self.functions)
         sizes["w"] = max(sizes["w"], self.arguments.expressions.total)
@@ -209,8 +205,9 @@ class Writer(abc.ABC):
         return {
             "name": name,
             "NAME": upper,
-            "title": _comment(self.scene.title or "an untitled scene"),
-            "title_in_python": json.dumps(self.scene.title or "an untitled scene")[1:-1],
+            "title": c_comment(title),
+            "title_in_python": in_docstring(title),
+            "title_in_markdown": markdown(title),
             "casadi": ca.CasadiMeta.version(),
             "arguments_in_words": _in_words([one.name for one in known]),
             "n_arguments": len(self.arguments.defaults),
@@ -219,7 +216,7 @@ class Writer(abc.ABC):
             "argument_places": _places(f"{upper}_ARG", [(a.name, len(a.default), a.unit) for a in known]),
             "result_places": _places(f"{upper}_RES", [(r.name, r.size, r.unit) for r in told]),
             "statuses": enumerated(statuses),
-            "messages": "\n".join(f'    case {key}: return "{meaning}";' for key, _, meaning in statuses),
+            "messages": "\n".join(f"    case {key}: return {c_string(meaning)};" for key, _, meaning in statuses),
             "defaults": numbers(self.arguments.defaults),
             "sz_state": max(1, self.states),
             "sz_p": max(1, len(self.arguments.defaults)),
@@ -287,16 +284,18 @@ class Writer(abc.ABC):
         name = "" if example is None else example["name"] + ("" if example["size"] == 1 else ".0")
         return {
             "memory_kb": manifest["sizes"]["memory_bytes"] // 1000 + 1,
-            "first_argument": f"{name}=1.5" if example else "",
-            "first_result": results[0]["name"] if results else "message",
+            "first_argument": shell_word(f"{name}=1.5" if example else ""),
+            "first_result": in_docstring(python_string(results[0]["name"] if results else "message")),
             "argument_entries": "\n".join(map(_entry, arguments)),
             "result_entries": "\n".join(map(_entry, results)),
             "argument_rows": "\n".join(
-                f"| `{one['name']}` | {one['size']} | {one['unit']} | {_short(one['default'])} | {one['meaning']} |"
+                f"| {markdown_cell(one['name'])} | {one['size']} | {one['unit']} | {_short(one['default'])} "
+                f"| {markdown(one['meaning'])} |"
                 for one in arguments
             ),
             "result_rows": "\n".join(
-                f"| `{one['name']}` | {' x '.join(map(str, one['shape'])) or '1'} | {one['unit']} | {one['meaning']} |"
+                f"| {markdown_cell(one['name'])} | {' x '.join(map(str, one['shape'])) or '1'} | {one['unit']} "
+                f"| {markdown(one['meaning'])} |"
                 for one in results
             ),
             "status_rows": "\n".join(f"| {key} = {value} | {meaning} |" for key, value, meaning in self.statuses),
@@ -319,7 +318,9 @@ def _kind(name: str) -> str:
 
 
 def _in_words(names: Sequence[str]) -> str:
-    words = textwrap.fill(", ".join(names) if names else "loads of the scene", 110, initial_indent=" * ")
+    words = textwrap.fill(
+        ", ".join(map(c_comment, names)) if names else "loads of the scene", 110, initial_indent=" * "
+    )
     return words.replace("\n", "\n * ")
 
 
@@ -336,7 +337,7 @@ def _places(prefix: str, sizes: Sequence[tuple[str, int, str]]) -> str:
 
 
 def _entry(one: dict[str, Any]) -> str:
-    return f"  {{{json.dumps(one['name'])}, {one['first']}, {one['size']}, {json.dumps(one['unit'])}}},"
+    return f"  {{{c_string(one['name'])}, {one['first']}, {one['size']}, {c_string(one['unit'])}}},"
 
 
 def _short(value: float | list[float]) -> str:

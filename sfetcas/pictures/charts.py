@@ -23,7 +23,7 @@ from ..paths.path import Branch, Path
 from .files import DPI, check_ending, save_figure
 from .glyphs import sketch_holds
 from .looks import dashes_of
-from .sheet import DOTTED, Sheet, axes_on, plot_line
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, plot_line, title_of
 from .sketch import REST, Course, Sketch, course_of, view_of
 
 __all__ = ["chart", "save_chart"]
@@ -63,7 +63,7 @@ def chart(path: Path) -> Figure:
     _draw_course(left, path, quantity)
     for shape in shapes:
         _draw_dot(left, shape, quantity, path)
-    figure.suptitle(path.scene.title, parse_math=False)
+    figure.suptitle(title_of(path.scene.title), parse_math=False)
     _draw_shapes(right, path, shapes)
     return figure
 
@@ -153,8 +153,8 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity) -> None:
             axes.plot(across[here], up[here], mark, color=colour, fillstyle="none", markersize=7, gid=kind)
     _calm(axes, path, quantity)
     names = ("factor", quantity.name) if quantity.upright else (quantity.name, "factor")
-    axes.set_xlabel(names[0], parse_math=False)
-    axes.set_ylabel(names[1], parse_math=False)
+    axes.set_xlabel(drawn_text(names[0]), parse_math=False)
+    axes.set_ylabel(drawn_text(names[1]), parse_math=False)
     axes.grid(color="#EBEBEB", linewidth=0.6)
     # More numbers like -0.0075 would run into each other.
     axes.locator_params(axis="x", nbins=6)

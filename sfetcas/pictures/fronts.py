@@ -13,7 +13,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 from ..tradeoff.trading import Row, Trade, again, whole
 from .files import DPI, check_ending, save_figure
 from .looks import PALETTE
-from .sheet import title_of
+from .sheet import drawn_text, title_of
 
 __all__ = ["front_picture", "save_front"]
 
@@ -73,7 +73,9 @@ def _draw(paper: Axes, trade: Trade, cost: Callable[[Row], float]) -> None:
         seconds = peer.seconds if cost is whole else peer.again
         if seconds is not None and np.isfinite(peer.error):
             paper.plot([seconds], [max(peer.error, LEAST)], "x", color=PEER, label="other programs")
-            paper.annotate(peer.label, (seconds, max(peer.error, LEAST)), fontsize=7, color=PEER, parse_math=False)
+            paper.annotate(
+                drawn_text(peer.label), (seconds, max(peer.error, LEAST)), fontsize=7, color=PEER, parse_math=False
+            )
     if trade.against == "refined" and trade.reference.estimate:
         paper.axhspan(LEAST, trade.reference.estimate, color="#EEEEEE", zorder=0, label="error of the reference")
     paper.set_xscale("log")

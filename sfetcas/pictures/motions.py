@@ -24,7 +24,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .files import DPI, check_ending, save_figure
 from .glyphs import sketch_holds
-from .sheet import DOTTED, Sheet, axes_on, plot_line, title_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, plot_line, title_of
 from .sketch import REST, Ink, Sketch, course_of, prefix, view_of
 
 __all__ = ["histories", "most_moving", "motion_picture", "save_histories", "save_motion"]
@@ -148,7 +148,7 @@ def _draw_values(axes: Axes, motion: Trajectory, values: Array, name: str, colou
 
 
 def _finish(axes: Axes, name: str) -> None:
-    axes.set_ylabel(name, parse_math=False)
+    axes.set_ylabel(drawn_text(name), parse_math=False)
     axes.grid(color="#EBEBEB", linewidth=0.6)
     axes.margins(x=0.01)
     # Above the frame it hides nothing.
@@ -225,4 +225,4 @@ def _sketch_ways(sketch: Sketch, motion: Trajectory) -> None:
         if long[name] > 0.02 * sketch.size:
             sketch.line(ways[name], f"way-{name}", colour=WAY, width=0.9, level=2.2)
             away = sketch.view.flat(sketch.leaving(name)).sum(axis=0)
-            sketch.label(name, ways[name][-1], -away, Ink(f"way-{name}", WAY, 0.9))
+            sketch.label(drawn_text(name), ways[name][-1], -away, Ink(f"way-{name}", WAY, 0.9))

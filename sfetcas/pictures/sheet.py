@@ -49,7 +49,7 @@ from .sketch import (
     thinned,
 )
 
-__all__ = ["DOTTED", "Colour", "Sheet", "axes_on", "plot_line", "sheet_of", "title_of"]
+__all__ = ["DOTTED", "Colour", "Sheet", "axes_on", "drawn_text", "plot_line", "sheet_of", "title_of"]
 
 Colour = Literal["moment", "magnitude", "none"]
 DOTTED = (0, (1, 2))
@@ -103,10 +103,15 @@ def plot_line(axes: Any, line: Array, **style: Any) -> Any:
     return drawn
 
 
-def title_of(text: str) -> str:
-    """The title in up to three lines of about the same length; a white box for what the font does not have."""
+def drawn_text(text: str) -> str:
+    """A text on one line, a white box for what the font does not have."""
     font = get_font(findfont(FontProperties()))
-    known = " ".join("".join(c if c.isspace() or font.get_char_index(ord(c)) else "\ufffd" for c in text).split())
+    return " ".join("".join(c if c.isspace() or font.get_char_index(ord(c)) else "\ufffd" for c in text).split())
+
+
+def title_of(text: str) -> str:
+    """The title in up to three lines of about the same length."""
+    known = drawn_text(text)
     lines = math.ceil(len(known) / 68)
     even = (textwrap.wrap(known, width) for width in range(max(20, len(known) // max(1, lines)), 69))
     fitting = (wrapped for wrapped in even if len(wrapped) <= min(3, lines))
@@ -243,7 +248,7 @@ def _box_of(text: Text, margin: float = 0.0) -> _Box:
 
 def _text_width(text: str) -> float:
     """Estimated width of a label, points."""
-    return 0.6 * FONT * len(text.replace("$", ""))
+    return 0.6 * FONT * len(text)
 
 
 def _arrow(points: Array, mark: Mark, style: dict[str, Any]) -> FancyArrowPatch:
@@ -443,7 +448,14 @@ class Sheet:
 
     def _write(self, centre: Array, text: str, colour: str, name: str) -> None:
         x, y = self.paper.transAxes.inverted().transform(centre)
-        style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": FONT, "zorder": 9.0, "gid": name}
+        style: dict[str, Any] = {
+            "ha": "center",
+            "va": "center",
+            "fontsize": FONT,
+            "zorder": 9.0,
+            "gid": name,
+            "parse_math": False,
+        }
         style |= {"color": colour, "path_effects": [withStroke(linewidth=2.0, foreground="white")]}
         self.paper.text(x, y, text, transform=self.paper.transAxes, **style).set_in_layout(False)
 

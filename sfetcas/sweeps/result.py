@@ -19,6 +19,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..files import write_file
 from ..mathematics.arrays import Array
+from ..quoting import csv_cell
 from .cases import Cases
 from .quantities import Wanted
 from .work import SHORT, SOLVED, Outcome
@@ -183,8 +184,8 @@ class Sweep:
         columns = [_plain(column) for column in self.table.values()]
         with open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(self.table)
-            writer.writerows(["" if cell is None else cell for cell in row] for row in zip(*columns, strict=True))
+            writer.writerow(map(csv_cell, self.table))
+            writer.writerows(map(csv_cell, row) for row in zip(*columns, strict=True))
 
     def _write_json(self, path: Path) -> None:
         answer = {

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..quoting import csv_cell, markdown
 from .measuring import Timing
 from .trading import TARGETS, Row, Trade, again, whole
 
@@ -107,7 +108,7 @@ def as_csv(trade: Trade) -> str:
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     writer.writeheader()
     for row in trade.rows:
-        writer.writerow({key: "" if value is None else value for key, value in _values(row).items()})
+        writer.writerow({key: csv_cell(value) for key, value in _values(row).items()})
     return text.getvalue()
 
 
@@ -120,7 +121,7 @@ def as_markdown(trade: Trade, *, every: bool = True) -> str:
     estimate = trade.reference.estimate
     against = "what the file expects" if trade.against == "file" else _reference(trade, estimate)
     lines = [
-        f"# Accuracy against time: {trade.scene.title or 'untitled scene'}",
+        f"# Accuracy against time: {markdown(trade.scene.title) or 'untitled scene'}",
         "",
         "; ".join(f"{key} {value}" for key, value in trade.machine.items()),
         "",
@@ -190,4 +191,4 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 
 def _peer_cells(peer: Any) -> tuple[str, ...]:
-    return peer.label, _number(peer.error), _seconds(peer.seconds), _seconds(peer.again)
+    return markdown(peer.label), _number(peer.error), _seconds(peer.seconds), _seconds(peer.again)

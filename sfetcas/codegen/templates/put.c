@@ -1,6 +1,6 @@
 /* Puts "name=value" or "name.i=value" to its place; 0 where there is none. */
 static int put(const char *text) {
-  const char *equals = strchr(text, '=');
+  const char *equals = strrchr(text, '=');
   const entry *one;
   if (!equals) return 0;
   for (one = arguments; one->name; ++one) {
