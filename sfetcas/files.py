@@ -1,8 +1,9 @@
-"""Files and folders that are written whole or not at all."""
+"""Files and folders that are written whole or not at all, and files that are read only where they are plain."""
 
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,64 @@ from typing import Any
 
 from .errors import SceneError
 
-__all__ = ["write_file", "write_folder"]
+__all__ = ["UnreadableError", "read_file", "write_file", "write_folder"]
+
+
+class UnreadableError(ValueError):
+    """A file that is not read; the sentence says what it is and what is accepted, without its name."""
+
+
+KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def read_file(path: str | os.PathLike[str], most: int, accepted: str = "a plain file") -> bytes:
+    """The content of a plain file, or of one that a link leads to; never that of a device or a pipe, which may not end.
+
+    Parameters
+    ----------
+    path
+    most : int
+        Bytes at most: a larger file is refused before it is read.
+    accepted : str
+        What is, in words.
+
+    Raises
+    ------
+    FileNotFoundError
+    UnreadableError
+        Anything else that is no plain file, cannot be read or is too large.
+    """
+    try:
+        # Opening alone may wait for a pipe, or do something to a device.
+        _check_plain(os.stat(path), accepted)
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+            found = os.fstat(file.fileno())
+            _check_plain(found, accepted)
+            # What the system makes up as it is read has no size before.
+            content = b"" if found.st_size > most else file.read(most + 1)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError) as error:
+        if isinstance(error, UnreadableError):
+            raise
+        reason = getattr(error, "strerror", None) or str(error)
+        raise UnreadableError(f"the file cannot be read: {reason}") from None
+    size = max(found.st_size, len(content))
+    if size > most:
+        raise UnreadableError(f"found {size / 1e6:.4g} MB, accepted: {accepted} of {most / 1e6:.4g} MB at most")
+    return content
+
+
+def _check_plain(found: os.stat_result, accepted: str) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        kind = KINDS.get(stat.S_IFMT(found.st_mode), "no file")
+        raise UnreadableError(f"this is {kind}, accepted: {accepted}")
 
 
 def write_file(path: Path, writer: Callable[[Path], Any]) -> None:

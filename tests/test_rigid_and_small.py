@@ -610,7 +610,7 @@ BAD_FILES = {
     "flat.mtx": (b"%%MatrixMarket matrix array real general\n1 2\n1\n2\n", "a square matrix of finite numbers"),
     "nan.mtx": (b"%%MatrixMarket matrix array real general\n1 1\nnan\n", "a square matrix of finite numbers"),
     "small.mtx": (b"%%MatrixMarket matrix array real general\n1 1\n1.0\n", "found 1 x 1, accepted: 12 x 12"),
-    "folder.mtx": ("folder", "cannot be read"),
+    "folder.mtx": ("folder", "this is a folder, accepted: a matrix"),
 }
 
 

@@ -223,10 +223,11 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     with pytest.raises(SceneError, match="the file cannot be read: "):
         load("a\0b.toml")
 
-    def locked(self):
+    def locked(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("pathlib.Path.read_bytes", locked)
+    (tmp_path / "any.toml").touch()
+    monkeypatch.setattr("os.open", locked)
     with pytest.raises(SceneError, match=r"any\.toml: the file cannot be read: Permission denied$"):
         load(tmp_path / "any.toml")
 

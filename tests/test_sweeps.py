@@ -564,7 +564,7 @@ def test_bad_samples_are_refused_in_a_sentence(call, sentence):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (None, "could not be read as a CSV table"),
+        (None, "there is no such file, accepted: a CSV table"),
         ("", "found 0 lines, accepted: a line of names and a line of numbers for each case"),
         ("a,b\n", "found 1 line"),
         ("a,a\n1,2\n", "found a name twice in the first line"),

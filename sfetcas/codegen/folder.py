@@ -14,7 +14,7 @@ from ..description.records import say
 from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
-from ..files import write_folder
+from ..files import read_file, write_folder
 from ..mathematics.kernels import interpreted
 from ..parametric.arguments import Asked
 from ..parametric.equilibrium import EquilibriumSolver, Place, equilibrium_solver
@@ -27,6 +27,9 @@ from .writing_equilibria import EquilibriumWriter
 from .writing_steps import StepWriter
 
 __all__ = ["check_folder", "check_name", "export"]
+
+LARGEST = 100_000_000
+"""Bytes of a manifest that is looked at."""
 
 RESERVED = (
     " auto break case char const continue default do double else enum extern float for goto if inline int long "
@@ -175,7 +178,7 @@ def check_folder(path: Path, *, overwrite: bool) -> None:
 def _ours(path: Path) -> bool:
     """Whether all that a folder holds is an earlier export, built or not."""
     try:
-        manifest = json.loads((path / "manifest.json").read_text(encoding="utf-8"))
+        manifest = json.loads(read_file(path / "manifest.json", LARGEST))
         name = manifest["name"] if manifest["made_by"] == "sfetcas" else None
     except (OSError, ValueError, KeyError, TypeError):
         return False

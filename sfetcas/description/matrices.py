@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import lzma
+import math
 import zipfile
 import zlib
 from pathlib import Path
@@ -12,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator
 
 from ..errors import SceneError
-from .records import say
+from ..files import UnreadableError, read_file
+from .records import enumerated, say
 
 __all__ = [
     "Mass",
@@ -32,6 +36,9 @@ SAME = 1e-7
 
 LARGEST = 6000
 """Rows of a matrix that are read: a thousand nodes of one small member."""
+
+MOST_BYTES = 300_000_000
+"""Of a file with a matrix, and of what it unpacks to: so many rows of numbers of 8 bytes."""
 
 
 def _matrix(value: Any, name: str) -> tuple[tuple[float, ...], ...]:
@@ -67,46 +74,68 @@ def read_matrix(path: Path, name: str = "stiffness") -> Floats:
         The file is absent or holds no such matrix; the sentence says which.
     """
     try:
-        return _from_npz(path, name) if path.suffix.lower() in (".npz", ".npy") else _from_market(path)
+        content = read_file(path, MOST_BYTES, "a matrix")
     except FileNotFoundError:
         raise ValueError(f"there is no file {path}") from None
-    except (OSError, zipfile.BadZipFile) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ValueError(f"the file {path} cannot be read: {reason}") from None
+    except UnreadableError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if path.suffix.lower() not in (".npz", ".npy"):
+        return _from_market(content, path)
+    return _from_npz(content, path, name) if content[:4] == b"PK\3\4" else _from_npy(content, path)
 
 
-def _from_npz(path: Path, name: str) -> Floats:
+def _from_npz(content: bytes, path: Path, name: str) -> Floats:
+    """One array of several; of the others nothing is unpacked."""
     try:
-        loaded: Any = np.load(path, allow_pickle=False)
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            names = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
+            if name not in names and len(names) != 1:
+                held = enumerated(list(names)) or "nothing"
+                raise ValueError(f"the file {path} holds {held}, accepted: {name}, or one array alone")
+            entry = names[name] if name in names else next(iter(names.values()))
+            if entry.file_size > MOST_BYTES:
+                message = f"{path}: found {entry.file_size / 1e6:.4g} MB unpacked, accepted: a matrix of"
+                raise ValueError(f"{message} {MOST_BYTES / 1e6:.4g} MB at most")
+            return _from_npy(archive.read(entry), path)
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        lzma.LZMAError,
+        EOFError,
+        OSError,
+        NotImplementedError,
+        RuntimeError,
+    ) as error:
+        raise ValueError(f"the file {path} cannot be read: {error}") from None
+
+
+def _from_npy(content: bytes, path: Path) -> Floats:
+    """An array of real numbers; what its head announces is looked at before there is room made for it."""
+    stream = io.BytesIO(content)
+    try:
+        major, _ = np.lib.format.read_magic(stream)
+        read_head = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+        shape, _, kind = read_head(stream)
     except (ValueError, EOFError):
         raise ValueError(f"the file {path} holds no arrays of numbers of numpy") from None
-    if isinstance(loaded, np.ndarray):
-        return _numbers_of(loaded, path)
-    with loaded:
-        names = list(loaded.files)
-        if name not in names and len(names) != 1:
-            message = f"the file {path} holds {', '.join(names) or 'nothing'}, accepted: {name}, or one array alone"
-            raise ValueError(message)
-        try:
-            array = loaded[name if name in names else names[0]]
-        except (ValueError, EOFError, zlib.error):
-            array = None
-        return _numbers_of(array, path)
-
-
-def _numbers_of(array: Any, path: Path) -> Floats:
-    # What is no array of numpy is given as bytes, or not at all.
-    if not isinstance(array, np.ndarray):
+    if kind.hasobject:
         raise ValueError(f"the file {path} holds no arrays of numbers of numpy")
-    if array.dtype.kind not in "fiu":
-        raise ValueError(f"the file {path} holds {array.dtype.name}, accepted: real numbers")
-    return np.asarray(array, dtype=float)
+    if kind.kind not in "fiu":
+        raise ValueError(f"the file {path} holds {kind.name}, accepted: real numbers")
+    if math.prod(shape) * kind.itemsize > len(content):
+        told = " x ".join(map(str, shape))
+        raise ValueError(f"the file {path} announces {told[:60]} numbers and holds fewer, accepted: all of them")
+    stream.seek(0)
+    try:
+        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False), dtype=float)
+    except (ValueError, EOFError):
+        raise ValueError(f"the file {path} holds no arrays of numbers of numpy") from None
 
 
-def _from_market(path: Path) -> Floats:
+def _from_market(content: bytes, path: Path) -> Floats:
     """Matrix Market exchange format, coordinate or array, general or symmetric (Boisvert et al. 1996)."""
     try:
-        lines = path.read_bytes().decode("utf-8-sig").strip().splitlines()
+        lines = content.decode("utf-8-sig").strip().splitlines()
     except UnicodeDecodeError:
         raise ValueError(f"the file {path} is no text, accepted: Matrix Market, or .npz") from None
     head = lines[0].lower().split() if lines else []

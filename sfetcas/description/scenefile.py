@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SceneError
+from ..files import UnreadableError, read_file
 from .records import say
 from .scene import Scene
 
@@ -23,6 +24,9 @@ except ImportError:
     tomli_w = None  # type: ignore[assignment]
 
 __all__ = ["dump", "load", "parse"]
+
+LARGEST = 50_000_000
+"""Bytes of a scene file: a hundred thousand members take half of it, and are more than can be solved."""
 
 _ENDINGS = {".toml": "toml", ".json": "json"}
 
@@ -106,15 +110,13 @@ def _format(path: Path) -> str:
 def _read(path: Path) -> str:
     _format(path)
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return read_file(path, LARGEST, "a scene file").decode("utf-8-sig")
     except FileNotFoundError:
         raise SceneError("there is no such file") from None
-    except IsADirectoryError:
-        raise SceneError("this is a folder, accepted: a scene file") from None
     except UnicodeDecodeError as error:
         raise SceneError(f"found a byte that is not UTF-8 at position {error.start}, accepted: UTF-8") from None
-    except (OSError, ValueError) as error:
-        raise SceneError(f"the file cannot be read: {_reason(error)}") from None
+    except UnreadableError as error:
+        raise SceneError(str(error)) from None
 
 
 def _within(values: Any, folder: Path) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 from ..description.records import counted, say
 from ..description.scene import Scene
 from ..errors import SceneError
+from ..files import UnreadableError, read_file
 from ..mathematics.arrays import Array
 from ..parametric.arguments import argument
 from ..parametric.changing import changed
@@ -25,6 +27,9 @@ __all__ = ["MOST_CASES", "Cases", "cases_from", "grid", "read_cases", "sampled"]
 
 MOST_CASES = 10_000_000
 """Cases at most."""
+
+LARGEST = 200_000_000
+"""Bytes of a table: so many cases of one number with all its digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,9 +184,13 @@ def read_cases(path: Path) -> Cases:
     """
     where = (str(path),)
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            lines = [line for line in csv.reader(file, strict=True) if line]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = read_file(path, LARGEST, "a CSV table").decode("utf-8-sig")
+        lines = [line for line in csv.reader(io.StringIO(text, newline=""), strict=True) if line]
+    except FileNotFoundError:
+        raise SceneError("there is no such file, accepted: a CSV table", where) from None
+    except UnreadableError as error:
+        raise SceneError(str(error), where) from None
+    except (UnicodeDecodeError, csv.Error) as error:
         raise SceneError(f"could not be read as a CSV table: {error}", where) from None
     if len(lines) < 2:
         accepted = "a line of names and a line of numbers for each case"
