@@ -12,7 +12,7 @@ def _own_cache(tmp_path_factory):
         # What one worker has compiled the others take.
         folder = folder.parent
     folder = folder / "kernels"
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SFETCAS_CACHE", str(folder))
         yield

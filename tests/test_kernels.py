@@ -74,12 +74,56 @@ def test_key_is_the_content(cache, compiler):
     np.testing.assert_allclose(three([1, 2, 3]).full(), 1.5 * two([1, 2, 3]).full(), rtol=1e-15)
 
 
-def test_corrupt_file_falls_back(cache, compiler):
-    path = kernels._library(small())
-    path.parent.mkdir(parents=True)
-    path.write_bytes(b"\x7fELF but nothing else")
-    result = kernels.compiled(small())([1, 2, 3]).full()
-    np.testing.assert_allclose(result, small()([1, 2, 3]).full(), rtol=1e-14)
+@pytest.mark.parametrize("how", ["truncated", "emptied", "another", "a pipe"])
+def test_a_library_that_is_not_what_was_compiled_is_never_loaded(how, cache, compiler):
+    kernels.compiled(small())
+    kernels.compiled(small(3.0, "other"))
+    (path,) = (file for file in cache.iterdir() if file.name.startswith("small-"))
+    (other,) = (file for file in cache.iterdir() if file.name.startswith("other-"))
+    whole = path.read_bytes()
+    # In a process of its own: what is mapped would end it where it was cut off.
+    path.unlink()
+    if how == "a pipe":
+        os.mkfifo(path)
+    else:
+        path.write_bytes({"truncated": whole[: len(whole) // 2], "emptied": b"", "another": other.read_bytes()}[how])
+    run = subprocess.run([sys.executable, "-c", AGAIN], capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 0, run.stderr
+    assert path.read_bytes() == whole
+    assert len(files(cache)) == 2
+
+
+AGAIN = """
+import casadi as ca, numpy as np
+from sfetcas.mathematics import kernels
+x = ca.SX.sym('x', 3)
+f = ca.Function('small', [x], [2.0 * ca.sin(x) * ca.sumsqr(x)], ['x'], ['y'])
+g = kernels.compiled(f)
+assert g is not f
+np.testing.assert_allclose(g([1, 2, 3]).full(), f([1, 2, 3]).full(), rtol=1e-14)
+"""
+
+
+def test_the_folder_is_private(cache, compiler):
+    kernels.compiled(small())
+    assert cache.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("how", ["group", "others", "somebody else"])
+def test_a_folder_that_others_fill_is_not_used(how, cache, compiler, monkeypatch):
+    kernels.compiled(small())
+    kernels._loaded.cache_clear()
+    before = files(cache)
+    if how == "somebody else":
+        owner = os.geteuid()
+        monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
+        monkeypatch.setattr(kernels, "RULER", owner + 2)
+    else:
+        cache.chmod({"group": 0o770, "others": 0o707}[how])
+    for function in (small(), small(3.0)):
+        with pytest.warns(UserWarning, match="no kernels are taken from this folder.*accepted: a folder of your own"):
+            assert kernels.compiled(function) is function
+    assert files(cache) == before
 
 
 def test_interrupted_write_leaves_nothing(cache, compiler, monkeypatch):
@@ -115,19 +159,10 @@ def test_folder_that_cannot_be_written(tmp_path, monkeypatch):
 
 
 def test_concurrent_processes(cache, compiler):
-    code = (
-        "import casadi as ca, numpy as np\n"
-        "from sfetcas.mathematics import kernels\n"
-        "x = ca.SX.sym('x', 3)\n"
-        "f = ca.Function('small', [x], [2.0 * ca.sin(x) * ca.sumsqr(x)], ['x'], ['y'])\n"
-        "g = kernels.compiled(f)\n"
-        "assert g is not f\n"
-        "np.testing.assert_allclose(g([1, 2, 3]).full(), f([1, 2, 3]).full(), rtol=1e-14)\n"
-    )
     source = str(Path(kernels.__file__).parents[1])
     environment = {**os.environ, "PYTHONPATH": source}
     running = [
-        subprocess.Popen([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE) for _ in range(3)
+        subprocess.Popen([sys.executable, "-c", AGAIN], env=environment, stderr=subprocess.PIPE) for _ in range(3)
     ]
     for process in running:
         error = process.communicate(timeout=60)[1]

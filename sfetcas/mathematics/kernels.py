@@ -2,8 +2,10 @@
 
 A kernel depends on the element type only, never on a scene, so a compiled one is kept in a cache on disk,
 keyed by its content, by CasADi's version and by the compiler.  A library is compiled beside its final name and
-moved there in one step: processes that run at once and interrupted writes leave nothing half-written.
-Without a compiler everything runs on the virtual machine.
+moved there in one step: processes that run at once and interrupted writes leave nothing half-written.  Its name ends
+with the checksum of what it holds, so that neither is ever without the other: what was cut short or changed is
+compiled anew, never loaded.  Nor is anything from a folder that somebody else owns or may write to.
+Without a compiler, and without such a folder, everything runs on the virtual machine.
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import subprocess
 import tempfile
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
@@ -24,6 +28,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from ..files import UnreadableError, read_file
 from .arrays import Array
 from .source import loadable
 
@@ -47,6 +52,16 @@ COMPILE_SECONDS_PER_INSTRUCTION = 8e-5
 """What the compiler spends on an instruction (measured: 16,000 instructions in 1.3 s)."""
 
 
+LARGEST = 100_000_000
+"""Bytes of a library that is looked at; those of kernels have up to a few million."""
+
+RULER = 0
+"""Who may do anything on a machine, by number."""
+
+LOADED = 256
+"""Libraries that are kept at hand, some for each kind of element; one that is not is read again."""
+
+
 def cache_folder() -> Path:
     """Where compiled kernels are kept: $SFETCAS_CACHE, else a folder of the user's cache."""
     given = os.environ.get("SFETCAS_CACHE")
@@ -64,48 +79,80 @@ def _flags(function: ca.Function) -> tuple[str, ...]:
     return (STRAIGHT if function.is_a("SXFunction") else LOOPS, *FLAGS)
 
 
-def _library(function: ca.Function) -> Path:
-    """Place of the compiled library of a function in the cache."""
+def _key(function: ca.Function) -> str:
+    """Beginning of the name of the compiled library of a function; its checksum follows."""
     flags = _flags(function)
     content = "\n".join([function.serialize(), ca.CasadiMeta.version(), platform.machine(), *flags, str(_compiler())])
-    return cache_folder() / f"{function.name()}-{hashlib.sha256(content.encode()).hexdigest()[:24]}.so"
+    return f"{function.name()}-{hashlib.sha256(content.encode()).hexdigest()[:24]}-"
 
 
-@functools.cache
-def _loaded(function_name: str, path: Path) -> ca.Function:
-    return ca.external(function_name, str(path))
+def _named(key: str, library: bytes) -> str:
+    """Name of a library with its checksum."""
+    return f"{key}{hashlib.sha256(library).hexdigest()[:32]}.so"
 
 
-def _load(function: ca.Function, path: Path) -> ca.Function | None:
-    """The compiled function, or None where the file is absent or cannot be loaded."""
-    if not path.exists():
-        return None
+def _private(folder: Path) -> bool:
+    """Whether only this user, or the one who rules the machine, can have put anything into a folder."""
+    found = folder.stat()
+    if not stat.S_ISDIR(found.st_mode):
+        raise NotADirectoryError
+    if not hasattr(os, "geteuid"):
+        return True
+    foreign = found.st_uid not in (os.geteuid(), RULER)
+    if foreign or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        why = "it belongs to somebody else" if foreign else "others may write to it"
+        told = f"{folder}: no kernels are taken from this folder or compiled, which costs time only, as {why}"
+        warnings.warn(
+            f"{told}; accepted: a folder of your own of mode 700, or another one as SFETCAS_CACHE", stacklevel=2
+        )
+        return False
+    return True
+
+
+@functools.lru_cache(maxsize=LOADED)
+def _loaded(name: str, key: str, folder: Path) -> ca.Function:
+    """The function in the library of a key; OSError where there is none that is whole and can be loaded."""
+    if _private(folder):
+        for path in (folder / entry for entry in os.listdir(folder) if entry.startswith(key)):
+            with contextlib.suppress(UnreadableError, RuntimeError):
+                if _named(key, read_file(path, LARGEST)) == path.name:
+                    return ca.external(name, str(path))
+    raise FileNotFoundError
+
+
+def _load(function: ca.Function, folder: Path) -> ca.Function | None:
+    """The compiled function from the cache, or None."""
     try:
-        return _loaded(function.name(), path)
-    except RuntimeError:
+        return _loaded(function.name(), _key(function), folder)
+    except OSError:
         return None
 
 
 def compiled(function: ca.Function) -> ca.Function:
     """The function as machine code from the cache, compiled first if need be; itself without a compiler."""
-    path = _library(function)
-    found = _load(function, path)
-    if found is not None:
-        return found
+    folder = cache_folder()
+    return _load(function, folder) or (_compile(function, folder) and _load(function, folder)) or function
+
+
+def _compile(function: ca.Function, place: Path) -> bool:
+    """Put the library of a function into the cache; whether that went well."""
     compiler = _compiler()
     if compiler is None:
-        return function
+        return False
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            source, library = Path(folder) / f"{function.name()}.c", Path(folder) / path.name
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not _private(place):
+            return False
+        with tempfile.TemporaryDirectory(dir=place) as folder:
+            source, library = Path(folder) / f"{function.name()}.c", Path(folder) / "library.so"
             source.write_text(loadable(function))
             command = [compiler, *_flags(function), "-o", str(library), str(source), "-lm"]
-            subprocess.run(command, check=True, capture_output=True)
-            os.replace(library, path)
+            # What the compiler itself leaves where it is interrupted goes with the folder.
+            subprocess.run(command, check=True, capture_output=True, env={**os.environ, "TMPDIR": folder})
+            os.replace(library, place / _named(_key(function), library.read_bytes()))
     except (OSError, subprocess.CalledProcessError):
-        return function
-    return _load(function, path) or function
+        return False
+    return True
 
 
 @functools.cache
@@ -163,7 +210,7 @@ def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca
     if way == "compiled" or spent > COMPILE_SECONDS + written * COMPILE_SECONDS_PER_INSTRUCTION:
         return compiled(function)
     # Looking into the cache costs a serialization: worth it only where time is spent at all.
-    return (_load(function, _library(function)) or function) if spent > 0.02 else function
+    return (_load(function, cache_folder()) or function) if spent > 0.02 else function
 
 
 class Batch:
