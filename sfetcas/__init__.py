@@ -24,6 +24,9 @@ Source: Barraco and Munteanu, A special finite element for static and dynamic st
 large motion, Part 1.
 """
 
+# Before all else, as what follows takes long to import.
+import sfetcas.stopping  # noqa: F401  # isort: split
+
 from .analyses import solve
 from .checks import check
 from .codegen.derivatives import Derivatives

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import os
 import re
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -32,6 +34,7 @@ from .outputs import outputs_of, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
 from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
+from .stopping import INTERRUPTED, SENTENCE, heard
 from .sweeps.sweeping import sweep
 from .sweeps.texts import cases_in_words, usual_quantities
 from .tradeoff.tables import as_markdown
@@ -41,8 +44,8 @@ __all__ = ["main"]
 
 T = TypeVar("T")
 
-SOLVED, SHORT, BAD_INPUT, NO_SOLUTION, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
-"""Exit codes."""
+SOLVED, SHORT, BAD_INPUT, NO_SOLUTION, INTERNAL = 0, 1, 2, 3, 70
+"""Exit codes, beside those of interrupts."""
 
 REPORT = "a mistake of sfetcas, not of the scene; please report it with the lines above and the scene file"
 
@@ -50,6 +53,21 @@ REPORT = "a mistake of sfetcas, not of the scene; please report it with the line
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code is returned."""
     options = _parser().parse_args(arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # Names have characters that not every terminal has.
+            stream.reconfigure(errors="backslashreplace")
+    with heard() as code, warnings.catch_warnings():
+        warnings.showwarning = _noted
+        return code(_ended(options))
+
+
+def _noted(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"sfetcas: note: {printable(str(message))}", file=sys.stderr)
+
+
+def _ended(options: argparse.Namespace) -> int:
+    """Run a command; the exit code is returned."""
     try:
         with np.errstate(over="raise"):
             return int(options.command(options))
@@ -66,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("sfetcas: no solution: the scene needs more memory than there is", file=sys.stderr)
         return NO_SOLUTION
     except KeyboardInterrupt:
-        print("sfetcas: interrupted; nothing was written", file=sys.stderr)
+        print(SENTENCE, file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -12,6 +12,7 @@ import sfetcas
 FOLDER = Path(sfetcas.__file__).parent
 
 ORDER = [
+    "stopping",
     "quoting",
     "errors",
     "files",

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
@@ -18,6 +17,7 @@ from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
 from ..errors import SceneError
+from ..stopping import begin_apart, postponed
 
 __all__ = ["Workers", "cores"]
 
@@ -76,6 +76,11 @@ class _Lane:
         """Let the process end."""
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
+    def kill(self) -> None:
+        """End the process, whatever it is at."""
+        for process in list((getattr(self._pool, "_processes", None) or {}).values()):
+            process.kill()
+
 
 class Workers(Executor):
     """So many processes of this machine.
@@ -102,7 +107,11 @@ class Workers(Executor):
         self._reader, self._writer = self._context.Pipe(duplex=False)
         self._lanes = [_Lane(self._pool) for _ in range(count)]
         try:
-            self._lanes[0].submit(_ready).result()
+            with postponed():
+                self._lanes[0].submit(_ready).result()
+        except KeyboardInterrupt:
+            self.kill()
+            raise
         except BrokenExecutor:
             self.kill()
             accepted = "a call below if __name__ == '__main__': in a script that can be imported"
@@ -130,6 +139,8 @@ class Workers(Executor):
     def kill(self) -> None:
         """End all processes at once."""
         self._writer.close()
+        for lane in self._lanes:
+            lane.kill()
         self.shutdown(cancel_futures=True)
 
 
@@ -139,7 +150,7 @@ def _ready() -> None:
 
 def _begin(reader: Connection) -> None:
     """Leave interrupts to the process that started this one, and end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    begin_apart()
     threading.Thread(target=_end_with, args=(reader,), daemon=True).start()
 
 

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from ..stopping import begin_apart, postponed
+
 __all__ = ["Apart", "EndedError"]
 
 PRELOADED = ["sfetcas.tradeoff.measuring"]
@@ -47,20 +49,24 @@ class Apart:
         """
         here, there = self._context.Pipe(duplex=False)
         process = self._context.Process(target=_work, args=(there, function, arguments), daemon=True)
-        process.start()
-        there.close()
         try:
+            with postponed():
+                process.start()
+                there.close()
             if not here.poll(longest):
                 raise EndedError(longest)
             return here.recv()
         except EOFError:
             raise EndedError(None) from None
         finally:
+            if process.pid is not None:
+                process.kill()
+                process.join()
+            # After that: nobody is there to write to what is closed.
             here.close()
-            process.kill()
-            process.join()
 
 
 def _work(there: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    begin_apart()
     there.send(function(*arguments))
     there.close()

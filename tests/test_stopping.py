@@ -1,0 +1,115 @@
+"""SIGTERM and Ctrl-C: a sentence, the usual exit code, and nothing left behind, whenever they come."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from sfetcas import cli, stopping
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+SIGNALS = {signal.SIGTERM: 143, signal.SIGINT: 130}
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs the signals of POSIX")
+
+
+def started(folder, *words, before=""):
+    """The command line as a process that says when it is where ``before`` puts a word on its standard error."""
+    (folder / "tmp").mkdir(exist_ok=True)
+    environment = {**os.environ, "TMPDIR": str(folder / "tmp"), "SFETCAS_CACHE": str(folder / "cache")}
+    code = f"import sys, os, signal\nsys.argv = ['sfetcas', *{words!r}]\nsay = lambda: os.write(2, b'here\\n')\n"
+    code += f"signal.signal(signal.SIGINT, signal.default_int_handler)\n{before}\n"
+    code += "from sfetcas.cli import main\nsys.exit(main())"
+    return subprocess.Popen(
+        [sys.executable, "-c", code], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def ended(process, *numbers):
+    """Exit code and what was said, after signals at the word."""
+    assert process.stderr.readline() == b"here\n"
+    for number in numbers:
+        process.send_signal(number)
+    _, error = process.communicate(timeout=60)
+    return process.returncode, error.decode()
+
+
+WHILE_IMPORTING = """
+import importlib.abc
+class Say(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "casadi":
+            say()
+            import time
+            time.sleep(60)
+sys.meta_path.insert(0, Say())
+"""
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_while_it_imports(number, tmp_path):
+    process = started(tmp_path, "run", str(PROBLEMS / "bend_45_degrees.toml"), before=WHILE_IMPORTING)
+    assert ended(process, number, number) == (SIGNALS[number], f"{stopping.SENTENCE}\n")
+
+
+WHILE_COMPILING = """
+from sfetcas.mathematics import kernels
+import subprocess, time
+def slow(command, **options):
+    open(command[command.index("-o") + 1], "wb").write(b"half")
+    say()
+    time.sleep(60)
+kernels.subprocess.run = slow
+os.environ["SFETCAS_KERNELS"] = "compiled"
+"""
+WHILE_WRITING = """
+from sfetcas import outputs
+import time
+def slow(answer, path):
+    path.write_text("half")
+    say()
+    time.sleep(60)
+outputs._json = lambda path, scene: slow
+"""
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("before", [WHILE_COMPILING, WHILE_WRITING], ids=["compiling", "writing"])
+def test_nothing_is_left(number, before, tmp_path):
+    # Whoever ends a group of processes sends it twice to some: the second one disturbs nothing.
+    twice = [number] * (2 if number == signal.SIGTERM else 1)
+    process = started(tmp_path, "run", str(PROBLEMS / "bend_45_degrees.toml"), "--json", "out.json", before=before)
+    assert ended(process, *twice) == (SIGNALS[number], f"{stopping.SENTENCE}\n")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_sweep_ends_with_all_its_processes(tmp_path):
+    before = "from sfetcas.sweeps import feeding\ntake = feeding._Feeding._take\n"
+    before += "def told(self, future):\n    take(self, future)\n    say()\nfeeding._Feeding._take = told\n"
+    words = ["sweep", str(PROBLEMS / "bend_45_degrees.toml"), "--vary", "factor=0.1:1:4000", "--workers", "2"]
+    process = started(tmp_path, *words, "--out", "out.csv", before=before)
+    # Its pipes are closed when the last of them has ended.
+    code, error = ended(process, signal.SIGTERM)
+    assert code == 143
+    assert error.replace("here\n", "") == "sfetcas: interrupted: what was solved before is kept\n"
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 4001
+    assert not list((tmp_path / "tmp").iterdir())
+
+
+def test_within_another_program_signals_are_left_alone():
+    before = [signal.getsignal(number) for number in SIGNALS]
+    code = "import signal, sfetcas; print(signal.getsignal(signal.SIGTERM) == signal.SIG_DFL)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "True\n"
+    assert cli.main(["info", str(PROBLEMS / "bend_45_degrees.toml")]) == 0
+    assert [signal.getsignal(number) for number in SIGNALS] == before
+    # Only the main thread may have a say in them.
+    codes = []
+    thread = threading.Thread(target=lambda: codes.append(cli.main(["info", "absent.toml"])))
+    thread.start()
+    thread.join()
+    assert codes == [2]
