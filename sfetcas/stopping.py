@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-__all__ = ["INTERRUPTED", "SENTENCE", "begin_apart", "heard", "leave_at_once", "postponed"]
+__all__ = ["INTERRUPTED", "SENTENCE", "heard", "leave_at_once"]
 
 INTERRUPTED = 128 + signal.SIGINT
 """Exit code after Ctrl-C."""
@@ -60,29 +60,6 @@ def heard() -> Iterator[Callable[[int], int]]:
     finally:
         # The command ends now: a second signal adds nothing.
         signal.signal(signal.SIGTERM, signal.SIG_IGN if signals and _is_command() else before)
-
-
-SIGNALS = {signal.SIGINT, signal.SIGTERM}
-
-
-@contextlib.contextmanager
-def postponed() -> Iterator[None]:
-    """Within this signals wait: a process is started whole, or not at all."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def begin_apart() -> None:
-    """In a process that another one started: interrupts are for that one to see, and what was postponed there ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
 
 
 def _is_command() -> bool:

@@ -58,6 +58,9 @@ LARGEST = 100_000_000
 RULER = 0
 """Who may do anything on a machine, by number."""
 
+COUNTED = 128
+"""Functions whose instructions are remembered, and which live as long: those of a model and its kinds of parts."""
+
 LOADED = 256
 """Libraries that are kept at hand, some for each kind of element; one that is not is read again."""
 
@@ -155,7 +158,7 @@ def _compile(function: ca.Function, place: Path) -> bool:
     return True
 
 
-@functools.cache
+@functools.lru_cache(maxsize=COUNTED)
 def _instructions(function: ca.Function) -> tuple[float, float]:
     """Instructions that a call runs, and that the source has; those of a short function are run twice as fast."""
     if function.is_a("Map"):

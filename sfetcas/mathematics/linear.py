@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from .arrays import Array
+from .keeping import kept
 from .kernels import Batch
 
 __all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "pattern", "smallest"]
@@ -214,7 +215,7 @@ class _Factors:
             raise np.linalg.LinAlgError("singular matrix") from None
         return x
 
-    @functools.lru_cache(maxsize=4)  # noqa: B019 - lives as long as the solver
+    @kept(4)
     def _batch(self, columns: int) -> Batch:
         """The solution as a function, which takes and gives arrays without copies."""
         entries, b = ca.MX.sym("entries", self._sparsity.nnz()), ca.MX.sym("b", self._sparsity.size1(), columns)

@@ -15,6 +15,7 @@ import numpy as np
 from ..description.obstacles import obstacle
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array
+from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .contact_joints import OnPlane, OnRound
@@ -23,6 +24,10 @@ from .loading import Loading
 from .mesh import Touch
 
 __all__ = ["Fields", "rotations_along", "transferred"]
+
+
+MEMBERS = 64
+"""Members of which something is kept at hand: reports ask of one after the other."""
 
 
 class Fields:
@@ -424,7 +429,7 @@ class Fields:
         beyond = np.einsum("j,eja->ea", element.to_points[:, 0], spread) / element.weights[0]
         return -self._pull[part][:, 0] - beyond + spread.sum(axis=1)
 
-    @functools.cache  # noqa: B019 - lives as long as the fields
+    @kept(MEMBERS)
     def _element_starts(self, member: str) -> Array:
         """Displacement at the start of each element of a member (and its end)."""
         model = self.model
@@ -433,7 +438,7 @@ class Fields:
         steps = (self.turned[part] - model.beams.tangent[part]).sum(axis=1)
         return np.asarray(first + np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)]))
 
-    @functools.cache  # noqa: B019 - lives as long as the fields
+    @kept(MEMBERS)
     def _element_moments(self, member: str) -> Array:
         """Moment at the start of each element of a member (and its end)."""
         model = self.model

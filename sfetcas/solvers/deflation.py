@@ -10,13 +10,13 @@ Source: Farrell, Birkisson and Funke 2015, SIAM J. Sci. Comput. 37, A2026 (shift
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 
 import numpy as np
 
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
+from ..mathematics.keeping import kept
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
@@ -98,7 +98,7 @@ def _rotation_vectors(model: Model, here: State, there: State) -> Array:
     return np.asarray(vectors)
 
 
-@functools.lru_cache(maxsize=16)
+@kept(1)
 def unheld(model: Model) -> tuple[Index, ...]:
     """Rotations that hang together and of which none is held."""
     turns = model.rotations.turns

@@ -13,6 +13,7 @@ from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
+from ..mathematics.keeping import kept
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
@@ -102,7 +103,7 @@ class Prepared:
     def _ipopt(self, scale: float) -> Callable[..., NLPResult]:
         return self._solvers(10.0 ** round(np.log10(scale)))
 
-    @functools.lru_cache(maxsize=8)  # noqa: B019 - lives as long as the model
+    @kept(8)
     def _solvers(self, scale: float) -> Callable[..., NLPResult]:
         return Ipopt(objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
 

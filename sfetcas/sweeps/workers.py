@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
 from ..errors import SceneError
-from ..stopping import begin_apart, postponed
+from ..processes import begin_apart, postponed
 
 __all__ = ["Workers", "cores"]
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..stopping import begin_apart, postponed
+from ..processes import begin_apart, postponed
 
 __all__ = ["Apart", "EndedError"]
 
