@@ -106,7 +106,7 @@ def _private(folder: Path) -> bool:
         why = "it belongs to somebody else" if foreign else "others may write to it"
         told = f"{folder}: no kernels are taken from this folder or compiled, which costs time only, as {why}"
         warnings.warn(
-            f"{told}; accepted: a folder of your own of mode 700, or another one as SFETCAS_CACHE", stacklevel=2
+            f"{told}; accepted: a folder of your own of mode 700, or another one as SFETCAS_CACHE", stacklevel=1
         )
         return False
     return True
