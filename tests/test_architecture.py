@@ -81,6 +81,7 @@ ORDER = [
     "solvers.newton",
     "solvers.doctor",
     "solvers.guess",
+    "solvers.sides",
     "solvers.stability",
     "solvers.divergence",
     "solvers.downhill",
@@ -227,6 +228,7 @@ ORDER = [
     "benchmarks.extremes",
     "benchmarks.many",
     "benchmarks.random_run",
+    "benchmarks.jitter",
     "benchmark",
     "reports",
     "outputs",
@@ -248,6 +250,7 @@ PROGRAMS = (
     "benchmarks.extremes",
     "benchmarks.many",
     "benchmarks.random_run",
+    "benchmarks.jitter",
 )
 """What is run and not imported: only these print."""
 

@@ -26,7 +26,7 @@ from ..errors import SceneError, SolveError
 from .random_checks import VARIANTS, compared, variant, wrong
 from .random_scenes import random_scene
 
-__all__ = ["Outcome", "random_run", "random_scenes"]
+__all__ = ["Outcome", "Worker", "random_run", "random_scenes"]
 
 START = 60.0
 """Seconds that a new process may take to import."""
@@ -84,7 +84,7 @@ def _asked(seed: int, name: str) -> str:
     return compared(answer.last, variant(name, scene, answer.last, seed))
 
 
-class _Worker:
+class Worker:
     """A process that solves one thing at a time and is killed when that takes too long."""
 
     def __init__(self, seconds: float) -> None:
@@ -116,7 +116,7 @@ class _Worker:
         self.pool.shutdown()
 
 
-def _outcomes(worker: _Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
+def _outcomes(worker: Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
     for seed in seeds:
         found, failed = worker.ask(_first, seed)
         if found is None:
@@ -134,7 +134,7 @@ def _outcomes(worker: _Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
 
 def random_run(seeds: Sequence[int], seconds: float = 30.0, processes: int = 1) -> Iterator[Outcome]:
     """What became of the scenes of these seeds, each solve in no more than so many seconds."""
-    lanes = [_Worker(seconds) for _ in range(processes)]
+    lanes = [Worker(seconds) for _ in range(processes)]
     try:
         with ThreadPoolExecutor(processes) as threads:
             rounds = [seeds[i : i + processes] for i in range(0, len(seeds), processes)]

@@ -64,7 +64,7 @@ BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
 UNBALANCED = 0.01
-"""Share of the loads that is out of balance without redundant multipliers: these carry it on next to nothing."""
+"""Share of what acts that is out of balance without redundant multipliers: these carry it on next to nothing."""
 
 CARRIED = 1e-6
 """The same of multipliers that are large: rounding of what hardly acts is far less."""
@@ -352,9 +352,13 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     residual = relative_residual(equations, point)
     most = CARRIED if largest > LARGE else UNBALANCED
     which = "the smallest are given"
-    if residual <= SOLVED:
+    # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
+    acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
+    carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
+    needed = carried > most * acting.max(initial=0.0) and carried > np.abs(left).max(initial=0.0)
+    if residual <= SOLVED and not needed:
         corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > most * loads > 0.0:
+    elif largest > BEYOND or needed:
         raise _stretched(equations, loose, corrected)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
