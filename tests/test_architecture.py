@@ -227,6 +227,7 @@ ORDER = [
     "benchmarks.derivatives",
     "benchmarks.extremes",
     "benchmarks.many",
+    "benchmarks.worker",
     "benchmarks.random_run",
     "benchmarks.jitter",
     "benchmark",

@@ -27,8 +27,8 @@ from ..equilibria.solution import Equilibrium, Solution
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..paths.path import Path
-from .random_run import Worker
 from .random_scenes import random_scene, reordered, transformed
+from .worker import Worker
 
 __all__ = ["Jittered", "differences", "jitter", "jittered"]
 

@@ -8,28 +8,21 @@ from __future__ import annotations
 
 import argparse
 import functools
-import multiprocessing
-import os
-import signal
 import statistics
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, TimeoutError
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any
 
 from ..equilibria.solution import Solution
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
 from .random_checks import VARIANTS, compared, variant, wrong
 from .random_scenes import random_scene
+from .worker import Worker
 
-__all__ = ["Outcome", "Worker", "random_run", "random_scenes"]
-
-START = 60.0
-"""Seconds that a new process may take to import."""
+__all__ = ["Outcome", "random_run", "random_scenes"]
 
 
 @dataclass
@@ -82,38 +75,6 @@ def _asked(seed: int, name: str) -> str:
     if answer is None or (name == "space" and scene.resolved_dimension == "space"):
         return ""
     return compared(answer.last, variant(name, scene, answer.last, seed))
-
-
-class Worker:
-    """A process that solves one thing at a time and is killed when that takes too long."""
-
-    def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
-        self._begin()
-
-    def _begin(self) -> None:
-        self.pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
-        self.process = self.pool.submit(os.getpid).result(START)
-
-    def ask(self, function: Any, *arguments: Any) -> tuple[Any, str]:
-        """What a function gives, or nothing and what happened instead."""
-        future: Future[Any] = self.pool.submit(function, *arguments)
-        try:
-            error = future.exception(self.seconds)
-        except TimeoutError:
-            os.kill(self.process, signal.SIGTERM)
-            self.close()
-            self._begin()
-            return None, "too slow"
-        if isinstance(error, BrokenProcessPool):
-            self._begin()
-            return None, "CRASH"
-        # Whatever else was raised is a mistake of the library, and this tells where.
-        return (future.result(), "") if error is None else (None, f"ERROR {type(error).__name__}: {error}")
-
-    def close(self) -> None:
-        """End the process."""
-        self.pool.shutdown()
 
 
 def _outcomes(worker: Worker, seeds: Sequence[int]) -> Iterator[Outcome]:

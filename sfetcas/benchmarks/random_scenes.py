@@ -449,7 +449,8 @@ def transformed(
     length, force, time : new units of the old ones; left out, that of time leaves accelerations as they are
     """
     turn = np.eye(3) if turn is None else np.asarray(turn)
-    table, lines = copy.deepcopy(table), Scene.from_dict(table).center_lines
+    table, scene = copy.deepcopy(table), Scene.from_dict(table)
+    lines = scene.center_lines
     space = table.get("dimension") == "space"
     units = np.array([force, length, np.sqrt(length) if time is None else time])
 
@@ -520,7 +521,7 @@ def transformed(
             motion["displacement"] = vector(motion["displacement"], length)
         if "rotation" in motion and not np.isscalar(motion["rotation"]):
             motion["rotation"] = vector(motion["rotation"])
-        elif "rotation" in motion and space and "between" not in motion:
+        elif "rotation" in motion and space and scene.nodes[motion["node"]].turn == "fixed":
             motion["rotation"] = vector([0.0, 0.0, motion["rotation"]])
     for key, powers in (("gravity", (0, 1, -2)), ("rotating", (0, 0, -1))):
         if key in table:
