@@ -178,8 +178,12 @@ def _equilibrium(told: _Told, name: str, step: Equilibrium, how: Jittered, size:
 
 
 def said(notes: Sequence[str]) -> tuple[str, ...]:
-    """The words of notes, in an order of their own: numbers, axes and the order of names left out."""
-    return tuple(sorted({" ".join(sorted(set(re.split(r"[\s,;:]+", NUMBER.sub("#", note))))) for note in notes}))
+    """The words of notes, in an order of their own: numbers, axes and the order of names left out.
+
+    A joint of several members is called by the first of them in the file: of redundant rows no names are compared.
+    """
+    kept = [NUMBER.sub("#", note.partition("redundant:")[0]) for note in notes]
+    return tuple(sorted({" ".join(sorted(set(re.split(r"[\s,;:]+", note)))) for note in kept}))
 
 
 def differences(scene: Scene, change: Jittered, answer: Answer | str | None = None) -> list[str]:
