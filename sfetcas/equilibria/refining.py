@@ -21,6 +21,7 @@ from ..solvers.newton import Corrected, loose_rows, relative_residual, rows_in
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
 from .meshing import Found
+from .mirrors import has_twin
 from .piloting import KEPT, Piloting
 from .single import finished, unjudged
 from .solution import Equilibrium
@@ -77,6 +78,16 @@ LARGE = 1e3
 
 GROWING = 0.01
 """Share by which closing them would change rows that nearly vanish, from which on it makes them vanish."""
+
+
+ESCAPED = "along its escape shape"
+"""What notes say of unstable states that were left."""
+
+TWIN = (
+    "its mirror image is an equilibrium as well; which of the two is a rule: the escape shape turns the first ends of "
+    "members towards +z, in space +b3, the first names in the alphabet most"
+)
+"""What is said where the energy does not tell one side from the other."""
 
 
 class Refining(Piloting):
@@ -206,6 +217,8 @@ class Refining(Piloting):
             found = replace(found, corrected=corrected, stability=stability, notes=(*found.notes, note))
             # The error was that of the state that was left.
             error = sum(self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor))
+        if any(ESCAPED in note for note in found.notes) and has_twin(prepared, found.corrected, loading):
+            found = replace(found, notes=(*found.notes, TWIN))
         return finished(
             prepared,
             found.corrected,
