@@ -85,6 +85,7 @@ ORDER = [
     "solvers.newton",
     "solvers.doctor",
     "solvers.guess",
+    "solvers.sides",
     "solvers.stability",
     "solvers.divergence",
     "solvers.downhill",
@@ -230,7 +231,9 @@ ORDER = [
     "benchmarks.derivatives",
     "benchmarks.extremes",
     "benchmarks.many",
+    "benchmarks.worker",
     "benchmarks.random_run",
+    "benchmarks.jitter",
     "benchmark",
     "reports",
     "outputs",
@@ -252,6 +255,7 @@ PROGRAMS = (
     "benchmarks.extremes",
     "benchmarks.many",
     "benchmarks.random_run",
+    "benchmarks.jitter",
 )
 """What is run and not imported: only these print."""
 

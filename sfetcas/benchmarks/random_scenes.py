@@ -403,8 +403,31 @@ def _reach(tangent: Array, b2: Array, kappas: Table) -> Array:
 
 # Other units, other axes, another order
 
-SECTION = {"EI2": (1, 2), "EI3": (1, 2), "GJ": (1, 2), "rhoA": (1, -1)}
-"""Units of a section: powers of force and length; accelerations are left as they are."""
+UNITS: dict[str, dict[str, tuple[int, int, int]]] = {
+    "sections": dict.fromkeys(("EI2", "EI3", "GJ"), (1, 2, 0))
+    | {"rhoA": (1, -2, 2), "rhoI": (1, 0, 2), "damping": (0, 0, 1), "drag": (1, -2, 1), "rho": (1, -4, 2)}
+    | dict.fromkeys(("E", "G"), (1, -2, 0))
+    | dict.fromkeys(("width", "height", "radius", "outer", "inner"), (0, 1, 0)),
+    "nodes": {"mass": (1, -1, 2), "inertia": (1, 1, 2), "drag": (1, -1, 1)},
+    "shape": dict.fromkeys(("radius", "pitch", "length"), (0, 1, 0))
+    | dict.fromkeys(("kappa2", "kappa3", "twist"), (0, -1, 0)),
+    "rotational": {"stiffness": (1, 1, 0), "damping": (1, 1, 1)},
+    "translational": {"stiffness": (1, -1, 0), "damping": (1, -1, 1)}
+    | dict.fromkeys(("rest", "length", "stop"), (0, 1, 0)),
+    "contacts": {"radius": (0, 1, 0)},
+    "histories": {"t": (0, 0, 1)},
+    "analysis": dict.fromkeys(("end", "output", "step"), (0, 0, 1)),
+}
+"""Units of what the keys of a scene give as numbers: powers of force, length and time; others have none."""
+
+VALUES = {"force": (1, 0, 0), "moment": (1, 1, 0), "distributed": (1, -1, 0)}
+"""The same of loads by their type."""
+
+POINTS = ("position", "start", "anchor", "point", "center")
+"""Keys of places."""
+
+DIRECTIONS = ("axis", "axis2", "direction", "normal", "side", "b2")
+"""Keys of vectors without a unit; of shapes ``start`` is one, too."""
 
 
 def transformed(
@@ -413,78 +436,104 @@ def transformed(
     shift: Sequence[float] = (0.0, 0.0, 0.0),
     length: float = 1.0,
     force: float = 1.0,
+    time: float | None = None,
 ) -> Table:
-    """A table of :func:`random_scene` turned by a rotation matrix, moved, in other units of length and force.
+    """A scene turned by a rotation matrix, moved, in other units of length, force and time.
 
     Parameters
     ----------
     table : dict
-        As ``Scene.to_dict`` gives it, of the shapes that are drawn.
+        As ``Scene.to_dict`` gives it, without what analyses are told by name.
     turn : (3, 3), optional
     shift : (3,), in the old unit of length
-    length, force : new units of the old ones
+    length, force, time : new units of the old ones; left out, that of time leaves accelerations as they are
     """
     turn = np.eye(3) if turn is None else np.asarray(turn)
-    table, lines = copy.deepcopy(table), Scene.from_dict(table).center_lines
+    table, scene = copy.deepcopy(table), Scene.from_dict(table)
+    lines = scene.center_lines
     space = table.get("dimension") == "space"
+    units = np.array([force, length, np.sqrt(length) if time is None else time])
 
-    def vector(value: Any, unit: float = 1.0) -> Any:
-        return (unit * turn @ value).tolist()
+    def unit(powers: tuple[int, int, int]) -> float:
+        return float(np.prod(units**powers))
+
+    def vector(value: Any, factor: float = 1.0) -> Any:
+        return (factor * turn @ value).tolist()
 
     def point(value: Any) -> Any:
         return (length * (turn @ value + shift)).tolist()
 
-    for section in table["sections"].values():
-        for key, (forces, lengths) in SECTION.items():
-            if key in section:
-                section[key] = _times(section[key], force**forces * length**lengths)
+    def measured(entry: Table, kind: str) -> None:
+        entry |= {key: _times(entry[key], unit(powers)) for key, powers in UNITS[kind].items() if key in entry}
+
+    def placed(entry: Table) -> None:
+        entry |= {key: point(entry[key]) for key in POINTS if key in entry}
+        # The side of what is round is a word.
+        entry |= {key: vector(entry[key]) for key in DIRECTIONS if not isinstance(entry.get(key, ""), str)}
+
+    for kind in ("sections", "nodes", "contacts", "histories"):
+        for entry in table.get(kind, {}).values():
+            if kind != "histories" or table.get("analysis", {}).get("type") == "dynamic":
+                measured(entry, kind)
+    measured(table.get("analysis", {}), "analysis")
     for node in table["nodes"].values():
-        node["position"] = point(node["position"])
         if "axis" not in node and "hinge" in (node.get("support"), node.get("rotation"), node.get("joint")):
             node["axis"] = [0.0, 0.0, 1.0]
-        node |= {key: vector(node[key]) for key in ("axis", "axis2", "direction") if key in node}
+        placed(node)
+        node |= {"velocity": vector(node["velocity"], unit((0, 1, -1)))} if "velocity" in node else {}
+        # About the fixed axes: right where the turn takes these to each other.
+        node |= {"inertia": (np.abs(turn) @ node["inertia"]).tolist()} if "inertia" in node else {}
+    for contact in table.get("contacts", {}).values():
+        if contact["type"] == "cylinder":
+            contact.setdefault("axis", [0.0, 0.0, 1.0])
+        placed(contact)
     for name, member in table["members"].items():
         member["b2"] = vector(matrix(lines[name].quaternions([0.0]))[0][:, 1])
-        _transform_shape(member.get("shape", {}), vector, point, length)
+        shape = member.get("shape", {})
+        measured(shape, "shape")
+        # What is a place of a node is a direction here.
+        start = {"start": vector(shape.pop("start"))} if "start" in shape else {}
+        placed(shape)
+        shape |= start
+        if shape.get("type") == "arc":
+            shape.setdefault("normal", vector([0.0, 0.0, 1.0]))
+        if "points" in shape:
+            shape["points"] = [point(place) for place in shape["points"]]
+        for key, powers in (("stiffness", (1, -1, 0)), ("mass", (1, -1, 2))):
+            if key in member:
+                sides = np.tile(np.repeat([1.0, length], 3), len(member[key]) // 6)
+                member[key] = (unit(powers) * np.outer(sides, sides) * member[key]).tolist()
+        if "spin" in member:
+            spin = member["spin"]
+            fixed = isinstance(spin, (list, tuple))
+            member["spin"] = vector(spin, 1.0 / units[2]) if fixed else _times(spin, 1.0 / units[2])
     for spring in table.get("springs", {}).values():
-        spring["stiffness"] *= force * (1.0 / length if spring["type"] == "translational" else length)
-        spring |= {key: vector(spring[key]) for key in ("axis", "direction") if key in spring}
-        spring |= {"anchor": point(spring["anchor"])} if "anchor" in spring else {}
-        keys = ("rest", "length") if spring["type"] == "translational" else ()
-        spring |= {key: length * spring[key] for key in keys if key in spring}
+        # What turns has a rest and a stop in rad.
+        measured(spring, spring["type"])
+        placed(spring)
     for load in table.get("loads", {}).values():
-        unit = force * {"force": 1.0, "moment": length, "distributed": 1.0 / length}[load["type"]]
+        factor = unit(VALUES[load["type"]])
         value = [0.0, 0.0, load["value"]] if np.isscalar(load["value"]) else load["value"]
-        load["value"] = (unit * np.array(value)).tolist() if load.get("frame") == "section" else vector(value, unit)
+        own = load.get("frame") == "section"
+        load["value"] = (factor * np.array(value)).tolist() if own else vector(value, factor)
     for motion in table.get("motions", {}).values():
         if "displacement" in motion:
             motion["displacement"] = vector(motion["displacement"], length)
         if "rotation" in motion and not np.isscalar(motion["rotation"]):
             motion["rotation"] = vector(motion["rotation"])
-        elif "rotation" in motion and space and "between" not in motion:
+        elif "rotation" in motion and space and scene.nodes[motion["node"]].turn == "fixed":
             motion["rotation"] = vector([0.0, 0.0, motion["rotation"]])
-    if "gravity" in table:
-        table["gravity"] = vector(table["gravity"])
+    for key, powers in (("gravity", (0, 1, -2)), ("rotating", (0, 0, -1))):
+        if key in table:
+            table[key] = vector(table[key], unit(powers))
     return table
-
-
-def _transform_shape(shape: Table, vector: Any, point: Any, length: float) -> None:
-    shape |= {key: vector(shape[key]) for key in ("normal", "axis", "start") if key in shape}
-    shape |= {key: length * shape[key] for key in ("radius", "pitch", "length") if key in shape}
-    shape |= {key: _times(shape[key], 1.0 / length) for key in ("kappa2", "kappa3", "twist") if key in shape}
-    if shape.get("type") == "arc":
-        shape.setdefault("normal", vector([0.0, 0.0, 1.0]))
-    if "center" in shape:
-        shape["center"] = point(shape["center"])
-    if "points" in shape:
-        shape["points"] = [point(place) for place in shape["points"]]
 
 
 def _times(value: Any, unit: float) -> Any:
     """A number, numbers, or a table or polynomial of them."""
     if isinstance(value, dict):
         return {key: entry if key == "at" else _times(entry, unit) for key, entry in value.items()}
-    return [unit * entry for entry in value] if isinstance(value, (list, tuple)) else unit * value
+    return [_times(entry, unit) for entry in value] if isinstance(value, (list, tuple)) else unit * value
 
 
 def reordered(table: Table, seed: int = 0) -> Table:
@@ -494,7 +543,7 @@ def reordered(table: Table, seed: int = 0) -> Table:
     """
     rng, table = np.random.default_rng(seed), copy.deepcopy(table)
     kept = any(node.get("joint") == "universal" for node in table["nodes"].values())
-    for key in ("nodes", "springs", "loads", "motions", "members"):
+    for key in ("nodes", "springs", "loads", "motions", "contacts", "members"):
         if key not in table or (kept and key == "members"):
             continue
         entries = list(table[key].items())

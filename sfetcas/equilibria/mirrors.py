@@ -15,10 +15,19 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.fields import rotations_along
+from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
+from ..solvers.newton import Corrected
+from ..solvers.prepared import Prepared
 
-__all__ = ["Mirror", "mirrored", "mirrors"]
+__all__ = ["Mirror", "has_twin", "mirrored", "mirrors"]
+
+APART, STAYS = 1e-2, 1e-3
+"""Rotations, rad, by which a mirror image differs from its state, and by which it may miss what is in balance."""
+
+LEVEL = 1e-9
+"""Difference of the energies of twins, relative: a load that bends by more than this is no symmetry."""
 
 SAME = 1e-6
 """Places of a centre line and of an image that are nearer than this, relative to the scene, are the same."""
@@ -62,6 +71,19 @@ def mirrors(model: Model) -> tuple[Mirror, ...]:
             if images is not None:
                 found.append(Mirror(matrix, images))
     return tuple(found)
+
+
+def has_twin(prepared: Prepared, found: Corrected, loading: Loading) -> bool:
+    """Whether a mirror image of an equilibrium, another state, is an equilibrium of the same energy."""
+    for mirror in mirrors(prepared.model):
+        image = prepared.equations.holding(mirrored(prepared.model, found.state, mirror), loading)
+        if prepared.distance(image, found.state) < APART:
+            continue
+        there = prepared.correct(image, loading)
+        level = abs(there.point.potential - found.point.potential) <= LEVEL * abs(found.point.potential)
+        if there.converged and level and prepared.distance(there.state, image) < STAYS:
+            return True
+    return False
 
 
 def _images(places: dict[str, Array], middle: Array, matrix: Array, near: float) -> dict[str, tuple[str, bool]] | None:

@@ -21,6 +21,7 @@ from ..solvers.newton import Corrected, loose_rows, relative_residual, rows_in
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.stability import Stability
 from .meshing import Found
+from .mirrors import has_twin
 from .piloting import KEPT, Piloting
 from .single import finished, unjudged
 from .solution import Equilibrium
@@ -64,7 +65,7 @@ BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
 UNBALANCED = 0.01
-"""Share of the loads that is out of balance without redundant multipliers: these carry it on next to nothing."""
+"""Share of what acts that is out of balance without redundant multipliers: these carry it on next to nothing."""
 
 CARRIED = 1e-6
 """The same of multipliers that are large: rounding of what hardly acts is far less."""
@@ -77,6 +78,16 @@ LARGE = 1e3
 
 GROWING = 0.01
 """Share by which closing them would change rows that nearly vanish, from which on it makes them vanish."""
+
+
+ESCAPED = "along its escape shape"
+"""What notes say of unstable states that were left."""
+
+TWIN = (
+    "its mirror image is an equilibrium as well; which of the two is a rule: the escape shape turns the first ends of "
+    "members towards +z, in space +b3, the first names in the alphabet most"
+)
+"""What is said where the energy does not tell one side from the other."""
 
 
 class Refining(Piloting):
@@ -206,6 +217,8 @@ class Refining(Piloting):
             found = replace(found, corrected=corrected, stability=stability, notes=(*found.notes, note))
             # The error was that of the state that was left.
             error = sum(self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor))
+        if any(ESCAPED in note for note in found.notes) and has_twin(prepared, found.corrected, loading):
+            found = replace(found, notes=(*found.notes, TWIN))
         return finished(
             prepared,
             found.corrected,
@@ -352,9 +365,13 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     residual = relative_residual(equations, point)
     most = CARRIED if largest > LARGE else UNBALANCED
     which = "the smallest are given"
-    if residual <= SOLVED:
+    # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
+    acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
+    carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
+    needed = carried > most * acting.max(initial=0.0) and carried > np.abs(left).max(initial=0.0)
+    if residual <= SOLVED and not needed:
         corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif largest > BEYOND or np.abs(point.residual[: equations.unknowns]).max() > most * loads > 0.0:
+    elif largest > BEYOND or needed:
         raise _stretched(equations, loose, corrected)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.

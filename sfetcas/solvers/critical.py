@@ -15,6 +15,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from .arclength import Curve, Standing, Tangent
+from .sides import Sides
 
 __all__ = ["Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
@@ -230,7 +231,7 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 
 
 def shapes_at(curve: Curve, event: Event) -> Array:
-    """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest entry 1.
+    """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest size 1.
 
     Of several, the first is the one with most rotation about z, then about y: so that meshes agree.
     """
@@ -243,8 +244,7 @@ def shapes_at(curve: Curve, event: Event) -> Array:
             liking[number[number[:, axis] >= 0, axis]] = float(axis)
         weight = curve.prepared.weight
         chosen = chosen @ np.linalg.eigh(chosen.T @ ((weight * liking)[:, None] * chosen))[1][:, ::-1]
-    peaks = np.abs(chosen).max(axis=0)
-    # The sign is that of the first entry that counts: the largest may be one of two that differ by rounding.
-    first = (np.abs(chosen) > 0.3 * peaks).argmax(axis=0)
-    signs = np.sign(chosen[first, np.arange(chosen.shape[1])])
-    return np.asarray(chosen * (signs / peaks))
+    sides, weight = Sides(curve.equations), curve.prepared.weight
+    sizes = np.sqrt((weight[:, None] * chosen**2).sum(axis=0))
+    faced = [sides.taken(shape[:, None], weight) for shape in (chosen / sizes).T]
+    return np.column_stack([shape / np.abs(shape).max() for shape in faced])

@@ -20,6 +20,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point
+from .sides import Sides, alike
 from .stability import LIGHT, NEUTRAL, RANK, ROUNDING, Inertia, Stability
 
 __all__ = ["TangentTest"]
@@ -45,6 +46,7 @@ class TangentTest:
         n = equations.unknowns
         softest = float(weight.max(initial=1.0) / equations.mass.max(initial=1.0))
         self._root = np.sqrt(np.concatenate([weight, np.full(n - len(weight), LIGHT * softest)]))
+        self._sides = Sides(equations)
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
@@ -114,7 +116,7 @@ class TangentTest:
         if not negative:
             return Stability("not defined", 0, 0.0, np.zeros(turning), nothing)
         lowest = int(np.argmin(values.real))
-        shape = vectors[:, lowest] / self._root
+        shape = self._sides.taken(vectors[:, [lowest]] / self._root[:, None], self._root**2)
         quotient = float(values[lowest].real) / self._size(shape)
         return Stability("not defined", negative, quotient, shape.real[:turning], shape.real[turning:])
 
@@ -139,9 +141,9 @@ class TangentTest:
         if not free:
             return Stability(True, 0, np.inf, np.zeros(turning), nothing)
         values, vectors = np.linalg.eigh(tangent)
-        shape = vectors[:, 0] / self._root
+        shape = self._sides.taken(vectors[:, : alike(values)] / self._root[:, None], self._root**2)
         quotient = float(values[0]) / self._size(shape)
-        shape = shape / shape[np.argmax(np.abs(shape[:turning]))]
+        shape = shape / np.abs(shape[:turning]).max()
         negative = int((values < -limit).sum())
         stable: bool | str = False if negative else bool(values[0] > limit) or "neutral"
         return Stability(stable, negative, quotient, shape[:turning], shape[turning:])

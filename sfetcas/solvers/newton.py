@@ -283,8 +283,12 @@ TINY_SHARE = 1e-15
 
 
 def rows_in(loose: Array) -> list[int]:
-    """The rows that take part in combinations, columns of :func:`loose_rows`."""
-    return np.flatnonzero((np.abs(loose) > 0.1).any(axis=1)).tolist() if loose.size else []
+    """The rows that take part in combinations, columns of :func:`loose_rows`, whichever span their space."""
+    return np.flatnonzero(np.linalg.norm(loose, axis=1) > TAKES_PART).tolist() if loose.size else []
+
+
+TAKES_PART = 0.1
+"""Length of a row's part in all loose combinations, of 1: a row takes part in none of them by rounding, 1e-8."""
 
 
 SLACK = 1e-6

@@ -21,6 +21,7 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import InertiaSolver, pattern
 from ..mechanics.equations import Equations, Point
+from .sides import Sides, alike
 
 __all__ = ["LIGHT", "NEUTRAL", "RANK", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
 
@@ -60,7 +61,8 @@ class Stability:
     smallest : float
         Rayleigh quotient of the escape shape by the integral of its square, dimensionless.
     shape : ndarray
-        Escape shape: the turning unknowns of the smallest eigenvalue, largest entry 1.
+        Escape shape: the turning unknowns of the smallest eigenvalue, largest size 1, to the side that
+        :mod:`~sfetcas.solvers.sides` takes.
     travel : ndarray
         The displacements kept as unknowns in it.
     limit : float
@@ -150,21 +152,26 @@ class StabilityTest:
         entries = self._weighted(point)
         limit = self._limit(entries)
         if self._is_graded(limit):
-            values, vector, negative, limit = self._most_doubtful(point, entries)
+            values, vectors, negative, limit = self._most_doubtful(point, entries)
         else:
-            values, vector, negative = (self._dense if self._is_dense else self._sparse)(point, entries, limit)
+            values, vectors, negative = (self._dense if self._is_dense else self._sparse)(point, entries, limit)
         if not len(values):
             return Stability(True, 0, np.inf, np.zeros(turning), nothing)
         stable: bool | str = bool(values[0] > limit)
         if negative == 0 and not stable:
             stable = "neutral"
-        shape = vector / np.sqrt(self._weights)
-        quotient = float(values[0]) * float(vector @ vector) / float(shape @ (self._masses * shape))
+        shape = self.sides.taken(vectors / np.sqrt(self._weights)[:, None], self._weights)
+        quotient = float(values[0]) / float(shape @ (self._masses * shape))
         turned = shape[:turning] if np.abs(shape[:turning]).max(initial=0.0) > 0.0 else shape
-        shape = shape / turned[np.argmax(np.abs(turned))]
+        shape = shape / np.abs(turned).max()
         travel = nothing.copy()
         travel[equations.elastic_displacements - turning] = shape[turning:]
         return Stability(stable, negative, quotient, shape[:turning], travel, limit)
+
+    @functools.cached_property
+    def sides(self) -> Sides:
+        """Which shape of equal eigenvalues, and which sign of it."""
+        return Sides(self.equations)
 
     def negative(self, point: Point) -> int:
         """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
@@ -191,9 +198,9 @@ class StabilityTest:
         """Eigenvalues from that which is lowest beside its own limit, its vector, how many are below, that limit."""
         values, vectors, limits = self._mode_by_mode(point, entries)
         if not len(values):
-            return values, np.zeros(self._n), 0, NEUTRAL
+            return values, vectors, 0, NEUTRAL
         lowest = int(np.argmin(values / limits))
-        return values[lowest:], vectors[:, lowest], int((values < -limits).sum()), float(limits[lowest])
+        return values[lowest:], vectors[:, [lowest]], int((values < -limits).sum()), float(limits[lowest])
 
     def _mode_by_mode(self, point: Point, entries: Array) -> tuple[Array, Array, Array]:
         """All eigenvalues, rising, their vectors as columns, and the limit below which each is rounding.
@@ -285,18 +292,19 @@ class StabilityTest:
         projected, basis = self._projected(entries, self._rows(point))
         values, vectors = np.linalg.eigh(projected)
         if not len(values):
-            return values, np.zeros(self._n), 0
-        return values, basis @ vectors[:, 0], int((values < -limit).sum())
+            return values, basis, 0
+        return values, basis @ vectors[:, : alike(values)], int((values < -limit).sum())
 
     def _sparse(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
         negative = self._below(point, entries, -limit)
         shift = -limit
         while negative and self._below(point, entries, shift) > 0:
             shift *= 8.0 if shift < -0.1 else 1000.0
-        values, vector = self._subspace(point, entries, shift)
+        values, vectors = self._subspace(point, entries, shift)
+        vectors = vectors[:, : alike(values)]
         if negative == 0 and values[0] < -limit:
             values[0] = -limit
-        return values, vector, negative
+        return values, vectors, negative
 
     def _below(self, point: Point, entries: Array, shift: float) -> int:
         """Number of eigenvalues on the null space of the rows below the shift."""
@@ -382,12 +390,12 @@ class StabilityTest:
             new, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
             if abs(new[0] - smallest[0]) <= 1e-7 * max(abs(new[0]), abs(shift)):
-                return new, block[:, 0]
+                return new, block
             smallest = new
             if count >= 2:
                 # Each solve factorises anyway: a nearer shift is free and converges ten times as fast.
                 shift = new[0] - 0.1 * (new[-1] - new[0]) - 1e-3 * abs(new[0])
-        return smallest, block[:, 0]
+        return smallest, block
 
     def _solved(self, point: Point, shift: float, loads: Array) -> Array:
         """Solution of the shifted Newton matrix, whose redundant rows a negative diagonal keeps from being singular."""

@@ -238,9 +238,18 @@ class OptimalControl:
         return found
 
 
-EXTRA = {"mumps_pivot_order": 5, "mumps_pivtol": 1e-2}
+EXTRA = {
+    "mumps_pivot_order": 5,
+    "mumps_pivtol": 1e-2,
+    "perturb_always_cd": "yes",
+    "dual_inf_tol": 1e-6,
+}
 """Options of IPOPT (measured): nested dissection leaves half the fill of MUMPS' own choice on these chains, and larger
-pivots keep the signs right that IPOPT counts: 5 iterations in the place of 24."""
+pivots keep the signs right that IPOPT counts: 5 iterations in the place of 24.
+
+Rows that nearly depend on each other, as those of rest at the end of a straight arm in space, are always made slightly
+soft: otherwise rounding decides whether they are, and where they are not multipliers grow to 1e10, beside which IPOPT
+took slopes of 1e3 for none and a saddle for a solution."""
 
 FAR = 1e-2
 """Distance of a replay over the size of the scene beyond which an answer is told to be short of what was asked."""

@@ -1,0 +1,93 @@
+"""Which of the shapes that fit equally well, and which way along it: a rule of the scene, never rounding.
+
+An eigenvector has no sign, and of eigenvalues that are the same no single vector either.  What is taken is what of the
+space of shapes comes nearest to fields that the scene names: rotations about the ``b3`` of the sections at the first
+ends of members (about z in the plane), which die away along each member from its first node, and count less the later
+a member's name stands in the alphabet.  No symmetry of a structure keeps such a field.  Where next to nothing of the
+shapes is in it, fields that die away more slowly are asked, then those about ``b2`` and ``b1``.
+
+Neither the order of a scene file, nor axes or units, nor rounding change what is taken.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations
+from ..mechanics.rotations import Turn
+
+__all__ = ["Sides", "alike"]
+
+DECAYS = (2.0, 0.7, 4.0)
+"""How fast fields die away along a member, one after the other."""
+
+LEAST = 1e-3
+"""Share of a field that shapes have at least: symmetry leaves none of it, and rounding 1e-10."""
+
+ALIKE = 1e-6
+"""Eigenvalues that are nearer to the lowest than this, beside it and the softest member, have one space of shapes."""
+
+
+class Sides:
+    """The rule for one model."""
+
+    def __init__(self, equations: Equations) -> None:
+        self._equations = equations
+
+    @functools.cached_property
+    def fields(self) -> tuple[Array, ...]:
+        """The fields that are asked one after the other, (turning unknowns,)."""
+        equations, model = self._equations, self._equations.model
+        lines = model.scene.center_lines
+        about = np.flatnonzero(model.rotations.kind == Turn.AXIS) if model.space else np.zeros(0, dtype=np.intp)
+        found = []
+        for axis in (2, 1, 0) if model.space else (2,):
+            for decay in DECAYS:
+                vectors = np.zeros((len(model.rotations.kind), 3))
+                # The node of several members is turned by the first of them.
+                for place, name in reversed(list(enumerate(sorted(model.rotations.ends)))):
+                    ends = list(model.rotations.ends[name])
+                    chain = model.chain(name) if name in model.members else np.array(ends)
+                    along = model.along(name) if name in model.members else np.linspace(0.0, 1.0, len(ends))
+                    frame = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0]
+                    way = frame[:, axis] if model.space else np.array([0.0, 0.0, 1.0])
+                    vectors[chain] = np.exp(-decay * along)[:, None] * way / (1.0 + place)
+                values = vectors if model.space else vectors[:, 2:3]
+                if len(about):
+                    values = values.copy()
+                    values[about, 0] = (vectors[about] * model.rotations.axis[about]).sum(axis=1)
+                field = np.zeros(equations.turning_unknowns)
+                used = equations.number >= 0
+                field[equations.number[used]] = values[used]
+                found.append(field)
+        return tuple(found)
+
+    def taken(self, shapes: Array, metric: Array) -> Array:
+        """The shape (turning unknowns and more,) of a space of shapes (., n) that the rule takes.
+
+        Parameters
+        ----------
+        shapes : ndarray
+            Columns, orthonormal with the metric.
+        metric : ndarray
+            Weight of each entry.
+        """
+        turning = self._equations.turning_unknowns
+        for field in self.fields:
+            weighted = metric[:turning] * field
+            parts = weighted @ shapes[:turning]
+            if np.linalg.norm(parts) > LEAST * np.sqrt(float(weighted @ field)):
+                # A complex shape is turned until its part in the field is real.
+                return np.asarray(shapes @ (parts.conj() / np.linalg.norm(parts)))
+        shape = shapes[:, 0]
+        first = int(np.argmax(np.abs(shape) > 0.5 * np.abs(shape).max(initial=0.0))) if len(shape) else 0
+        return np.asarray(shape * np.sign(shape[first].real or 1.0)) if len(shape) else shape
+
+
+def alike(values: Array) -> int:
+    """How many of rising eigenvalues, in those of the softest member, are the lowest one."""
+    return int((values - values[0] <= ALIKE * max(1.0, abs(float(values[0])))).sum())
