@@ -78,6 +78,7 @@ ORDER = [
     "mechanics.fields",
     "mechanics.accuracy",
     "solvers",
+    "solvers.sharing",
     "solvers.newton",
     "solvers.doctor",
     "solvers.guess",
