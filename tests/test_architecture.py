@@ -111,6 +111,7 @@ ORDER = [
     "equilibria.solution",
     "equilibria.quantities",
     "equilibria.several",
+    "equilibria.scanning",
     "equilibria.single",
     "equilibria.settings",
     "equilibria.meshing",

@@ -55,8 +55,8 @@ TAUT = (
 )
 
 CRITICAL = (
-    "the loads are beyond the critical ones of straight members, which would have to stretch to bend between places that "
-    f"come no closer; {SHARED}"
+    "the loads are beyond the critical ones of straight members, which would have to stretch to bend between places "
+    f"that come no closer; {SHARED}"
 )
 
 CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
