@@ -238,12 +238,13 @@ def test_each_factor_is_searched():
 
 
 def test_notes_say_how_the_search_was_done_and_that_it_may_not_be_complete():
-    note = solve(column(1.5)).steps[0].notes[-1]
+    note = solve(column(1.5), runs=100).steps[0].notes[-1]
     assert "Newton runs" in note
     assert "deflated" in note
     assert "mirrored" in note
     assert "there may be more equilibria" in note
     assert "do not balance" not in note
+    assert "there are no others" in solve(column(1.5)).steps[0].notes[-1]
 
 
 def test_ways_out_that_do_not_balance_are_told():

@@ -201,10 +201,7 @@ class Piloting(Meshing):
         """The state that the loads lead to from the last factor, where that lies on the way from zero."""
         if last is None or last[0] * (factor - last[0]) < 0.0:
             return None
-        found = self._through(pilot, last[0], factor, last[1].corrected.state)
-        # What a jump on the way to the last factor led to, growing loads still would not come back from.
-        before = tuple(note for note in last[1].notes if note.endswith(JUMPED))
-        return None if found is None else replace(found, notes=(*before, *found.notes))
+        return self._through(pilot, last[0], factor, last[1].corrected.state)
 
     def _grown_from_zero(self, pilot: Prepared, factor: float) -> Found | None:
         """The state that the loads lead to from zero."""

@@ -99,7 +99,10 @@ class Refining(Piloting):
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
         if not corrected.converged:
-            corrected, _ = prepared.minimise(loading, state)
+            try:
+                corrected, _ = prepared.minimise(loading, state)
+            except SolveError as error:
+                raise SolveError(error.status, error.detail + more_than(mesh, source), error.last) from None
         apart = prepared.distance(state, corrected.state) > DRIFT and ELSEWHERE not in source.notes
         notes = (*source.notes, ELSEWHERE) if apart else source.notes
         return replace(source, prepared=prepared, corrected=corrected, notes=notes)
@@ -188,10 +191,12 @@ class Refining(Piloting):
         apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
         few, many = (counted(n, "element", "elements") for n in (self.target.elements, fine.model.mesh.elements))
         if apart > APART:
-            detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}: take more"
+            detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}" + more_than(
+                self.target, pilot
+            )
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         if pilot.stability.negative == 0 < now.prepared.negative(now.corrected):
-            detail = f"{few} asked for snap away from what is stable on {many}: take more"
+            detail = f"{few} asked for snap away from what is stable on {many}" + more_than(self.target, pilot)
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         return now
 
@@ -255,6 +260,11 @@ class Refining(Piloting):
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+
+
+def more_than(mesh: Mesh, source: Found) -> str:
+    """The advice to take more elements, where fewer were asked for than an equilibrium was found on."""
+    return ": take more" if mesh.elements < source.prepared.model.mesh.elements else ""
 
 
 def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:

@@ -29,8 +29,9 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 from ..solvers.unheld import refuse_unheld
-from .meshing import WHERE, Found
+from .meshing import Found
 from .piloting import NO_ENERGY, NO_POTENTIAL
+from .quantities import WHERE
 from .refining import LEVELS, Refining
 from .scanning import Scan, scan
 from .settings import Settings
@@ -187,7 +188,8 @@ class _Run(Refining):
             first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
         prepared, loading = first.prepared, first.prepared.model.loading(factor)
         starts = [transferred(model, state, prepared.model) for model, state in self.others]
-        scanned = scan(prepared, loading, first.corrected)
+        # Whoever gives the number of runs wants the search.
+        scanned = scan(prepared, loading, first.corrected) if self.settings.runs is None else None
         for _ in range(0 if self._prescribed else FINER):
             if scanned is None or len(scanned.found) >= scanned.roots:
                 break

@@ -193,7 +193,7 @@ class Prepared:
         if not self.model.minimisable:
             mesh = counted(self.model.mesh.elements, "element", "elements")
             detail = f"Newton's method did not converge on {mesh}, and loads without potential cannot be minimised"
-            raise SolveError(Status.FAILED, f"{detail}: more elements may help", state)
+            raise SolveError(Status.FAILED, detail, state)
         if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
             # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
             found = self.correct(state, loading, iterations=50)
