@@ -8,6 +8,7 @@ import io
 import os
 import re
 import sys
+import threading
 import time
 import traceback
 import warnings
@@ -271,13 +272,23 @@ def _named(file: Path, work: Callable[[], T]) -> T:
 
 @contextlib.contextmanager
 def _progress(scene: Scene) -> Iterator[Callable[[float], object] | None]:
-    """A bar that shows how far a motion is, for somebody who looks at a terminal; it is wiped away at the end."""
-    if scene.analysis.type != "dynamic" or not sys.stderr.isatty():
-        yield None
+    """How far a motion is: a bar on a terminal, which is wiped away at the end, else lines now and then."""
+    if scene.analysis.type != "dynamic":
+        with _lines(lambda: scene.analysis.type):
+            yield None
+        return
+    end, runs, last = scene.analysis.duration, 1, 0.0
+    if not sys.stderr.isatty():
+
+        def reach(reached: float) -> None:
+            nonlocal runs, last
+            runs, last = runs + (reached <= last), reached
+
+        with _lines(lambda: f"run {runs}: {100.0 * min(last / end, 1.0):.0f} %, {last:.4g} of {end:.4g} s"):
+            yield reach
         return
     from tqdm import tqdm
 
-    end, runs, last = scene.analysis.duration, 1, 0.0
     look = "{desc}{percentage:3.0f}% |{bar}| {n:.4g} of {total:.4g} s, {elapsed} and {remaining} to go"
     with tqdm(total=end, desc="run 1: ", bar_format=look, leave=False, file=sys.stderr) as bar:
 
@@ -292,6 +303,28 @@ def _progress(scene: Scene) -> Iterator[Callable[[float], object] | None]:
             bar.update(min(reached, end) - bar.n)
 
         yield told
+
+
+EVERY = 10.0
+"""Seconds from a line to the next that says how far a long run is."""
+
+
+@contextlib.contextmanager
+def _lines(told: Callable[[], str]) -> Iterator[None]:
+    """Now and then a line on the standard error stream that says how far something is."""
+    begin, over = time.perf_counter(), threading.Event()
+
+    def go_on() -> None:
+        while not over.wait(EVERY):
+            print(f"sfetcas: {told()}, {time.perf_counter() - begin:.0f} s so far", file=sys.stderr, flush=True)
+
+    lines = threading.Thread(target=go_on, daemon=True)
+    lines.start()
+    try:
+        yield
+    finally:
+        over.set()
+        lines.join()
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -403,9 +436,16 @@ def _sweep(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _counted_progress(count: int) -> Iterator[Callable[[int], object] | None]:
-    """A bar that shows how many cases are done, for somebody who looks at a terminal; it is wiped away at the end."""
+    """How many cases are done: a bar on a terminal, which is wiped away at the end, else lines now and then."""
     if not sys.stderr.isatty():
-        yield None
+        done = 0
+
+        def more(number: int) -> None:
+            nonlocal done
+            done += number
+
+        with _lines(lambda: f"{done} of {counted(count, 'case')}"):
+            yield more
         return
     from tqdm import tqdm
 
@@ -415,9 +455,11 @@ def _counted_progress(count: int) -> Iterator[Callable[[int], object] | None]:
 
 @contextlib.contextmanager
 def _named_progress() -> Iterator[Callable[[str], object]]:
-    """A line that names what is run, for somebody who looks at a terminal; it is wiped away at the end."""
+    """What is run: a line on a terminal, which is wiped away at the end, else lines now and then."""
     if not sys.stderr.isatty():
-        yield lambda name: None
+        names: list[str] = []
+        with _lines(lambda: f"run {len(names)}: {names[-1]}" if names else "begins"):
+            yield names.append
         return
     from tqdm import tqdm
 

@@ -43,8 +43,9 @@ def report(solution: Answer, seconds: float) -> None:
     if isinstance(solution, Trajectory):
         _report_motion(solution)
     else:
+        said: set[str] = set()
         for step, place in zip(solution.steps, _places(solution), strict=True):
-            _report_step(step, place)
+            _report_step(step, place, said)
     split = ", ".join(f"{what} {spent:.3f} s" for what, spent in solution.seconds.items())
     print(f"{solution.status.value} in {seconds:.3f} s ({split})")
 
@@ -201,7 +202,8 @@ def _places(solution: Answer) -> list[str]:
     return [f", equilibrium {factors[: i + 1].count(f)} of {factors.count(f)}" for i, f in enumerate(factors)]
 
 
-def _report_step(step: Equilibrium, place: str) -> None:
+def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
+    """One answer; a note that was said of one before is not repeated."""
     print(f"factor {step.factor:g}{place}")
     for name in step.model.nodes[:MOST_NODES]:
         angle = step.angle(name)
@@ -228,8 +230,10 @@ def _report_step(step: Equilibrium, place: str) -> None:
         _report_contact(name, entry)
     proof = step.certificate
     print(f"  {_kind(step)}, residual {proof.residual:.1e}, {_accuracy(proof.error_estimate, proof.error_of)}")
-    for note in step.notes:
-        print(f"  note: {note}")
+    for note in dict.fromkeys(step.notes):
+        if note not in said:
+            print(f"  note: {note}")
+    said.update(step.notes)
 
 
 def _accuracy(error: float | None, quantity: str) -> str:

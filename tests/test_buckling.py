@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import made
 
-from sfetcas import load, solve
+from sfetcas import SolveError, load, solve
 from sfetcas.cli import main
 from sfetcas.description.scenefile import dump
 
@@ -103,3 +103,47 @@ def test_answer_report_and_expectation(tmp_path, capsys):
     assert main(["run", str(file), "--json", str(out)]) == 0
     assert json.loads(out.read_text())["modes"]["buckling"][0] == pytest.approx(np.pi**2 / 4, rel=1e-8)
     assert "buckles at factors, linear estimate: 2.4674011, 22.20660" in capsys.readouterr().out
+
+
+def ritz_of_a_column_held_twice(height, shapes=40):
+    """First critical force at a height of a hinged column of EA the same everywhere: sines, forces as it stretches."""
+    x = (np.arange(4000) + 0.5) / 4000
+    numbers = np.pi * np.arange(1, shapes + 1)
+    slopes = numbers[:, None] * np.cos(numbers[:, None] * x)
+    pressed = np.where(x < height, 1.0 - height, -height)
+    softening = (slopes * pressed) @ slopes.T / len(x)
+    bending = 0.5 * numbers**4
+    return 1.0 / np.linalg.eigvalsh(softening / np.sqrt(np.outer(bending, bending)))[-1]
+
+
+def test_column_held_at_both_ends_shares_its_load_alike_in_all_analyses():
+    """Three analyses, one rule for what is not determined without stretch, and a note of it in each."""
+    critical = ritz_of_a_column_held_twice(0.3)
+
+    def held(**analysis):
+        hinge = {"support": "hinge"}
+        places = {"a": {"position": [0, 0], **hinge}, "m": {"position": [0, 0.3]}, "b": {"position": [0, 1], **hinge}}
+        table = {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": places,
+            "members": {"l": {"nodes": ["a", "m"], "section": "s"}, "u": {"nodes": ["m", "b"], "section": "s"}},
+            "loads": {"p": {"type": "force", "node": "m", "value": [0, -1]}},
+            "analysis": analysis,
+        }
+        return made(table)
+
+    below, modes = solve(held(steps=[0.9 * critical])).last, solve(held(type="modes"))
+    path = solve(held(type="path", range=[0, 1.1 * critical], points=60))
+    # The sums of the softening cut at the load are right to 1e-4; the mesh of a path to its accuracy of 1e-4.
+    assert modes.buckling[0] == pytest.approx(critical, rel=2e-4)
+    assert path.bifurcations[0].factor == pytest.approx(modes.buckling[0], rel=1e-4)
+    assert below.certificate.stable is True
+    for answer, factor, notes in ((below, 0.9 * critical, below.notes), (path.last, 1.0, path.notes)):
+        assert answer.reaction("a")[0][1] == pytest.approx(0.7 * factor, rel=1e-9)
+        assert answer.reaction("b")[0][1] == pytest.approx(0.3 * factor, rel=1e-9)
+        assert any("critical loads, depend on it" in note for note in notes)
+    assert any("critical loads, depend on it" in note for note in modes.last.notes)
+    # Bent it would be shorter: beyond, nothing else is there, and this is unstable.
+    with pytest.raises(SolveError, match="beyond the critical ones"):
+        solve(held(steps=[1.1 * critical]))
+    assert solve(held(steps=[1.1 * critical], unstable="stay")).last.certificate.negative == 1

@@ -4,11 +4,13 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sfetcas import Scene, cli
 from sfetcas.cli import main
 from sfetcas.description.records import counted
 
@@ -402,3 +404,26 @@ def test_reports_count_in_words(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "unstable (1 way out)" in printed
     assert "no flexible member, 1 unknown," in printed
+
+
+@pytest.mark.parametrize("kind", ["static", "dynamic"])
+def test_a_long_run_without_a_terminal_says_now_and_then_how_far_it_is(kind, monkeypatch, capfd):
+    monkeypatch.setattr(cli, "EVERY", 0.01)
+    moving = {"type": "dynamic", "end": 2.0} if kind == "dynamic" else {}
+    scene = Scene.from_dict(tomllib.loads(BEAM.replace("EI3 = 1.0", "EI3 = 1.0\nrhoA = 1.0")) | {"analysis": moving})
+    with cli._progress(scene) as progress:
+        if progress is not None:
+            progress(0.5)
+        said, begin = "", time.monotonic()
+        # A busy machine may take its time for a thread, but not this long.
+        while "so far" not in said and time.monotonic() < begin + 60.0:
+            said += capfd.readouterr().err
+    expected = "sfetcas: run 1: 25 %, 0.5 of 2 s, " if kind == "dynamic" else "sfetcas: static, "
+    assert said.startswith(expected)
+
+
+def test_a_note_of_several_steps_is_printed_once(tmp_path, capsys):
+    file = tmp_path / "follower.toml"
+    file.write_text(BEAM + 'frame = "follower"\n[analysis]\nsteps = [0.1, 0.2, 0.3]\n')
+    assert main(["run", str(file)]) == 0
+    assert capsys.readouterr().out.count("note: loads without potential") == 1

@@ -14,7 +14,9 @@ from sfetcas import Scene, SceneError, assemble, solve, uniform_mesh
 from sfetcas.checks import check
 from sfetcas.cli import main
 from sfetcas.equilibria.mirrors import mirrored, mirrors
+from sfetcas.equilibria.scanning import scan
 from sfetcas.equilibria.several import Search, search
+from sfetcas.equilibria.single import cold
 from sfetcas.equilibria.statics import Settings
 from sfetcas.mathematics import quaternion
 from sfetcas.solvers.deflation import deflated, turned_between, unheld
@@ -72,6 +74,103 @@ def test_column_has_a_pair_for_each_critical_load_that_it_is_beyond(times):
     straight = [negative for tip, negative in found if abs(tip) < 1e-9]
     assert straight == [pairs]
     np.testing.assert_allclose([tip for tip, _ in found], [-tip for tip, _ in reversed(found)], atol=1e-3)
+
+
+def cosine_over_delta(u, g):
+    """Jacobi's function cd by descending Landen transformations, of the complementary modulus g."""
+    m = 1.0 - g * g
+    a, c, scales, first = 1.0, math.sqrt(m), [], g
+    while abs(c) > 1e-16:
+        a, g, c = 0.5 * (a + g), math.sqrt(a * g), 0.5 * (a - g)
+        scales.append((a, c))
+    phi = 2.0 ** len(scales) * a * u
+    for a_n, c_n in reversed(scales):
+        phi = 0.5 * (phi + math.asin(c_n / a_n * math.sin(phi)))
+    return math.cos(phi) / math.hypot(math.cos(phi), first * math.sin(phi))
+
+
+def tips_by_elliptic_functions(force, degrees, samples=800):
+    """Tip angles of all equilibria of a cantilever: a pendulum that begins at rest, all roots at the clamp."""
+
+    # Against the direction of the force the clamp stands at this angle.
+    clamp = math.remainder(math.pi - math.radians(degrees), 2.0 * math.pi)
+    found = []
+    for side in (1.0, -1.0):
+
+        def missed(left, side=side):
+            # The amplitude is what is left to half a turn: next to it the pendulum stays upright for long.
+            swing = math.cos(0.5 * left) * cosine_over_delta(math.sqrt(force), math.sin(0.5 * left))
+            return side * 2.0 * math.asin(swing) - clamp
+
+        places = np.concatenate([np.geomspace(1e-9, 0.05, samples // 4), np.linspace(0.05, math.pi, samples)[1:]])
+        values = np.array([missed(left) for left in places])
+        for i in np.flatnonzero(values[1:] * values[:-1] < 0.0):
+            low, high = places[i], places[i + 1]
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if missed(middle) * values[i] > 0.0 else (low, middle)
+            found.append(side * (math.pi - 0.5 * (low + high)) - clamp)
+    return sorted(found)
+
+
+def scanned(scene):
+    """Tip angles of what a scan finds on a mesh that is fine enough for it."""
+    prepared = Prepared(assemble(scene, uniform_mesh(scene, 5, 32)))
+    loading = prepared.model.loading(1.0)
+    result = scan(prepared, loading, cold(prepared, loading)[0])
+    end = prepared.model.chain("m")[-1]
+    return result, sorted(float(found.state.q[end, 0]) for found in result.found)
+
+
+@pytest.mark.parametrize(("force", "degrees", "count"), [(150.0, 100, 7), (150.0, 150, 9)])
+def test_scan_has_all_equilibria_of_the_elastica(force, degrees, count):
+    known = tips_by_elliptic_functions(force, degrees)
+    result, found = scanned(inclined(force, degrees))
+    assert (len(known), result.roots, result.grazing) == (count, count, 0)
+    np.testing.assert_allclose(found, known, atol=1e-4)
+
+
+def tips_by_shooting(n, stiffness, rest, jump, span=40.0, samples=4_001, steps=200):
+    """Tip angles of a beam from the moments at its clamp, by Runge-Kutta steps; the moment jumps where half is past."""
+    angle, moment, h = np.zeros(samples), np.linspace(-span, span, samples), 1.0 / steps
+
+    def rate(s, angle, moment):
+        x, y = n(s)
+        return rest + moment / stiffness(s), x * np.sin(angle) - y * np.cos(angle)
+
+    for i in range(steps):
+        moment = moment - (jump if 2 * i == steps else 0.0)
+        a = rate(i * h, angle, moment)
+        b = rate((i + 0.5) * h, angle + 0.5 * h * a[0], moment + 0.5 * h * a[1])
+        c = rate((i + 0.5) * h, angle + 0.5 * h * b[0], moment + 0.5 * h * b[1])
+        d = rate((i + 1) * h, angle + h * c[0], moment + h * c[1])
+        angle = angle + h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0])
+        moment = moment + h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1])
+    over = moment - 1.5
+    here = np.flatnonzero(over[1:] * over[:-1] < 0.0)
+    share = over[here] / (over[here] - over[here + 1])
+    return sorted(angle[here] + share * (angle[here + 1] - angle[here]) - rest)
+
+
+def test_scan_of_a_bent_beam_with_loads_everywhere():
+    """Weight, forces and moments at the tip and the middle, a stiffness that falls: against shooting from the clamp."""
+    table = cantilever((-30.0, 5.0)) | {"gravity": [-20.0, 3.0], "analysis": {"equilibria": "all"}}
+    table["sections"] = {"s": {"EI3": {"at": [0, 1], "value": [2.0, 0.8]}, "rhoA": 1.0}}
+    name = next(iter(table["members"]))
+    table["members"] = {name: {"nodes": ["A", "B"], "section": "s"}}
+    table["members"][name]["shape"] = {"type": "curvature", "kappa3": [0.7], "length": 1.0, "start": [1, 0]}
+    table["nodes"]["B"]["position"] = [math.sin(0.7) / 0.7, (1.0 - math.cos(0.7)) / 0.7]
+    table["loads"] |= {
+        "end": {"type": "moment", "node": "B", "value": 1.5},
+        "middle": {"type": "moment", "member": name, "at": 0.5, "value": -2.0},
+    }
+    known = tips_by_shooting(
+        lambda s: (-30.0 - 20.0 * (1.0 - s), 5.0 + 3.0 * (1.0 - s)), lambda s: 2.0 - 1.2 * s, 0.7, -2.0
+    )
+    result, found = scanned(Scene(**table))
+    assert result.roots == len(known) == 3
+    # Tip angles of the reference are interpolated between samples.
+    np.testing.assert_allclose(found, known, atol=5e-3)
 
 
 def shot(moment, force, degrees, steps=2000):
@@ -139,12 +238,13 @@ def test_each_factor_is_searched():
 
 
 def test_notes_say_how_the_search_was_done_and_that_it_may_not_be_complete():
-    note = solve(column(1.5)).steps[0].notes[-1]
+    note = solve(column(1.5), runs=100).steps[0].notes[-1]
     assert "Newton runs" in note
     assert "deflated" in note
     assert "mirrored" in note
     assert "there may be more equilibria" in note
     assert "do not balance" not in note
+    assert "there are no others" in solve(column(1.5)).steps[0].notes[-1]
 
 
 def test_ways_out_that_do_not_balance_are_told():

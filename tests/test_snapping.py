@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from scenes import cantilever
+from scenes import cantilever, made
 
 from sfetcas import Scene, SceneError, assemble, solve, solve_model, switch, uniform_mesh
 from sfetcas.cli import main
@@ -331,3 +331,58 @@ def test_a_closed_branch_is_told_once_and_no_stretch_of_it_at_one_factor(tmp_pat
     assert said.count("it closes on itself") == 1
     assert said.count("factor -35.3757438") == 1
     assert not re.search(r"from factor (\S+) to \1$", said, re.MULTILINE)
+
+
+def toggle(start, unstable, **analysis):
+    """Two arcs, joined rigidly and hinged at their feet: snapped through they stay there without a load."""
+    hinge, bow = {"support": "hinge"}, {"type": "arc", "angle": -0.58291}
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {
+            "a": {"position": [0, 0], **hinge},
+            "crown": {"position": [0.5, 0.15], "start": start},
+            "b": {"position": [1, 0], **hinge},
+        },
+        "members": {
+            "l": {"nodes": ["a", "crown"], "section": "s", "shape": bow},
+            "r": {"nodes": ["crown", "b"], "section": "s", "shape": bow},
+        },
+        "loads": {"p": {"type": "force", "node": "crown", "value": [0, -1.0]}},
+        "analysis": {"unstable": unstable, **analysis},
+    }
+    return made(table)
+
+
+@pytest.mark.parametrize(
+    ("start", "unstable", "ways"), [([0.5, -0.15], "leave", 0), ([0.5, 0.0], "stay", 1), ([0.5, 0.0], "leave", 0)]
+)
+def test_start_places_choose_the_same_equilibrium_in_statics_and_on_a_path(start, unstable, ways):
+    """Below, or the unstable one between: found by Newton's method from the start, not by sliding down from it."""
+    step = solve(toggle(start, unstable)).last
+    path = solve(toggle(start, unstable, type="path", range=[0, 1], points=40))
+    assert step.certificate.negative == ways
+    height = step.position("crown")[1]
+    assert height < -0.1 if start[1] else abs(height) < 0.08 if ways else height > 0.1
+    # Both to 1e-4 of the scene's size.
+    np.testing.assert_allclose(path.last.position("crown"), step.position("crown"), atol=2e-4)
+    assert any("start places" in note for note in path.notes)
+
+
+def test_straight_columns_that_snap_say_so():
+    """Three hinged columns joined at the top, once statically indeterminate: they bend at no load but the critical."""
+    places = {"a": -0.5, "b": 0.0, "c": 0.5}
+    table = {
+        "sections": {"s": {"EI3": 1.0}},
+        "nodes": {"top": {"position": [0, 0]}}
+        | {name: {"position": [x, -1], "support": "hinge"} for name, x in places.items()},
+        "members": {name: {"nodes": ["top", name], "section": "s"} for name in places},
+        "loads": {"p": {"type": "force", "node": "top", "value": [0, -1]}},
+    }
+    below = solve(made(table | {"analysis": {"steps": [23.0]}})).last
+    np.testing.assert_allclose(below.position("top"), 0.0, atol=1e-9)
+    snapped = solve(made(table | {"analysis": {"steps": [60.0]}})).last
+    told = [float(re.search(r"jumped near factor ([0-9.e+]+):", note)[1]) for note in snapped.notes]
+    critical = solve(made(table | {"analysis": {"type": "path", "range": [0, 30]}})).bifurcations[0].factor
+    # The way is followed until a stable and an unstable state are 2 % apart.
+    assert told[0] == pytest.approx(critical, rel=0.025)
+    assert snapped.position("top")[1] < -0.5

@@ -553,7 +553,7 @@ def test_taut_member_that_joints_would_bend_is_named():
 
 
 @pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])
-def test_straight_bars_held_twice_carry_the_least_forces_and_stay_where_they_are(factor):
+def test_straight_bars_held_twice_share_forces_as_if_they_stretched_alike_and_stay_where_they_are(factor):
     """A node on three bars from the ground: of their forces one combination is free, which nothing applies."""
     places = {"A": [0.0, 0.0], "B": [0.2, 0.0], "D": [0.1, 0.0]}
     scene = {
@@ -565,15 +565,16 @@ def test_straight_bars_held_twice_carry_the_least_forces_and_stay_where_they_are
     }
     step = solve(made(scene)).last
     ways = np.array([np.subtract([0.1, 0.1], place) for place in places.values()])
-    ways /= np.linalg.norm(ways, axis=1)[:, None]
-    least = ways * (np.linalg.pinv(ways.T) @ [-0.3 * factor, factor])[:, None]
-    # By hand in bars; multipliers of straight members are balanced to rounding.
-    for name, force in zip(places, least, strict=True):
+    lengths = np.linalg.norm(ways, axis=1)
+    ways /= lengths[:, None]
+    # By hand in bars of one EA; multipliers of straight members are balanced to rounding.
+    moved = np.linalg.solve((ways.T / lengths) @ ways, [-0.3 * factor, factor])
+    for name, force in zip(places, ways * (ways @ moved / lengths)[:, None], strict=True):
         np.testing.assert_allclose(step.reaction(name)[0][:2], force, atol=1e-9 * factor)
     # Hinged bars buckle at 4.9 N and more: none is near, and nothing is left.
     assert step.certificate.stable is True
     assert len(step.notes) == 1
-    assert "the smallest are given" in step.notes[0]
+    assert "members that stretch alike (equal EA); what is stable, and critical loads, depend on it" in step.notes[0]
     np.testing.assert_allclose(step.position("C"), [0.1, 0.1, 0.0], atol=1e-12)
 
 
@@ -605,8 +606,8 @@ def test_cable_hangs_as_a_catenary_and_says_that_it_was_not_followed():
 
 @pytest.mark.parametrize("load", [1e-3, 3.0])
 @pytest.mark.parametrize("count", [3, 5])
-def test_lattice_of_straight_bars_carries_the_least_reactions(count, load):
-    """Straight bars carry axial forces only: of all that balance at the nodes those with the least reactions."""
+def test_lattice_of_straight_bars_shares_forces_as_if_they_stretched_alike(count, load):
+    """Straight bars carry axial forces only: of all that balance at the nodes those of bars with one EA."""
     grid = [(i, j) for i in range(count) for j in range(count)]
     name = {place: "n{}{}".format(*place) for place in grid}
     pairs = [
@@ -625,7 +626,7 @@ def test_lattice_of_straight_bars_carries_the_least_reactions(count, load):
     }
     step = solve(made(table)).last
     assert step.certificate.stable is True
-    assert "the smallest are given" in step.notes[0]
+    assert "members that stretch alike" in step.notes[0]
     # Each column: what a tension of one in a bar does to the nodes.
     number = {name[p]: k for k, p in enumerate(grid)}
     pulls = np.zeros((2 * len(grid), len(pairs)))
@@ -637,9 +638,9 @@ def test_lattice_of_straight_bars_carries_the_least_reactions(count, load):
     free = np.setdiff1d(np.arange(len(pulls)), ground)
     applied = np.zeros(len(pulls))
     applied[2 * number[corner] : 2 * number[corner] + 2] = [load, -load]
-    bars = np.linalg.lstsq(pulls[free], -applied[free], rcond=None)[0]
-    null = np.linalg.svd(pulls[free])[2][np.linalg.matrix_rank(pulls[free]) :].T
-    least = bars - null @ np.linalg.lstsq(pulls[ground] @ null, pulls[ground] @ bars, rcond=None)[0]
+    lengths = np.array([np.linalg.norm(np.subtract(b, a)) for a, b in pairs])
+    moved = np.linalg.solve((pulls[free] / lengths) @ pulls[free].T, -applied[free])
+    least = pulls[free].T @ moved / lengths
     found = np.concatenate([step.reaction(node)[0][:2] for node in held])
     np.testing.assert_allclose(found, -pulls[ground] @ least, atol=1e-7 * load)  # rounding of the multipliers
 

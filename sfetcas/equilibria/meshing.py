@@ -15,7 +15,7 @@ from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
-from .quantities import Quantity
+from .quantities import WHERE, Quantity
 from .settings import Settings
 from .solution import Equilibrium
 
@@ -23,9 +23,6 @@ __all__ = ["PILOT_ELEMENTS", "WHERE", "Found", "Meshing"]
 
 FINE = 1e-8
 """Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
-
-WHERE = ("analysis", "accuracy_of")
-"""Where a scene names what the accuracy is of."""
 
 PILOT_ELEMENTS = 60
 """A mesh that was asked for, if no coarser than the first one in space, is its own pilot up to this many elements."""

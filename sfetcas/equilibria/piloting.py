@@ -13,15 +13,21 @@ from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
+from ..solvers.deflation import nearest
 from ..solvers.newton import loose_rows
 from ..solvers.prepared import Prepared
+from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .settings import Settings
 from .single import cold
 
-__all__ = ["KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting"]
+__all__ = ["BEYOND", "KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting", "multipliers"]
 
 KEPT = "the loads growing from zero lead to this unstable equilibrium, and no way from it to a stable one was found"
+
+PASSED = (
+    "the loads growing from zero lead here through unstable equilibria, from which no way to a stable one was found"
+)
 
 NO_ENERGY = "loads without potential: no energy tells whether this is stable"
 
@@ -48,8 +54,19 @@ TAUT = (
     "let one end slide"
 )
 
+CRITICAL = (
+    "the loads are beyond the critical ones of straight members, which would have to stretch to bend between places "
+    f"that come no closer; {SHARED}"
+)
+
 CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
 """Growth of the loads from step to step where a structure between obstacles becomes unstable."""
+
+BEYOND = 1e4
+"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
+
+STRAIGHT = 1e-6
+"""Rotations below this, rad, are rounding of members that loads along them leave straight: others bend or diverge."""
 
 IN_LINE = 1e-3
 """Share of the largest singular value of the closings below which links are in one line, but for rounding and steps."""
@@ -103,9 +120,12 @@ class Piloting(Meshing):
             return self._accepted(pilot, alone, failure, loading)
         reached = self._grown(pilot, factor, last)
         if reached is None:
+            zero = self._unloaded(pilot)
+            straight = alone is None or pilot.distance(alone.corrected.state, zero) < STRAIGHT
+            if straight and pilot.lacks_slack and self._stays(pilot, zero, factor):
+                raise SolveError(Status.FAILED, CRITICAL, zero)
             found = self._accepted(pilot, alone, failure, loading)
-            # From straight members without slack no way leads: that the loads are not followed is no finding.
-            return found if pilot.lacks_slack else replace(found, notes=(NEAREST, *found.notes))
+            return replace(found, notes=(NEAREST, *found.notes))
         if alone is not None:
             reached.iterations = alone.iterations
             apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
@@ -133,6 +153,9 @@ class Piloting(Meshing):
 
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
         """From the start guess at the full load."""
+        near = nearest(pilot, loading) if self.started and not self.leave else None
+        if near is not None:
+            return Found(pilot, near, pilot.stability(near)), None
         try:
             corrected, iterations = cold(pilot, loading, self.settings.solver)
         except SolveError as error:
@@ -183,11 +206,14 @@ class Piloting(Meshing):
     def _grown_from_zero(self, pilot: Prepared, factor: float) -> Found | None:
         """The state that the loads lead to from zero."""
         model = pilot.model
-        zero = pilot.equations.start(model.loading(0.0, 0.0))
+        zero = self._unloaded(pilot)
         if pilot.lacks_slack:
-            # Straight members without slack: no way leads from here but the one that motions make.
-            moved = np.any(model.loading(factor).shift) and not self.scene.histories
-            return self._grown_from_bent(pilot, factor) if moved else None
+            # Straight members without slack: what acts along them alone leaves them straight, else they have to bend.
+            if self._stays(pilot, zero, factor):
+                found = self._through(pilot, 0.0, factor, zero)
+                # What cannot bend leaves for a whole turn within one element, which only its mesh lets pass.
+                return None if found is None or multipliers(found) > BEYOND else found
+            return None if self.scene.histories else self._grown_from_bent(pilot, factor)
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
             return self._grown_from_bent(pilot, factor)
@@ -198,6 +224,17 @@ class Piloting(Meshing):
                 return None
             zero = first.corrected.state
         return self._through(pilot, 0.0, factor, zero)
+
+    @staticmethod
+    def _unloaded(pilot: Prepared) -> State:
+        return pilot.equations.start(pilot.model.loading(0.0, 0.0))
+
+    def _stays(self, pilot: Prepared, zero: State, factor: float) -> bool:
+        """Whether straight members carry the loads all the way without bending: where they do not move at the end."""
+        if pilot.model.loaded_at_zero or self.scene.histories:
+            return False
+        there = pilot.correct(zero, pilot.model.loading(factor))
+        return there.converged and pilot.distance(there.state, zero) < STRAIGHT
 
     def _through(self, pilot: Prepared, begin: float, end: float, state: State) -> Found | None:
         """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
@@ -231,7 +268,8 @@ class Piloting(Meshing):
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
         result = follow(pilot, way, state, leave=leave)
-        if not result.reached and leave and not energy_known:
+        passed = not result.reached and leave and not energy_known
+        if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
             result = follow(pilot, way, state, leave=False)
         if not result.reached:
@@ -241,7 +279,15 @@ class Piloting(Meshing):
         notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
         if stability.negative and self.leave and not energy_known:
             notes += (KEPT,)
+        elif passed:
+            notes += (PASSED,)
         return Found(pilot, corrected, stability, notes, left=result.left)
+
+
+def multipliers(found: Found) -> float:
+    """The largest multiplier over the loads, or over the unit of force."""
+    loads = found.prepared.load_size(found.corrected)
+    return float(np.abs(found.corrected.state.lam).max(initial=0.0)) / max(1.0, loads)
 
 
 def _with_change_point(found: Found) -> Found:

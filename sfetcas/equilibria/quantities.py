@@ -17,7 +17,10 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .solution import Equilibrium, Posture
 
-__all__ = ["Further", "Quantity", "entry_of", "value_of"]
+__all__ = ["WHERE", "Further", "Quantity", "entry_of", "value_of"]
+
+WHERE = ("analysis", "accuracy_of")
+"""Where a scene names what the accuracy is of."""
 
 Further = Callable[[str, str], dict[str, Any]]
 """Of a kind and a name (``nodes``, ``B``) what an answer has beyond what all have; empty where that is nothing."""
@@ -120,15 +123,18 @@ class Quantity:
         Raises
         ------
         SceneError
-            No number stands after ``at``.
+            No number stands after ``at``, or no place along a member.
         """
         name, found, place = text.partition(" at ")
+        if not found and name.startswith("members."):
+            accepted = f"a place along the member too, as {name.strip()} at 0.5"
+            raise SceneError(f"found {text!r}, accepted: {accepted}", WHERE)
         if not found:
             return cls(text.strip())
         try:
             at = float(place)
         except ValueError:
-            raise SceneError(f"found {text!r}, accepted: NAME, or members.NAME.KEY at FRACTION") from None
+            raise SceneError(f"found {text!r}, accepted: NAME, or members.NAME.KEY at FRACTION", WHERE) from None
         return cls(name.strip(), at)
 
     def value(self, step: Posture, look_up: Callable[..., Any] = value_of) -> Array:

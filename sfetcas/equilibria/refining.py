@@ -17,12 +17,13 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
-from ..solvers.newton import Corrected, loose_rows, relative_residual, rows_in
+from ..solvers.newton import Corrected, loose_rows, named_in, relative_residual
 from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import Stability
 from .meshing import Found
 from .mirrors import has_twin
-from .piloting import KEPT, Piloting
+from .piloting import BEYOND, KEPT, Piloting, multipliers
 from .single import finished, unjudged
 from .solution import Equilibrium
 
@@ -43,6 +44,11 @@ MOST_FURTHER = 300
 DRIFT = 1.0
 """An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
 
+ELSEWHERE = (
+    "on a finer mesh the equilibrium is not near that of a coarser one, on which the loads were followed from zero: "
+    "it may be another one"
+)
+
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -60,9 +66,6 @@ COARSE = 0.1
 
 HELD = 2e-9
 """Eigenvalues above this, in those of the softest member, hold a mechanism, if barely: rounding leaves about 1e-9."""
-
-BEYOND = 1e4
-"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
 UNBALANCED = 0.01
 """Share of what acts that is out of balance without redundant multipliers: these carry it on next to nothing."""
@@ -107,8 +110,13 @@ class Refining(Piloting):
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
         if not corrected.converged:
-            corrected, _ = prepared.minimise(loading, state)
-        return replace(source, prepared=prepared, corrected=corrected)
+            try:
+                corrected, _ = prepared.minimise(loading, state)
+            except SolveError as error:
+                raise SolveError(error.status, error.detail + more_than(mesh, source), error.last) from None
+        apart = prepared.distance(state, corrected.state) > DRIFT and ELSEWHERE not in source.notes
+        notes = (*source.notes, ELSEWHERE) if apart else source.notes
+        return replace(source, prepared=prepared, corrected=corrected, notes=notes)
 
     @staticmethod
     def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:
@@ -194,10 +202,12 @@ class Refining(Piloting):
         apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
         few, many = (counted(n, "element", "elements") for n in (self.target.elements, fine.model.mesh.elements))
         if apart > APART:
-            detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}: take more"
+            detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}" + more_than(
+                self.target, pilot
+            )
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         if pilot.stability.negative == 0 < now.prepared.negative(now.corrected):
-            detail = f"{few} asked for snap away from what is stable on {many}: take more"
+            detail = f"{few} asked for snap away from what is stable on {many}" + more_than(self.target, pilot)
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         return now
 
@@ -265,6 +275,11 @@ class Refining(Piloting):
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
 
+def more_than(mesh: Mesh, source: Found) -> str:
+    """The advice to take more elements, where fewer were asked for than an equilibrium was found on."""
+    return ": take more" if mesh.elements < source.prepared.model.mesh.elements else ""
+
+
 def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:
     """The same, with a note where section moments are far from those on half the elements, wherever positions are."""
     sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (now, finer)]
@@ -311,37 +326,6 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
         raise SceneError(free_to_move(in_words(prepared.equations, shape)))
 
 
-def _least_reactions(equations: Equations, state: State, loading: Loading, loose: Array) -> State:
-    """The state with the reactions of supports whose sum of squares is least, then the least multipliers.
-
-    Moments count over the unit of length.  Loose multipliers change nothing else.
-    """
-    model = equations.model
-    supported = [name for name, node in model.scene.nodes.items() if node.support != "free"]
-    units = np.concatenate([np.full(3, model.scales.force), np.full(3, model.scales.moment)])
-
-    def reactions(lam: Array) -> Array:
-        fields = Fields(equations, replace(state, lam=lam), loading)
-        return np.concatenate([np.concatenate(fields.reaction(name)) / units for name in supported])
-
-    if not supported or loose.shape[1] > MOST_LOOSE:
-        return state
-    own = reactions(state.lam)
-    gains = np.column_stack([reactions(state.lam + column) - own for column in loose.T])
-    left, sizes, right = np.linalg.svd(gains, full_matrices=False)
-    # Columns are of length 1 and reactions dimensionless: what gains less says nothing but rounding.
-    kept = sizes > FELT
-    change = right[kept].T @ ((left[:, kept].T @ own) / sizes[kept])
-    return replace(state, lam=state.lam - loose @ change)
-
-
-FELT = 1e-6
-"""A combination of redundant rows that changes reactions by less than this share changes none."""
-
-MOST_LOOSE = 60
-"""Up to so many redundant rows reactions are made least; beyond, the multipliers only."""
-
-
 def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     """The same, with the smallest reactions and a note where closings are redundant.
 
@@ -352,19 +336,17 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     """
     equations, corrected = found.prepared.equations, found.corrected
     loose = loose_rows(equations, corrected.point)
-    loads = found.prepared.load_size(corrected)
-    largest = float(np.abs(corrected.state.lam).max(initial=0.0)) / max(1.0, loads)
+    largest = multipliers(found)
     if not loose.size:
         nearly = loose_rows(equations, corrected.point, NEARLY) if largest > LARGE else loose
         if nearly.size and _grow(equations, corrected.point, nearly):
             raise _stretched(equations, nearly, corrected)
         return found
-    lam = corrected.state.lam - loose @ (loose.T @ corrected.state.lam)
-    state = _least_reactions(equations, replace(corrected.state, lam=lam), loading, loose)
+    state = shared(equations, corrected.state, loading, loose, reactions=True)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
     most = CARRIED if largest > LARGE else UNBALANCED
-    which = "the smallest are given"
+    note = SHARED if stretches(equations, state, loading, loose) else SMALLEST
     # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
     acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
@@ -375,8 +357,8 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
         raise _stretched(equations, loose, corrected)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
-        which = "one set of many is given"
-    note = f"reactions are not unique, {which}; redundant: {_named_in(equations, loose)}"
+        note = "reactions are not unique, one set of many is given"
+    note += f"; redundant: {named_in(equations, loose)}"
     return replace(found, corrected=corrected, notes=(*found.notes, note))
 
 
@@ -396,8 +378,4 @@ def _grow(equations: Equations, point: Point, nearly: Array) -> bool:
 def _stretched(equations: Equations, loose: Array, corrected: Corrected) -> SolveError:
     """What is said of members that no finite force holds straight."""
     detail = "fully stretched between held points, where an inextensible member takes any force: "
-    return SolveError(Status.STRETCHED, detail + _named_in(equations, loose), corrected.state)
-
-
-def _named_in(equations: Equations, loose: Array) -> str:
-    return ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
+    return SolveError(Status.STRETCHED, detail + named_in(equations, loose), corrected.state)

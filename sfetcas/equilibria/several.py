@@ -131,6 +131,10 @@ class Search:
         """What to say of an equilibrium that stands for others."""
         return (FAMILY,) if number in self.family else ()
 
+    def missing(self, answers: Sequence[Equilibrium]) -> str:
+        """What is said of equilibria that were not found, as :func:`missing`."""
+        return missing(answers)
+
     # -- one run --------------------------------------------------------------------------------
 
     def run(self, kind: str, start: State, *, deflate: bool) -> bool:

@@ -29,11 +29,13 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 from ..solvers.unheld import refuse_unheld
-from .meshing import WHERE, Found
+from .meshing import Found
 from .piloting import NO_ENERGY, NO_POTENTIAL
+from .quantities import WHERE
 from .refining import LEVELS, Refining
+from .scanning import Scan, scan
 from .settings import Settings
-from .several import Search, long_elements, missing, same, search
+from .several import Search, long_elements, same, search
 from .single import finished, solve_model, unjudged
 from .solution import Equilibrium, Solution, at_factor
 
@@ -76,6 +78,10 @@ def solve(
 def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
     """The mesh that :func:`solve` begins with."""
     return _Run(scene, settings or Settings()).target
+
+
+FINER = 2
+"""Halvings of the mesh of the search at most for equilibria of a scan that it does not have."""
 
 
 class _Run(Refining):
@@ -130,7 +136,7 @@ class _Run(Refining):
                 dropped += 1
             elif not any(same(further, other) for other in answers):
                 answers.append(further)
-        note = result.sentence() + missing(answers)
+        note = result.sentence() + result.missing(answers)
         if dropped:
             coarse = counted(dropped, "equilibrium", "equilibria")
             note += f"; {coarse} of the mesh of the search not found on finer ones"
@@ -164,8 +170,11 @@ class _Run(Refining):
         short = (answer.certificate.error_estimate or 0.0) > self.accuracy
         return None if short and not self._prescribed else answer
 
-    def _searched(self, found: Found, factor: float) -> Search:
-        """The search, on a mesh fine enough for what is strongly curled, but for elements that are prescribed."""
+    def _searched(self, found: Found, factor: float) -> Search | Scan:
+        """The scan or, where one number does not give all equilibria, the search.
+
+        On a mesh fine enough for what is strongly curled, but for elements that are prescribed.
+        """
         first = found
         if not self._prescribed:
             first = self._onto(self._halved(found), found, factor)
@@ -179,8 +188,18 @@ class _Run(Refining):
             first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
         prepared, loading = first.prepared, first.prepared.model.loading(factor)
         starts = [transferred(model, state, prepared.model) for model, state in self.others]
-        result = search(prepared, loading, first.corrected, starts, self.settings.runs)
-        self.others = [(prepared.model, other.state) for other in result.found]
+        # Whoever gives the number of runs wants the search.
+        scanned = scan(prepared, loading, first.corrected) if self.settings.runs is None else None
+        for _ in range(0 if self._prescribed else FINER):
+            if scanned is None or len(scanned.found) >= scanned.roots:
+                break
+            first = self._onto(self._halved(first), first, factor)
+            again = scan(first.prepared, first.prepared.model.loading(factor), first.corrected)
+            if again is None or len(again.found) <= len(scanned.found):
+                break
+            scanned = again
+        result = scanned or search(prepared, loading, first.corrected, starts, self.settings.runs)
+        self.others = [(result.prepared.model, other.state) for other in result.found]
         return result
 
     # -- contact --------------------------------------------------------------------------------

@@ -26,8 +26,8 @@ from ..mechanics.model import assemble
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, check_slack
 from ..solvers.critical import Event, at_factors, shapes_at
-from ..solvers.newton import Corrected, relative_residual
-from ..solvers.prepared import Prepared
+from ..solvers.newton import Corrected, relative_residual, with_sharing
+from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.tracing import Traced, passes, switched, trace, without
 from .contact_path import follow_in_contact
 from .path import NO_POTENTIAL, Branch, Path, PathPoint
@@ -395,15 +395,16 @@ class _Run:
 
     def _entry(self, curve: Curve, at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
         prepared = curve.prepared
-        residual = relative_residual(curve.equations, at.point)
-        stability = prepared.stability(Corrected(at.state, at.point, True, at.iterations, 0.0, 0.0, residual))
+        state, point = with_sharing(curve.equations, at.state, at.loading, at.point, SOLVED, reactions=True)
+        residual = relative_residual(curve.equations, point)
+        stability = prepared.stability(Corrected(state, point, True, at.iterations, 0.0, 0.0, residual))
         finite = error if error is not None and np.isfinite(error) else None
         return equilibrium(
             curve.equations,
-            at.state,
+            state,
             at.loading,
             float(at.factor),
-            at.point,
+            point,
             residual,
             stability,
             error_estimate=finite,

@@ -13,7 +13,7 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from .deflation import turned_between
-from .newton import DUAL, PROXIMAL, ROUNDING, relative_residual
+from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, redundant, relative_residual, with_sharing
 from .prepared import Prepared
+from .sharing import shared
 from .stability import LIGHT, Inertia
 
 __all__ = ["Curve", "Standing", "Tangent"]
@@ -221,6 +222,12 @@ class Curve:
         if not np.all(np.isfinite(both)):
             return along, True
         rate, answer = both[: len(self.weight), 0], both[: self._turning, 1]
+        loose = loose_rows(self.equations, point) if redundant(self.equations, point) else np.zeros(0)
+        if loose.size:
+            # What is shared is linear in the multipliers and loads, so that their rates are shared alike.
+            first = self.equations.unknowns
+            way = shared(self.equations, replace(state, lam=rate[first:]), self.rate(factor), loose)
+            rate[first:] = way.lam
         found = self.normed(Tangent(rate, 1.0))
         doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
         return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor), doubtful
@@ -238,7 +245,7 @@ class Curve:
     ) -> Standing:
         """Everything that is known of an equilibrium on the curve."""
         loading = self.loading(factor)
-        point = self.equations.at(state, loading)
+        state, point = with_sharing(self.equations, state, loading, self.equations.at(state, loading), PASSING)
         tangent, doubtful = self.tangent(state, factor, point, along)
         return Standing(state, factor, loading, point, tangent, arc, iterations, self.prepared, doubtful)
 
@@ -301,8 +308,9 @@ class Curve:
                 return None
         if not (residual <= TOLERANCE or (not sharp and self._passes(point, residual))):
             return None
-        tangent, doubtful = self.tangent(state, factor, point, across)
         loading = self.loading(factor)
+        state, point = with_sharing(equations, state, loading, point, max(residual, TOLERANCE))
+        tangent, doubtful = self.tangent(state, factor, point, across)
         return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
 
     def _passes(self, point: Point, residual: float) -> bool:

@@ -6,14 +6,19 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
+from ..mechanics.loading import Loading
 from .arclength import Curve, Standing, Tangent
 from .continuation import follow
-from .newton import loose_rows, rows_in
+from .deflation import nearest
+from .newton import Corrected, loose_rows, named_in
 from .prepared import Prepared
+from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
 from .unheld import refuse_unheld
 
 __all__ = ["begin_path", "check_slack"]
+
+STARTED = "the path begins at the equilibrium of factor 0 that start places of nodes choose"
 
 BEGINNING = 1e-3
 """Where straight members have no slack, or nothing but loads holds a mechanism, the path starts at this share."""
@@ -42,7 +47,12 @@ def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, St
     # The unit is the factor that would turn the structure by a radian were it linear, if that is in the range.
     if share < 0.5:
         curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), 1e-6 * widest)
-    return curve, curve.standing(state, factor, along), notes
+    start = curve.standing(state, factor, along)
+    loose = loose_rows(curve.equations, start.point)
+    if loose.size:
+        told = SHARED if stretches(curve.equations, start.state, start.loading, loose) else SMALLEST
+        notes += (f"{told}; redundant: {named_in(curve.equations, loose)}",)
+    return curve, start, notes
 
 
 def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple[str, ...]]:
@@ -58,6 +68,8 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
     if prepared.diagnosis.mobility and model.minimisable:
         note = f"without loads it is a mechanism: the path starts at factor {beside:g}"
         return _bent(prepared, beside), beside, (note,)
+    if prepared.started and model.minimisable:
+        return _at_start_places(prepared, model.loading(0.0)), 0.0, (STARTED,)
     if not model.loaded_at_zero:
         return prepared.correct(state, model.loading(0.0)).state, 0.0, ()
     grown = follow(prepared, lambda t: model.loading(0.0, t), state)
@@ -66,17 +78,29 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
     return grown.state, 0.0, ()
 
 
+def _at_start_places(prepared: Prepared, loading: Loading) -> State:
+    """The equilibrium that ``start`` places choose, as in statics: stable but where unstable ones are to be kept."""
+    near = nearest(prepared, loading) if prepared.model.scene.analysis.unstable == "stay" else None
+    return _stable(prepared, loading).state if near is None else near.state
+
+
 def _bent(prepared: Prepared, factor: float) -> State:
-    loading = prepared.model.loading(factor)
+    if prepared.started and prepared.model.minimisable:
+        return _at_start_places(prepared, prepared.model.loading(factor))
+    return _stable(prepared, prepared.model.loading(factor)).state
+
+
+def _stable(prepared: Prepared, loading: Loading) -> Corrected:
+    """A stable equilibrium near the start guess."""
     state, gap = prepared.guess(loading)
     if gap > 0.2:
-        detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at factor {factor:g}"
+        detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m where the path starts"
         raise SolveError(Status.INFEASIBLE, detail, state)
     found, _ = prepared.minimise(loading, state)
     stability = prepared.stability(found)
     if stability.negative:
         found, _ = prepared.leave(found.state, stability, loading)
-    return found.state
+    return found
 
 
 def check_slack(curve: Curve, traced: Traced) -> None:
@@ -91,6 +115,6 @@ def check_slack(curve: Curve, traced: Traced) -> None:
     loose = loose_rows(equations, first.point)
     loads = max(float(np.abs(part).max(initial=0.0)) for part in (last.loading.force, last.loading.pull))
     if loose.size and loads > 0.0 and np.abs(last.state.lam).max() > TAUT * loads:
-        names = ", ".join(equations.row_names[row] for row in rows_in(loose))
-        detail = f"fully stretched between held points, where an inextensible member takes any force: {names}"
+        detail = "fully stretched between held points, where an inextensible member takes any force: "
+        detail += named_in(equations, loose)
         raise SolveError(Status.STRETCHED, detail, last.state)

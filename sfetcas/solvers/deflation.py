@@ -24,13 +24,19 @@ from ..mechanics.rotations import Turn
 from .newton import Corrected, newton_step
 from .prepared import Prepared
 
-__all__ = ["deflated", "turned_between", "unheld"]
+__all__ = ["deflated", "nearest", "turned_between", "unheld"]
 
 LONGEST = 0.7
 """No node turns by more than this in an iteration, rad."""
 
 NEAR = 1e-3
 """Steps shorter than this, rad, go on without deflation."""
+
+OPEN = 1e-6
+"""Gaps of closings, in the size of the scene, that start places leave where they can be reached."""
+
+BESIDE = 1.5
+"""An equilibrium that turns a node by more than this, rad, from where it was led to is not the one that was meant."""
 
 ITERATIONS = 40
 """Iterations of a run: those that arrive at something new need 5 to 35 (measured)."""
@@ -56,6 +62,16 @@ def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence
         stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / length)
         state = equations.moved(state, (stretch if left > 0.0 else -stretch) * step)
     return None
+
+
+def nearest(prepared: Prepared, loading: Loading) -> Corrected | None:
+    """The equilibrium beside the ``start`` places of nodes, stable or not; None where Newton's method finds none.
+
+    A minimisation from there would slide down from one that is unstable.
+    """
+    state, gap = prepared.guess(loading, settle=False)
+    found = deflated(prepared, state, loading, ()) if gap <= OPEN else None
+    return found if found is not None and prepared.distance(found.state, state) <= BESIDE else None
 
 
 def _slope(equations: Equations, state: State, other: State, step: Array) -> float:

@@ -101,12 +101,12 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
     return state, float(np.abs(missing).max())
 
 
-def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[State, float]:
+def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle: bool = True) -> tuple[State, float]:
     """A state to start from, and the gap of the closings that is left.
 
     The undeformed scene, its rotations carried along by the prescribed ones; straight members bent where the
     closings would otherwise have no slack (a straight member cannot shorten to first order); then closings,
-    motions and the ``start`` places of nodes satisfied as far as possible.
+    motions and the ``start`` places of nodes satisfied as far as possible; then, to ``settle``, downhill.
     """
     state = equations.start(loading)
     if np.any(loading.turn):
@@ -117,7 +117,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array) -> tuple[
     if targets is not None:
         state = _placed(equations, state, loading, weight, targets)
     state, gap = restore(equations, state, loading, weight)
-    if gap > 1e-6:
+    if gap > 1e-6 or not settle:
         return state, gap
     return descend(equations, state, loading, weight, most=TURN if targets is None else NEAR), gap
 

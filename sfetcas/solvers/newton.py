@@ -9,6 +9,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
+from .sharing import shared
 
 __all__ = [
     "DUAL",
@@ -19,9 +20,12 @@ __all__ = [
     "correct",
     "descend",
     "loose_rows",
+    "named_in",
     "newton_step",
+    "redundant",
     "relative_residual",
     "rows_in",
+    "with_sharing",
 ]
 
 PROXIMAL = 1e-10
@@ -75,9 +79,7 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
     entries[diagonal[equations.unknowns : total]] -= DUAL
     equations.solver.factor(entries)
     step = equations.solver.solve(-point.residual)
-    if equations.redundant is None:
-        equations.redundant = bool(loose_rows(equations, point).size)
-    if equations.redundant:
+    if redundant(equations, point):
         # Of redundant closings only the softness above limits the multipliers: their loose part has no meaning.
         rows, loose = slice(equations.unknowns, None), loose_rows(equations, point)
         if loose.size:
@@ -161,7 +163,29 @@ def correct(
     if not residual <= tolerance and begun[2] <= tolerance:
         state, point, residual = begun
     second = 0.0 if second == np.inf else second
+    if residual <= tolerance:
+        state, point = with_sharing(equations, state, loading, point, tolerance)
+        residual = relative_residual(equations, point)
     return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+
+
+def redundant(equations: Equations, point: Point) -> bool:
+    """Whether rows depend on each other where this was asked for the first time."""
+    if equations.redundant is None:
+        equations.redundant = bool(loose_rows(equations, point).size)
+    return equations.redundant
+
+
+def with_sharing(
+    equations: Equations, state: State, loading: Loading, point: Point, tolerance: float, *, reactions: bool = False
+) -> tuple[State, Point]:
+    """An equilibrium with redundant multipliers as :func:`~sfetcas.solvers.sharing.shared`, as far as it stays one."""
+    loose = loose_rows(equations, point) if redundant(equations, point) else np.zeros(0)
+    if not loose.size:
+        return state, point
+    there = shared(equations, state, loading, loose, reactions=reactions)
+    found = equations.at(there, loading)
+    return (there, found) if relative_residual(equations, found) <= tolerance else (state, point)
 
 
 def _balanced(equations: Equations, point: Point) -> bool:
@@ -289,6 +313,11 @@ def rows_in(loose: Array) -> list[int]:
 
 TAKES_PART = 0.1
 """Length of a row's part in all loose combinations, of 1: a row takes part in none of them by rounding, 1e-8."""
+
+
+def named_in(equations: Equations, loose: Array) -> str:
+    """Their names."""
+    return ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
 
 
 SLACK = 1e-6

@@ -28,6 +28,7 @@ from .guess import first_guess, lacks_slack, restore
 from .newton import Corrected, correct, loose_rows
 from .problem import EquilibriumProblem
 from .program import Program
+from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
 
 __all__ = ["SOLVED", "Prepared"]
@@ -107,9 +108,14 @@ class Prepared:
     def _solvers(self, scale: float) -> Callable[..., NLPResult]:
         return Ipopt(objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
 
-    def guess(self, loading: Loading) -> tuple[State, float]:
-        """A state to start from, and the gap of its closings."""
-        return first_guess(self.equations, loading, self._test.weight)
+    def guess(self, loading: Loading, *, settle: bool = True) -> tuple[State, float]:
+        """A state to start from, downhill from the ``start`` places unless it is not to ``settle``, and its gap."""
+        return first_guess(self.equations, loading, self._test.weight, settle=settle)
+
+    @property
+    def started(self) -> bool:
+        """Whether ``start`` places of nodes choose among equilibria."""
+        return any(node.start is not None for node in self.model.scene.nodes.values())
 
     def correct(self, state: State, loading: Loading, *, firm: float = 1.0, **limits: Any) -> Corrected:
         """Newton's method from a near state, with a proximal term that may be made firmer."""
@@ -188,7 +194,7 @@ class Prepared:
         if not self.model.minimisable:
             mesh = counted(self.model.mesh.elements, "element", "elements")
             detail = f"Newton's method did not converge on {mesh}, and loads without potential cannot be minimised"
-            raise SolveError(Status.FAILED, f"{detail}: more elements may help", state)
+            raise SolveError(Status.FAILED, detail, state)
         if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
             # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
             found = self.correct(state, loading, iterations=50)
@@ -225,7 +231,7 @@ class Prepared:
         return self._without_prestress(polished, loading), result.iterations
 
     def _without_prestress(self, found: Corrected, loading: Loading) -> Corrected:
-        """The same equilibrium with the least multipliers where closings are redundant.
+        """The same equilibrium with the multipliers of members that stretch alike where closings are redundant.
 
         Of these IPOPT leaves what happens to come out, up to what buckles members: with such a prestress, which
         nobody applied, what is stable would look unstable.
@@ -235,8 +241,7 @@ class Prepared:
             return found
         # Where Newton's method began the members may have been bent, and no closing redundant.
         self.equations.redundant = True
-        lam = found.state.lam - loose @ (loose.T @ found.state.lam)
-        least = self.correct(replace(found.state, lam=lam), loading)
+        least = self.correct(shared(self.equations, found.state, loading, loose), loading)
         return least if least.converged and self.distance(least.state, found.state) < SAME else found
 
     @functools.cached_property
@@ -248,7 +253,7 @@ class Prepared:
         """The equilibrium by Newton's method from afar, stable or not, and its iterations; None where it fails."""
         method = self._globalised
         start = None
-        if self.lacks_slack or any(node.start is not None for node in self.model.scene.nodes.values()):
+        if self.lacks_slack or self.started:
             start = method.program.flat(self.guess(loading)[0])
         outcome = method(method.program.given_of(loading), start)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
