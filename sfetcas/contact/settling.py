@@ -22,7 +22,19 @@ from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from .touches import Touched
 
-__all__ = ["APART", "SETTLED", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed", "stretched"]
+__all__ = [
+    "APART",
+    "SETTLED",
+    "Held",
+    "Ran",
+    "Settler",
+    "Way",
+    "carried_over",
+    "free_places",
+    "moved",
+    "placed",
+    "stretched",
+]
 
 NEAR = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
@@ -174,6 +186,16 @@ def closed(equations: Equations, state: State, loading: Loading, known: Collecti
     return replace(state, y=y)
 
 
+def carried_over(
+    scene: Scene, source: tuple[Model, State], before: Loading, prepared: Prepared, loading: Loading
+) -> State:
+    """A state of one model as the start on another: nodes where they were, closings met, multipliers in balance."""
+    state = _carried(source, before, prepared.model, transferred(source[0], source[1], prepared.model))
+    known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in scene.nodes for axis in "xyz")}
+    state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
+    return balanced(prepared.equations, state, loading)
+
+
 class Settler:
     """Equilibria of one scene with given touches.
 
@@ -208,11 +230,7 @@ class Settler:
         elif same:
             state = source[1]
         else:
-            state = transferred(source[0], source[1], prepared.model)
-            state = _carried(source, way.loading(source[0]), prepared.model, state)
-            known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in self.scene.nodes for axis in "xyz")}
-            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
-            state = balanced(prepared.equations, state, loading)
+            state = carried_over(self.scene, source, way.loading(source[0]), prepared, loading)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
         if not corrected.converged and not corrected.residual <= 1e-9:
             return None

@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,13 +17,17 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..errors import SolveError
+from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.prepared import Prepared
+from .contact_stability import ContactStability, can_leave
+from .cushions import Cushioned, Cushions
+from .passing import Passing
 from .revising import Reviser, Tried
 from .settling import Held, Ran, Settler, Way, placed
 from .touches import Touched
 
-__all__ = ["Toucher", "can_leave"]
+__all__ = ["Toucher"]
 
 CHANGES = 24
 """Changes of what touches at one point of the way before the step is taken to be too long."""
@@ -37,11 +41,17 @@ SNAP = 2e-3
 MOST_SNAPS = 4
 """Snaps on one way."""
 
-MOST_SOLVES = 200
-"""Equilibria with places held that are solved on one way."""
+MOST_SOLVES, MOST_ON_WAY = 200, 3000
+"""Equilibria with places held that are solved at one point of a way, and on all of it."""
 
-TRIES = 60
+TRIES = 500
 """Steps tried before giving up."""
+
+FIRST, AFTER_SNAP = 0.25, 0.05
+"""Parts of the way of the first step, and of the one after a state was left."""
+
+NARROW = 0.01
+"""The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
 
 class Toucher:
@@ -67,6 +77,9 @@ class Toucher:
     ) -> None:
         self.scene, self.prepare = scene, prepare
         self.settler, self.reviser = Settler(scene, prepare), Reviser(scene, limit, sides)
+        self.stability = ContactStability(self.settler)
+        self.cushions = Cushions(scene, prepare, sides)
+        self.passing = Passing(scene, self.cushions.obstacles)
         self.leave = scene.analysis.unstable == "leave"
         self.snapped: list[float] = []
 
@@ -106,27 +119,33 @@ class Toucher:
             source = found.prepared.model, found.corrected.state
         return None
 
-    def follow(
-        self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...], longest: float = 1.0
-    ) -> Held | None:
+    def follow(self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...]) -> Held | None:
         """Follow from the begin of a way to its end; from a state there, or from the undeformed scene.
 
-        No step is longer than ``longest``, a part of the way.
+        No step turns a place by more than :data:`~sfetcas.contact.passing.STRIDE` or may have passed an obstacle, and
+        a state that ceases to be stable is left as soon as that is seen, if that is wanted.
 
-        ``snapped``, an attribute, is then the parts of the way at which a state was left that ceased to be.
+        ``snapped``, an attribute, is then the parts of the way at which a state was left, or ceased to be.
         """
         self.snapped = []
-        now = start if isinstance(start, Held) else None
+        most = self.settler.solves + MOST_ON_WAY
+        now = start if isinstance(start, Held) else self.resolved(base, None, start, way(0.0))
         touches = start.mesh.touches if isinstance(start, Held) else start
-        done, step = 0.0, min(0.5, longest)
-        most = self.settler.solves + MOST_SOLVES
+        stands = now is not None and not self.unstable(now, way(0.0))
+        done, step = 0.0, FIRST
         for _ in range(TRIES):
             if done >= 1.0:
                 return now
             if self.settler.solves > most:
                 return None
             trial = min(1.0, done + step)
-            there = self.resolved(base, now, touches, way(trial), most)
+            there = self.resolved(base, now, touches, way(trial))
+            if there is not None and now is not None and self.passing.possible(now, there, way(trial).offsets):
+                there = None
+            falls = there is not None and stands and self.unstable(there, way(trial))
+            if falls and trial - done > max(NARROW * trial, SHORTEST[0]):
+                step = 0.5 * (trial - done)
+                continue
             if there is None:
                 step *= 0.25
                 if step >= SHORTEST[done > 0.0]:
@@ -136,32 +155,86 @@ class Toucher:
                 if there is None:
                     return None
                 self.snapped.append(trial)
-                step = 0.05
+                step = AFTER_SNAP
+            elif falls:
+                left = self.left(there, way(trial))
+                if left is not None and self.passing.possible(there, left, way(trial).offsets):
+                    if trial - done > SHORTEST[1]:
+                        step = 0.5 * (trial - done)
+                        continue
+                    left = self._fallen(base, there, way(trial))
+                if left is not None:
+                    there = left
+                    self.snapped.append(trial)
+                step = AFTER_SNAP
             now, touches, done = there, there.mesh.touches, trial
-            step = min(2.0 * step, longest)
+            stands = not self.unstable(now, way(done))
+            step *= 2.0
         return None
 
+    # -- unstable states ------------------------------------------------------------------------
+
+    def unstable(self, held: Held, way: Way) -> bool:
+        """Whether a state is unstable, and such states are to be left."""
+        return self.leave and can_leave(held) and self.stability.judged(held, way).negative > 0
+
+    def left(self, held: Held, way: Way) -> Held | None:
+        """A stable state that an unstable one goes to along its escape shape; None where none is found."""
+        pressing = self.stability.pressing(held, way)
+        loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
+        source = pressing.prepared.model, pressing.corrected.state
+        for start in (pressing, self.settler.solved(replace(pressing.mesh, touches=loose), source, way)):
+            found = None if start is None else self._along_escape(start, start.prepared, start.loading, loose, way)
+            if found is not None and not self.unstable(found, way):
+                return found
+        return None
+
+    def _along_escape(
+        self, start: Held, prepared: Prepared, loading: Loading, touches: tuple[Touch, ...], way: Way
+    ) -> Held | None:
+        """Downhill from a state along its escape shape, then what touches is looked at again."""
+        try:
+            corrected, _ = prepared.leave(start.corrected.state, start.prepared.stability(start.corrected), loading)
+            touched = Touched(prepared.equations, corrected.state, loading)
+            there = Held(prepared, corrected, loading, touched)
+            return self.resolved(replace(start.mesh, touches=()), there, touches, way)
+        except SolveError:
+            return None
+
     def _snapped(self, base: Mesh, now: Held | None, way: Way) -> Held | None:
-        """Where a state that ceases to be goes to: downhill on what touches, then what touches is looked at again."""
+        """Where a state that ceases to be goes to."""
         if now is None or not self.leave or not can_leave(now) or len(self.snapped) >= MOST_SNAPS:
             return None
         touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in now.mesh.touches)
         prepared = self.prepare(replace(now.mesh, touches=touches))
-        loading = way.loading(prepared.model)
-        stability = now.prepared.stability(now.corrected)
-        try:
-            corrected, _ = prepared.leave(now.corrected.state, stability, loading)
-        except SolveError:
+        found = self._along_escape(now, prepared, way.loading(prepared.model), touches, way)
+        if found is None or self.passing.possible(now, found, way.offsets):
+            return self._fallen(base, now, way)
+        return found
+
+    def _fallen(self, base: Mesh, now: Held, way: Way) -> Held | None:
+        """Where a state falls to on cushions, in short steps that pass nothing."""
+        if way.offsets:
             return None
-        there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
-        found = self.resolved(base, there, touches, way)
-        return None if found is None or self.reviser.ran_over(now, found) else found
+        found = self.cushions.fallen(base, now, way.loading)
+        return None if found is None else self.read(base, found, way)
+
+    def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
+        """The state in contact that one on cushions stands for."""
+        for touches in _readings(found.touches):
+            held = self.resolved(base, found.held, touches, way)
+            if held is not None:
+                return held
+        return None
 
 
-def can_leave(held: Held) -> bool:
-    """Whether there is an energy and anything left to move."""
-    equations = held.prepared.equations
-    return held.prepared.model.minimisable and equations.rows < equations.unknowns
+def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
+    """What touches as it was read from cushions; then without single places on members that lie on the obstacle too."""
+    yield touches
+    lying = {(t.contact, t.member) for t in touches if t.to is not None}
+    fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
+    if len(fewer) < len(touches):
+        yield fewer
 
 
 def _alike(a: tuple[Touch, ...], b: tuple[Touch, ...]) -> bool:

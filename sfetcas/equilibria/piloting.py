@@ -48,9 +48,6 @@ TAUT = (
     "let one end slide"
 )
 
-CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
-"""Growth of the loads from step to step where a structure between obstacles becomes unstable."""
-
 IN_LINE = 1e-3
 """Share of the largest singular value of the closings below which links are in one line, but for rounding and steps."""
 
