@@ -354,7 +354,7 @@ class ContactRun:
         """An unstable state left for a stable one, where that is wanted and found."""
         if not self.toucher.unstable(held, way):
             return held, ()
-        there = self.toucher.left(held, way)
+        there = self.toucher.left(held.mesh, held, way)
         return (held, (STAYS,)) if there is None else (there, (LEFT,))
 
 

@@ -24,7 +24,7 @@ from ..mechanics.model import Model
 from ..solvers.continuation import between, follow
 from ..solvers.newton import Corrected, descend
 from ..solvers.prepared import Prepared
-from .settling import Held, carried_over
+from .settling import Held
 from .touches import Touched
 
 __all__ = ["Cushioned", "Cushions"]
@@ -118,17 +118,6 @@ class Cushions:
         self.left += [factors[-1]] if rolled else []
         return cushioned
 
-    def fallen(self, base: Mesh, held: Held, loading: Callable[[Model], Loading]) -> Cushioned | None:
-        """Where a state in contact goes that ceased to be one: downhill in short steps, over no obstacle."""
-        mesh = self._divided(base)
-        prepared = self.prepare(self._cushioned(mesh, THICKEST, loading))
-        if not prepared.model.minimisable:
-            return None
-        here = loading(prepared.model)
-        state = carried_over(self.scene, (held.prepared.model, held.corrected.state), held.loading, prepared, here)
-        found = self._downhill(prepared, state, here)
-        return None if found is None else self._thinned(mesh, prepared, found, loading)[0]
-
     def _thinned(
         self, mesh: Mesh, prepared: Prepared, found: Corrected, loading: Callable[[Model], Loading]
     ) -> tuple[Cushioned, bool]:
@@ -199,10 +188,7 @@ class Cushions:
         if not prepared.model.minimisable:
             return None
         loading = prepared.model.loading(factor)
-        return self._downhill(prepared, prepared.equations.start(loading), loading)
-
-    def _downhill(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
-        """Downhill from a state in short steps, none of which leads over an obstacle."""
+        state = prepared.equations.start(loading)
         for _ in range(FALLS):
             # What falls past everything overflows within a few steps.
             with np.errstate(over="ignore", invalid="ignore"):

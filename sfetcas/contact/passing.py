@@ -82,12 +82,16 @@ class Passing:
             {name: fields.tangents(name, x) for name, x in self.fractions.items()},
         )
 
-    def possible(self, before: Held, after: Held, offsets: Mapping[str, float]) -> bool:
-        """Whether something may have been passed between two states, or they are too far apart to tell."""
+    def turned(self, before: Held, after: Held) -> float:
+        """Largest angle between tangents of the same place in two states, rad."""
+        return self.course(before.touched).turned(self.course(after.touched))
+
+    def possible(self, before: Held, after: Held, offsets: Mapping[str, float], stride: float = STRIDE) -> bool:
+        """Whether something may have been passed between two states, or they are more than a ``stride`` (rad) apart."""
         one, other = self.course(before.touched), self.course(after.touched)
         touching = [{(t.contact, t.member) for t in held.mesh.touches} for held in (before, after)]
         turned = one.turned(other)
-        return turned > STRIDE or any(
+        return turned > stride or any(
             self._passed(pair, one, other, turned, pair in touching[0] & touching[1], offsets.get(pair[0], 0.0))
             for pair in self.pairs
         )

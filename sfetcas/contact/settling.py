@@ -18,6 +18,7 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch, breaks_of
 from ..mechanics.model import Model
+from ..solvers.dragging import Drag
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from .touches import Touched
@@ -85,10 +86,15 @@ class Held:
 
 @dataclass(frozen=True)
 class Way:
-    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m."""
+    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m.
+
+    With ``drag`` rotations since the state ``since`` are resisted, see :mod:`~sfetcas.solvers.dragging`.
+    """
 
     loading: Callable[[Model], Loading]
     offsets: Mapping[str, float]
+    since: tuple[Model, State] | None = None
+    drag: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -231,7 +237,10 @@ class Settler:
             state = source[1]
         else:
             state = carried_over(self.scene, source, way.loading(source[0]), prepared, loading)
-        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
+        drag = None
+        if way.since is not None:
+            drag = Drag(prepared.equations, transferred(*way.since, prepared.model), way.drag)
+        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN, drag=drag)
         if not corrected.converged and not corrected.residual <= 1e-9:
             return None
         return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))

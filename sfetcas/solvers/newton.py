@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,6 +98,7 @@ def correct(
     contraction: float = 1.0,
     tangent: Array | None = None,
     flat: Array | None = None,
+    drag: Callable[[State, Point], Point] | None = None,
 ) -> Corrected:
     """Newton's method from a near state down to rounding.
 
@@ -115,9 +117,17 @@ def correct(
         path, while the matrix under the new load may already point away from it.
     flat : ndarray, optional
         A shape (turning unknowns) of a flat energy: no step goes along it.
+    drag : callable, optional
+        Adds couples that resist to the equations, see :mod:`~sfetcas.solvers.dragging`; the point that is returned
+        has none.
     """
+
+    def dragged(state: State) -> Point:
+        point = equations.at(state, loading)
+        return point if drag is None else drag(state, point)
+
     state = equations.holding(state, loading)
-    point = equations.at(state, loading)
+    point = dragged(state)
     residual = relative_residual(equations, point)
     first = second = last = np.inf
     begun = state, point, residual
@@ -149,7 +159,7 @@ def correct(
             return Corrected(state, point, False, count, first, second, residual)
         last = length
         trial = equations.moved(state, step)
-        there = equations.at(trial, loading)
+        there = dragged(trial)
         gained = relative_residual(equations, there)
         if residual <= tolerance and gained > 0.25 * residual and (count or _balanced(equations, point)):
             if gained < residual:
@@ -161,6 +171,7 @@ def correct(
     if not residual <= tolerance and begun[2] <= tolerance:
         state, point, residual = begun
     second = 0.0 if second == np.inf else second
+    point = point if drag is None else equations.at(state, loading)
     return Corrected(state, point, residual <= tolerance, count, first, second, residual)
 
 
