@@ -180,7 +180,7 @@ class ContactRun:
                     continue
                 gaps = stop.gaps(line.positions(x), line.tangents(x))
                 found += self._lying(contact, member, x, gaps)
-        return tuple(found)
+        return self.reviser.numbered(tuple(found))
 
     def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
         """Places and stretches of the undeformed member at no distance."""

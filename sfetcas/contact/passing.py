@@ -7,8 +7,9 @@ where it does not, the step is too long to tell, and a shorter one has a thinner
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from .touches import Touched
 
 __all__ = ["STRIDE", "Course", "Passing"]
 
-FINENESS, LEAST, MOST = 0.25, 24, 400
+FINENESS, LEAST, MOST = 0.25, 64, 400
 """Places along a member stand nearer than this share of the smallest radius; fewest and most intervals of a member."""
 
 STRIDE = 0.5
@@ -32,6 +33,9 @@ DEVIATION = 0.2
 PASSED = 1e-3
 """Share of the size of the scene, and of a radius times 50, up to which a tube may be inside: what dips in by so little
 is pushed out again to where it came from."""
+
+BEHIND = 1e-3
+"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
 
 ALONG = 0.25
 """The same share of a radius for a member that touches the obstacle before and after: it slides along it."""
@@ -89,12 +93,48 @@ class Passing:
     def possible(self, before: Held, after: Held, offsets: Mapping[str, float], stride: float = STRIDE) -> bool:
         """Whether something may have been passed between two states, or they are more than a ``stride`` (rad) apart."""
         one, other = self.course(before.touched), self.course(after.touched)
+        if self._over(before, after, one, other):
+            return True
         touching = [{(t.contact, t.member) for t in held.mesh.touches} for held in (before, after)]
         turned = one.turned(other)
         return turned > stride or any(
             self._passed(pair, one, other, turned, pair in touching[0] & touching[1], offsets.get(pair[0], 0.0))
             for pair in self.pairs
         )
+
+    def over(self, before: Held | None, after: Held) -> bool:
+        """Whether a step, from the undeformed scene with None, surely leads over an obstacle, or across an edge."""
+        return self._over(before, after, self._undeformed if before is None else self.course(before.touched))
+
+    def _over(self, before: Held | None, after: Held, here: Course, there: Course | None = None) -> bool:
+        touched = {touch.contact for touch in after.mesh.touches}
+        there = there or self.course(after.touched)
+        for contact, member in self.pairs:
+            stop = self.obstacles[contact]
+            # On an edge itself no side can be told.
+            if stop.kind == "sharp" and contact in touched:
+                continue
+            if swept(self._behind(before, contact, member, stop), here.positions[member], there.positions[member]):
+                return True
+        return False
+
+    @functools.cached_property
+    def _undeformed(self) -> Course:
+        lines = {name: (self.scene.center_lines[name], x) for name, x in self.fractions.items()}
+        return Course(
+            {name: line.positions(x) for name, (line, x) in lines.items()},
+            {name: line.tangents(x) for name, (line, x) in lines.items()},
+        )
+
+    def _behind(self, before: Held | None, contact: str, member: str, stop: Obstacle) -> Obstacle:
+        """An edge that a member begins to leave a little behind where it is: on the edge itself no side can be told."""
+        if before is None or stop.kind != "sharp":
+            return stop
+        for touch in before.mesh.touches:
+            if (touch.contact, touch.member) == (contact, member):
+                shift = BEHIND * self.scene.size * before.touched.normal(touch, touch.at)
+                return replace(stop, place=stop.place - shift)
+        return stop
 
     def _passed(
         self, pair: tuple[str, str], one: Course, other: Course, turned: float, slides: bool, offset: float
@@ -103,7 +143,7 @@ class Passing:
         stop, size = self.obstacles[contact], self.scene.size
         before, after = one.positions[member], other.positions[member]
         if stop.kind == "sharp":
-            return not slides and swept(stop, before, after)
+            return False
         chords = after - before
         tube = DEVIATION * turned * np.linalg.norm(chords, axis=1)
         depth = float((tube - _closest(stop, before, chords) - offset).max())
@@ -111,7 +151,7 @@ class Passing:
             return depth > FLAT * size
         if slides:
             return depth > ALONG * stop.radius
-        return depth > PASSED * min(size, 50.0 * stop.radius) or swept(stop, before, after)
+        return depth > PASSED * min(size, 50.0 * stop.radius)
 
 
 def _closest(stop: Obstacle, begin: Array, chords: Array) -> Array:

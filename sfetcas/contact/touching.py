@@ -125,7 +125,7 @@ class Toucher:
                 continue
             wrong = self.reviser.wrong(found, way, tried)
             if wrong is None:
-                return None if self.reviser.ran_over(now, found) else found
+                return None if self.passing.over(now, found) else found
             touches = wrong
             source = found.prepared.model, found.corrected.state
         return None
