@@ -14,9 +14,12 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import halving, roughness
 from ..mechanics.balance import three
+from ..mechanics.equations import State
 from ..mechanics.fields import Fields
+from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import JUMPED, near_factor
+from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
 from .settling import Held, Way, placed
@@ -199,6 +202,21 @@ class ContactRun:
         """The point of the way that a factor is."""
         return Way(lambda model: model.loading(factor), {})
 
+    def unstopped(self, prepared: Prepared) -> Callable[[State, Loading, State, Loading], bool]:
+        """Whether a step without obstacles stays clear of all of them on its way."""
+
+        def held(state: State, loading: Loading) -> Held:
+            touched, point = Touched(prepared.equations, state, loading), prepared.equations.at(state, loading)
+            return Held(prepared, Corrected(state, point, True, 0, 0.0, 0.0, 0.0), loading, touched)
+
+        def allowed(before: State, at: Loading, after: State, loading: Loading) -> bool:
+            there = held(after, loading)
+            if there.touched.inside({}, self.reviser.sides, INSIDE * self.scene.size):
+                return False
+            return not self.toucher.passing.possible(held(before, at), there, {})
+
+        return allowed
+
     def clear(self, fields: Fields) -> bool:
         """Whether no obstacle is in the way of a state."""
         return not Touched.of(fields).inside({}, self.reviser.sides, self.fine * self.scene.size)
@@ -216,7 +234,7 @@ class ContactRun:
         if not falls:
             ways.insert(1, ("", lambda: self.grown(base, factor)))
         if free is not None:
-            ways.insert(0, ("", lambda: self.retracted(base, factor, free)))
+            ways.insert(1, ("", lambda: self.retracted(base, factor, free)))
         for note, way in ways:
             self.jumps, self.elsewhere = [], note
             yield way()

@@ -163,16 +163,19 @@ class Cushions:
     def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
         leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
 
-        def allowed(before: State, after: State) -> bool:
-            return self._passes(prepared, before, after, way(1.0))
+        def allowed(before: State, at: Loading, after: State, there: Loading) -> bool:
+            return self._passes(prepared, before, after, there, at)
 
         result = follow(prepared, way, state, leave=leave, allowed=allowed)
         self._parts = result.left
         return result.state if result.reached else None
 
-    def _passes(self, prepared: Prepared, before: State, after: State, loading: Loading) -> bool:
-        """Whether no member runs over an obstacle from one state to the next."""
-        courses = [self._courses(prepared, state, loading) for state in (before, after)]
+    def _passes(
+        self, prepared: Prepared, before: State, after: State, loading: Loading, at: Loading | None = None
+    ) -> bool:
+        """Whether no member runs over an obstacle from one state, ``at`` another loading if so, to the next."""
+        states = (before, loading if at is None else at), (after, loading)
+        courses = [self._courses(prepared, state, loading) for state, loading in states]
         return not any(
             swept(stop, courses[0][member], courses[1][member])
             for name, stop in self.obstacles.items()

@@ -34,7 +34,7 @@ CHANGES = 24
 SHORTEST = 2e-5, 5e-4
 """First and later steps below this part of the way end the search."""
 
-SNAPS = 2e-3, 1e-2, 4e-2
+SNAPS = 5e-3, 2e-2, 5e-2
 """Parts of the way beyond a limit point or a bifurcation at which a state is left for another, nearer ones first."""
 
 MOST_SNAPS = 8
@@ -61,7 +61,7 @@ NUDGE = 0.05
 FIRST, AFTER_JUMP = 0.25, 0.05
 """Parts of the way of the first step, and of the one after a state was left."""
 
-NARROW = 0.01
+NARROW = 0.02
 """The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -63,6 +64,7 @@ class Piloting(Meshing):
     def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
         super().__init__(scene, settings, stops)
         self.leave = scene.analysis.unstable == "leave"
+        self.allowed: Callable[[Prepared], Callable[[State, Loading, State, Loading], bool]] | None = None
         self.started = any(node.start is not None for node in scene.nodes.values())
 
     def _found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
@@ -227,10 +229,11 @@ class Piloting(Meshing):
     def _followed(self, pilot: Prepared, way: Any, state: State, factors: tuple[float, float] | None) -> Found | None:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
-        result = follow(pilot, way, state, leave=leave)
+        allowed = self.allowed and self.allowed(pilot)
+        result = follow(pilot, way, state, leave=leave, allowed=allowed)
         if not result.reached and leave and not energy_known:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
-            result = follow(pilot, way, state, leave=False)
+            result = follow(pilot, way, state, leave=False, allowed=allowed)
         if not result.reached:
             return None
         corrected = pilot.correct(result.state, way(1.0))

@@ -185,6 +185,11 @@ class _Run(Refining):
         base = self.pilot_mesh.refined()
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
         falls = bool(pilot.diagnosis.mobility) and not contact.first_touches(base)
+        known = pilot.model.minimisable and not (pilot.diagnosis.mobility or pilot.lacks_slack)
+        if known and not (self.started or contact.last or contact.first_touches(base)):
+            found = self._clear_all_the_way(contact, pilot, factor)
+            if found is not None:
+                return found
         unstopped, failure = self._unstopped(pilot, factor) if self.started else (None, None)
         free = None
         if unstopped is not None:
@@ -198,6 +203,20 @@ class _Run(Refining):
                     return answer
         ways = contact.reached(base, factor, free, falls=falls)
         return self._first_pressed(contact, ways, factor, notes, failure)
+
+    def _clear_all_the_way(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium | None:
+        """The answer without obstacles, where the growing loads lead there past none of them; else None."""
+        self.allowed = contact.unstopped
+        try:
+            found = self._grown_from_zero(pilot, factor)
+        except SolveError:
+            found = None
+        finally:
+            self.allowed = None
+        if found is None or (self.leave and found.stability.negative > 0):
+            return None
+        answer = self._refined(found, factor)
+        return answer if contact.clear(answer.fields) else None
 
     def _first_pressed(
         self,
