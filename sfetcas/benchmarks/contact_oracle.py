@@ -18,7 +18,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from .contact_chain import Chain, ChainState, NotAChainError, in_space
 
-__all__ = ["ChainAnswer", "chain_contact"]
+__all__ = ["ChainAnswer", "chain_contact", "free_way"]
 
 Table = dict[str, Any]
 
@@ -121,7 +121,20 @@ def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
     )
 
 
-def _followed(chain: Chain) -> tuple[ChainState, list[float]]:
+def free_way(scene: Table, links: int = 8) -> Array:
+    """Places (n, 3), m, that a chain passes from zero to factor 1 where no obstacle stops it.
+
+    Raises
+    ------
+    NotAChainError
+        What is not known here.
+    """
+    chain, seen = Chain({**scene, "contacts": {}}, links), list[Array]()
+    _followed(chain, seen)
+    return np.pad(chain.size * np.vstack(seen), ((0, 0), (0, 3 - chain.dim)))
+
+
+def _followed(chain: Chain, seen: list[Array] | None = None) -> tuple[ChainState, list[float]]:
     """From zero to factor 1: the state there, and factors at which it snapped."""
     state, s, step, snaps = chain.start(), 0.0, FIRST_STEP, []
     width = WIDTHS[0]
@@ -144,6 +157,8 @@ def _followed(chain: Chain) -> tuple[ChainState, list[float]]:
         elif count < 12 and far < 0.5 * FAR:
             step = min(2.0 * step, 2.0 * FIRST_STEP)
         state = tried
+        if seen is not None:
+            seen.append(chain.points(state))
     before = chain.points(state)
     for wider, width in zip(WIDTHS, WIDTHS[1:]):
         narrower = _emerged(chain, state, wider, width)

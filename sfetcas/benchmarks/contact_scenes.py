@@ -1,22 +1,27 @@
 """Scenes of contact at random, in four families, each from its seed; dictionaries as in a scene file.
 
-Everything has lengths and stiffness of order 1, loads from a third to some thirty EI/L^2.  What the chains of
-:mod:`.contact_oracle` do not know is left out.
+Everything has lengths and stiffness of order 1, loads from a third to some thirty EI/L^2.  The first obstacle stands in
+the way that a chain takes without any.  What the chains of :mod:`.contact_oracle` do not know is left out.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..mathematics.arrays import Array
-from .contact_chain import member_points
+from .contact_chain import NotAChainError, member_points
+from .contact_oracle import free_way
 
 __all__ = ["FAMILIES", "contact_scene"]
 
 Table = dict[str, Any]
+
+Gap = Callable[[Array], Array]
+"""Distances (n,) of places (n, 3) from an obstacle."""
 
 FAMILIES = ("pegs", "drums", "floors", "spheres")
 
@@ -25,6 +30,9 @@ CLEAR = 0.01
 
 TRIES = 60
 """Obstacles drawn for each that is wanted."""
+
+REDRAWN = 20
+"""Scenes drawn until one has an obstacle."""
 
 
 def contact_scene(family: str, seed: int) -> Table:
@@ -43,7 +51,11 @@ def contact_scene(family: str, seed: int) -> Table:
     >>> contact_scene("pegs", 1) == contact_scene("pegs", 1)
     True
     """
-    return _Draw(np.random.default_rng([seed, FAMILIES.index(family), 18]), family).scene(f"{family} {seed}")
+    for again in range(REDRAWN):
+        table = _Draw(np.random.default_rng([seed, FAMILIES.index(family), again]), family).scene(f"{family} {seed}")
+        if table["contacts"]:
+            break
+    return table
 
 
 class _Draw:
@@ -211,13 +223,18 @@ class _Draw:
                 start = np.zeros(3)
                 start[: len(by)] = self.nodes[motion["node"]]["position"]
                 points = np.vstack([points, start + np.linspace(0.0, 1.0, 9)[:, None] * (place - start)])
+        try:
+            way = free_way(table)
+        except NotAChainError:
+            way = points
         wanted = int(self.rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))
         kinds = {"pegs": self.peg, "drums": self.drum, "floors": self.floor, "spheres": self.solid}
         for _ in range(TRIES):
             if len(self.contacts) == wanted:
                 return
-            contact, gaps = kinds[self.family](points)
-            if CLEAR < float(gaps.min()) < 0.5:
+            contact, gap = kinds[self.family](points, points if self.contacts else way)
+            stands_in_it = bool(float(gap(way).min()) < -CLEAR)
+            if CLEAR < float(gap(points).min()) < 0.5 and (self.contacts or stands_in_it):
                 self.contacts[f"{contact['type']}{len(self.contacts)}"] = contact
 
     def near(self, points: Array, distance: float) -> Array:
@@ -229,46 +246,43 @@ class _Draw:
     def listed(self, place: Array) -> list[float]:
         return [round(float(v), 4) for v in place[: 3 if self.space else 2]]
 
-    def peg(self, points: Array) -> tuple[Table, Array]:
+    def peg(self, points: Array, way: Array) -> tuple[Table, Gap]:
         radius = self.between(0.04, 0.25)
-        center = self.listed(self.near(points, radius + self.between(0.02, 0.4)))
+        center = self.listed(self.near(way, self.between(0.0, 1.0) * radius))
         contact = {"type": "circle", "center": center, "radius": radius, "members": "all"}
-        return contact, np.linalg.norm(points[:, :2] - center, axis=1) - radius
+        return contact, lambda x: np.linalg.norm(x[:, :2] - center, axis=1) - radius
 
-    def drum(self, points: Array) -> tuple[Table, Array]:
+    def drum(self, points: Array, way: Array) -> tuple[Table, Gap]:
         inside = self.chance(0.5) and not any(c.get("side") == "inside" for c in self.contacts.values())
         if not inside:
             radius = self.between(0.4, 2.0)
-            center = self.listed(self.near(points, radius + self.between(0.02, 0.3)))
+            center = self.listed(self.near(way, self.between(0.5, 1.0) * radius))
             contact = {"type": "circle", "center": center, "radius": radius, "members": "all"}
-            return contact, np.linalg.norm(points[:, :2] - center, axis=1) - radius
+            return contact, lambda x: np.linalg.norm(x[:, :2] - center, axis=1) - radius
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0)) + 0.1 * np.append(self.vector(), 0.0)
-        distances = np.linalg.norm(points[:, :2] - self.listed(middle), axis=1)
-        radius = round(float(distances.max()) + self.between(0.02, 0.3), 4)
-        contact = {"type": "circle", "center": self.listed(middle), "radius": radius, "members": "all"}
-        return contact | {"side": "inside"}, radius - distances
+        center = self.listed(middle)
+        radius = round(float(np.linalg.norm(points[:, :2] - center, axis=1).max()) + self.between(0.02, 0.3), 4)
+        contact = {"type": "circle", "center": center, "radius": radius, "members": "all"}
+        return contact | {"side": "inside"}, lambda x: radius - np.linalg.norm(x[:, :2] - center, axis=1)
 
-    def floor(self, points: Array) -> tuple[Table, Array]:
-        down = self.space or (self.chance(0.6) and not self.contacts)
+    def floor(self, points: Array, way: Array) -> tuple[Table, Gap]:
         normal = np.zeros(3)
-        normal[: 3 if self.space else 2] = (
-            ([0.0, 1.0] if not self.space else [0.0, 0.0, 1.0]) if down else self.vector()
-        )
-        depths = points @ normal
-        place = (float(depths.min()) - self.between(0.02, 0.4)) * normal
+        normal[: 3 if self.space else 2] = self.vector()
+        if self.chance(0.4):
+            normal = np.array([0.0, 0.0, 1.0] if self.space else [0.0, 1.0, 0.0])
+        place = (float((points @ normal).min()) - self.between(0.02, 0.4)) * normal
         contact = {"type": "plane", "point": self.listed(place), "normal": self.listed(normal), "members": "all"}
-        return contact, (points - [*contact["point"], 0.0][:3]) @ normal
+        return contact, lambda x: (x - [*contact["point"], 0.0][:3]) @ normal
 
-    def solid(self, points: Array) -> tuple[Table, Array]:
+    def solid(self, points: Array, way: Array) -> tuple[Table, Gap]:
         if self.chance(0.15):
-            return self.floor(points)
+            return self.floor(points, way)
         radius = self.between(0.08, 0.5)
-        center = self.listed(self.near(points, radius + self.between(0.02, 0.3)))
-        out = points - center
+        center = self.listed(self.near(way, self.between(0.0, 1.0) * radius))
         contact: Table = {"type": "sphere", "center": center, "radius": radius, "members": "all"}
+        across = np.eye(3)
         if self.chance(0.5):
             axis = self.vector()
             contact |= {"type": "cylinder", "axis": axis}
-            unit = np.array(axis) / np.linalg.norm(axis)
-            out = out - np.outer(out @ unit, unit)
-        return contact, np.linalg.norm(out, axis=1) - radius
+            across -= np.outer(axis, axis) / np.dot(axis, axis)
+        return contact, lambda x: np.linalg.norm((x - center) @ across, axis=1) - radius
