@@ -1,7 +1,8 @@
 """Accuracy and speed measured: ``python -m sfetcas.benchmark [NAME ...]``.
 
 Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, start and
-extremes; left out, all are run.  Another one, ``random``, stands alone, takes options (``--help``) and half an hour.
+extremes; left out, all are run.  Two others, ``random`` and ``contact``, stand alone, take options (``--help``) and
+half an hour.
 
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
@@ -26,6 +27,7 @@ import numpy as np
 
 from .benchmarks.accuracy import knob
 from .benchmarks.code import code
+from .benchmarks.contact_run import contact
 from .benchmarks.derivatives import derivatives
 from .benchmarks.extremes import extremes
 from .benchmarks.many import many
@@ -412,12 +414,13 @@ def main(names: list[str]) -> None:
     known = {"order": order, "loads": loads, "size": size, "repeated": repeated, "derivatives": derivatives}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
     known |= {"accuracy": knob, "pieces": pieces, "sweep": many, "start": start, "extremes": extremes}
-    if names[:1] == ["random"]:
-        random_scenes(names[1:])
+    alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "contact": contact}
+    if names[:1] and names[0] in alone:
+        alone[names[0]](names[1:])
         return
     for name in names or list(known):
         if name not in known:
-            raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join(known)}, or random")
+            raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join(known)}, random or contact")
         try:
             known[name]()
         except (SceneError, SolveError) as error:

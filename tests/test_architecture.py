@@ -229,7 +229,12 @@ ORDER = [
     "benchmarks.derivatives",
     "benchmarks.extremes",
     "benchmarks.many",
+    "benchmarks.worker",
     "benchmarks.random_run",
+    "benchmarks.contact_chain",
+    "benchmarks.contact_oracle",
+    "benchmarks.contact_scenes",
+    "benchmarks.contact_run",
     "benchmark",
     "reports",
     "outputs",
@@ -251,6 +256,7 @@ PROGRAMS = (
     "benchmarks.extremes",
     "benchmarks.many",
     "benchmarks.random_run",
+    "benchmarks.contact_run",
 )
 """What is run and not imported: only these print."""
 

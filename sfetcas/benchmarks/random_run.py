@@ -8,28 +8,21 @@ from __future__ import annotations
 
 import argparse
 import functools
-import multiprocessing
-import os
-import signal
 import statistics
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, TimeoutError
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any
 
 from ..equilibria.solution import Solution
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
 from .random_checks import VARIANTS, compared, variant, wrong
 from .random_scenes import random_scene
+from .worker import Worker
 
 __all__ = ["Outcome", "random_run", "random_scenes"]
-
-START = 60.0
-"""Seconds that a new process may take to import."""
 
 
 @dataclass
@@ -84,39 +77,7 @@ def _asked(seed: int, name: str) -> str:
     return compared(answer.last, variant(name, scene, answer.last, seed))
 
 
-class _Worker:
-    """A process that solves one thing at a time and is killed when that takes too long."""
-
-    def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
-        self._begin()
-
-    def _begin(self) -> None:
-        self.pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
-        self.process = self.pool.submit(os.getpid).result(START)
-
-    def ask(self, function: Any, *arguments: Any) -> tuple[Any, str]:
-        """What a function gives, or nothing and what happened instead."""
-        future: Future[Any] = self.pool.submit(function, *arguments)
-        try:
-            error = future.exception(self.seconds)
-        except TimeoutError:
-            os.kill(self.process, signal.SIGTERM)
-            self.close()
-            self._begin()
-            return None, "too slow"
-        if isinstance(error, BrokenProcessPool):
-            self._begin()
-            return None, "CRASH"
-        # Whatever else was raised is a mistake of the library, and this tells where.
-        return (future.result(), "") if error is None else (None, f"ERROR {type(error).__name__}: {error}")
-
-    def close(self) -> None:
-        """End the process."""
-        self.pool.shutdown()
-
-
-def _outcomes(worker: _Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
+def _outcomes(worker: Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
     for seed in seeds:
         found, failed = worker.ask(_first, seed)
         if found is None:
@@ -134,7 +95,7 @@ def _outcomes(worker: _Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
 
 def random_run(seeds: Sequence[int], seconds: float = 30.0, processes: int = 1) -> Iterator[Outcome]:
     """What became of the scenes of these seeds, each solve in no more than so many seconds."""
-    lanes = [_Worker(seconds) for _ in range(processes)]
+    lanes = [Worker(seconds) for _ in range(processes)]
     try:
         with ThreadPoolExecutor(processes) as threads:
             rounds = [seeds[i : i + processes] for i in range(0, len(seeds), processes)]

@@ -116,7 +116,7 @@ def correct(
         Entries of the Newton matrix of the equilibrium that is left, for the first step: then it goes along the
         path, while the matrix under the new load may already point away from it.
     flat : ndarray, optional
-        A shape (turning unknowns) of a flat energy: no step goes along it.
+        Shapes of a flat energy, columns (turning unknowns, shapes): no step goes along them.
     drag : callable, optional
         Adds couples that resist to the equations, see :mod:`~sfetcas.solvers.dragging`; the point that is returned
         has none.
@@ -145,7 +145,8 @@ def correct(
             break
         turning = step[: equations.turning_unknowns]
         if flat is not None:
-            turning -= flat * (turning @ (weight * flat)) / (flat @ (weight * flat))
+            weighted = weight[:, None] * flat
+            turning -= flat @ np.linalg.lstsq(flat.T @ weighted, weighted.T @ turning, rcond=None)[0]
         length = float(np.abs(turning).max(initial=0.0))
         if not np.isfinite(length):
             break
