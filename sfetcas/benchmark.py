@@ -1,8 +1,8 @@
 """Accuracy and speed measured: ``python -m sfetcas.benchmark [NAME ...]``.
 
 Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, start and
-extremes; left out, all are run.  Two others, ``random`` and ``jitter``, stand alone, take options (``--help``) and half
-an hour each.
+extremes; left out, all are run.  Three others, ``random``, ``jitter`` and ``contact``, stand alone, take options
+(``--help``) and half an hour each.
 
 Not a test: times are medians on the machine at hand, printed as tables.  The problems are those of the
 literature for which other programs' figures are known: S1, S1b a cantilever under F L^2/EI = 10 and 100; S2, S2b
@@ -27,6 +27,7 @@ import numpy as np
 
 from .benchmarks.accuracy import knob
 from .benchmarks.code import code
+from .benchmarks.contact_run import contact
 from .benchmarks.derivatives import derivatives
 from .benchmarks.extremes import extremes
 from .benchmarks.jitter import jitter
@@ -414,8 +415,8 @@ def main(names: list[str]) -> None:
     known = {"order": order, "loads": loads, "size": size, "repeated": repeated, "derivatives": derivatives}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
     known |= {"accuracy": knob, "pieces": pieces, "sweep": many, "start": start, "extremes": extremes}
-    alone = {"random": random_scenes, "jitter": jitter}
-    if names and names[0] in alone:
+    alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter, "contact": contact}
+    if names[:1] and names[0] in alone:
         alone[names[0]](names[1:])
         return
     for name in names or list(known):

@@ -71,9 +71,16 @@ def check(scene: Scene, solution: Answer) -> list[Check]:
         except SceneError as error:
             raise error.within("expect", str(i), "value") from None
         except (TypeError, ValueError):
-            message = f"found {say(expect.value)}, accepted: numbers as in the answer, {say(value)}"
+            message = f"found {say(expect.value)}, accepted: numbers as in the answer, {say(_plain(value))}"
             raise SceneError(message, ("expect", str(i), "value")) from None
     return checks
+
+
+def _plain(value: Any) -> Any:
+    """A value of an answer as one writes it in a scene: numbers with six digits, and lists of them."""
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(entry) for entry in value]
+    return float(f"{value:.6g}") if isinstance(value, (float, np.floating)) else value
 
 
 def asked(solution: Answer, expect: Expect) -> Any:

@@ -14,16 +14,17 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.accuracy import halving, roughness
 from ..mechanics.balance import three
+from ..mechanics.equations import State
 from ..mechanics.fields import Fields
+from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import JUMPED, near_factor
+from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
-from .cushions import Cushions
-from .rolling import rolling
 from .settling import Held, Way, placed
 from .touches import COARSE, NOISE, Touched, edge_sides, obstacles_of
-from .touching import Toucher, can_leave
+from .touching import Toucher
 
 __all__ = ["ContactRun", "Pressed"]
 
@@ -33,20 +34,20 @@ INSIDE = 1e-9
 WEAK = 1e-9
 """Forces of obstacles below this share of the largest force hardly touch."""
 
-IDLE = 1e-7
-"""Share of the force on a stretch below which it is without pressure between its ends."""
-
-STRAIGHT = 1e-4
-"""Curvatures, times the length of the scene, below this are those of a straight member on a coarse mesh."""
-
 PARALLEL = 1e-6
 """Square of the sine of an angle up to which a direction lies in a plane."""
 
 STAYS = "unstable, and no stable equilibrium was found along its escape shape"
 """A note."""
 
-CAREFUL = 0.05
-"""Part of the way of a step where longer ones led astray."""
+LEFT = "left an unstable equilibrium in contact along its escape shape"
+"""Another."""
+
+ELSEWHERE = (
+    "the loads growing from zero could not be followed in contact all the way: this is a state in contact that "
+    "soft obstacles becoming hard led to, and there may be others"
+)
+"""A note of answers that were found in another way."""
 
 LEVELS, MOST_ELEMENTS = 40, 20_000
 """Most refinements of a mesh, and most elements."""
@@ -90,11 +91,13 @@ class ContactRun:
         self.scene, self.accuracy, self.fixed, self.judge = scene, accuracy, fixed, judge or _judge
         self.toucher = Toucher(scene, prepare, COARSE, edge_sides(scene))
         self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
-        self.cushions = Cushions(scene, prepare, self.reviser.sides)
+        self.stability = self.toucher.stability
+        self.cushions = self.toucher.cushions
         self.fine = max(INSIDE, 0.1 * accuracy)
         self.prepare = prepare
         self.last: tuple[float, Held] | None = None
         self.jumps: list[float] = []
+        self.elsewhere = ""
 
     # -- ways -----------------------------------------------------------------------------------
 
@@ -104,12 +107,7 @@ class ContactRun:
         if self.last is None or self.last[0] * (factor - self.last[0]) < 0.0 or not self.last[1].mesh.touches:
             return None
         begin, start = self.last
-        held = self._through(base, begin, factor, start)
-        stood = self.scene.analysis.unstable == "leave" and self._judged(start, self.at(begin)).negative <= 0
-        if held is None or not stood or self._judged(held, self.at(factor)).negative <= 0:
-            return held
-        # A long step from a stable state may have met an unstable branch beside its own.
-        return self._through(base, begin, factor, start, longest=CAREFUL) or held
+        return self._through(base, begin, factor, start)
 
     def grown(self, base: Mesh, factor: float) -> Held | None:
         """From the undeformed scene, loads and motions growing together."""
@@ -127,14 +125,12 @@ class ContactRun:
         knots = {t for history in self.scene.histories.values() for t in history.t if low < t < high}
         return [begin, *sorted(knots, reverse=end < begin), end]
 
-    def _through(
-        self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...], longest: float = 1.0
-    ) -> Held | None:
+    def _through(self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...]) -> Held | None:
         stops = self._factors(begin, end)
         held: Held | None = None
         for a, b in zip(stops, stops[1:], strict=False):
             way = _between(a, b)
-            held = self.toucher.follow(base, way, start, longest)
+            held = self.toucher.follow(base, way, start)
             if held is None:
                 return None
             self.jumps += [a + part * (b - a) for part in self.toucher.snapped]
@@ -143,8 +139,9 @@ class ContactRun:
 
     @property
     def jumped(self) -> tuple[str, ...]:
-        """What is to be said of states that the last way left."""
-        return tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
+        """What is to be said of the last way, and of states that it left."""
+        told = (self.elsewhere,) if self.elsewhere else ()
+        return told + tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
 
     def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
         """From the state without obstacles, these coming back from where they do not reach it."""
@@ -164,11 +161,7 @@ class ContactRun:
         if found is None:
             return None
         self.jumps = list(self.cushions.left)
-        for touches in _readings(found.touches):
-            held = self.toucher.resolved(base, found.held, touches, self.at(factor))
-            if held is not None:
-                return held
-        return None
+        return self.toucher.read(base, found, self.at(factor))
 
     def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
         """What touches in the undeformed scene."""
@@ -190,7 +183,7 @@ class ContactRun:
                     continue
                 gaps = stop.gaps(line.positions(x), line.tangents(x))
                 found += self._lying(contact, member, x, gaps)
-        return tuple(found)
+        return self.reviser.numbered(tuple(found))
 
     def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
         """Places and stretches of the undeformed member at no distance."""
@@ -209,24 +202,41 @@ class ContactRun:
         """The point of the way that a factor is."""
         return Way(lambda model: model.loading(factor), {})
 
+    def unstopped(self, prepared: Prepared) -> Callable[[State, Loading, State, Loading], bool]:
+        """Whether a step without obstacles stays clear of all of them on its way."""
+
+        def held(state: State, loading: Loading) -> Held:
+            touched, point = Touched(prepared.equations, state, loading), prepared.equations.at(state, loading)
+            return Held(prepared, Corrected(state, point, True, 0, 0.0, 0.0, 0.0), loading, touched)
+
+        def allowed(before: State, at: Loading, after: State, loading: Loading) -> bool:
+            there = held(after, loading)
+            if there.touched.inside({}, self.reviser.sides, INSIDE * self.scene.size):
+                return False
+            return not self.toucher.passing.possible(held(before, at), there, {})
+
+        return allowed
+
     def clear(self, fields: Fields) -> bool:
         """Whether no obstacle is in the way of a state."""
         return not Touched.of(fields).inside({}, self.reviser.sides, self.fine * self.scene.size)
 
-    def reached(
-        self, base: Mesh, factor: float, free: Held | None, *, nearer: bool, falls: bool
-    ) -> Iterator[Held | None]:
-        """States in contact, one way after the other: the loads growing from zero, or near the state without obstacles.
+    def reached(self, base: Mesh, factor: float, free: Held | None, *, falls: bool) -> Iterator[Held | None]:
+        """States in contact, one way after the other: that of the growing loads is the answer, others are told.
 
-        What ``falls`` onto obstacles, as nothing else holds it, has no state under small loads to grow from.
+        Near the state without obstacles, ``free``, where a start place chooses it.  What ``falls`` onto obstacles, as
+        nothing else holds it, has no state under small loads to grow from.
         """
-        ways: list[Callable[[], Held | None]] = [lambda: self.cushioned(base, factor)]
+        ways: list[tuple[str, Callable[[], Held | None]]] = [
+            ("", lambda: self.continued(base, factor)),
+            ("" if falls else ELSEWHERE, lambda: self.cushioned(base, factor)),
+        ]
         if not falls:
-            ways.insert(0, lambda: self.grown(base, factor))
-            if free is not None:
-                ways.insert(0 if nearer else 2, lambda: self.retracted(base, factor, free))
-        for way in ways:
-            self.jumps = []
+            ways.insert(1, ("", lambda: self.grown(base, factor)))
+        if free is not None:
+            ways.insert(1, ("", lambda: self.retracted(base, factor, free)))
+        for note, way in ways:
+            self.jumps, self.elsewhere = [], note
             yield way()
 
     def refuse_what_cannot_be(self, pilot: Prepared, factor: float) -> None:
@@ -278,7 +288,7 @@ class ContactRun:
             What touches on a coarse mesh is not found again on a fine one.
         """
         way = self.at(factor)
-        held, left = self._left(held, way)
+        held, left = self._settled(held, way)
         self.last = (factor, held)
         now = held
         if held.mesh.order != target.order or self.fixed:
@@ -342,7 +352,7 @@ class ContactRun:
         """Stability with what touches held on its obstacles, free to slide along them."""
         notes: list[str] = []
         touched, touches = held.touched, held.mesh.touches
-        stability = self._judged(held, way)
+        stability = self.stability.judged(held, way)
         if touches:
             notes.append(f"in contact: {_told(held)}; stability is that with these places held on their obstacles")
         pushes = {touch.name: float(np.linalg.norm(touched.force(touch))) for touch in touches}
@@ -356,110 +366,14 @@ class ContactRun:
         """Stability of a state on its mesh with sliding places, also where these take stability away, and notes."""
         way = self.at(factor)
         stability, notes = self._stability(held, way)
-        judged = held.prepared.stability(rolling(held))
-        freed = self._freed(held, way) if judged.stable in (True, False) else 0
-        if freed:
-            ways_out = max(judged.negative + freed, 0)
-            stability = replace(judged, stable=ways_out == 0, negative=ways_out, smallest=np.nan)
-        return stability, tuple(notes)
+        return self.stability.strictly(held, way) or stability, tuple(notes)
 
-    def _judged(self, held: Held, way: Way) -> Stability:
-        """Stability on what touches with a force, at places that slide.
-
-        A stretch without pressure may leave its obstacle between its ends: only these hold it.
-        """
-        held = self._pressing(held, way)
-        stability = held.prepared.stability(rolling(held))
-        if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
-            # The smallest eigenvalue was that of places that do not slide.
-            stability = replace(stability, stable=True, negative=0, smallest=np.nan)
-        return stability
-
-    def _pressing(self, held: Held, way: Way) -> Held:
-        """The state with the ends of stretches without pressure in their place; itself where there is none."""
-        touches: list[Touch] = []
-        for touch in held.mesh.touches:
-            if touch.to is None:
-                touches.append(touch)
-                continue
-            pressed = held.touched.pressures(touch, np.linspace(touch.at, touch.to, 9))
-            idle = np.abs(pressed).max() < IDLE * float(np.linalg.norm(held.touched.force(touch)))
-            if idle and all(0.0 < x < 1.0 or held.touched.goes_on(touch, x) for x in touch.places):
-                inner = [x for x in touch.places if 0.0 < x < 1.0]
-                ends = (replace(touch, at=x, to=None, flat=True) for x in inner)
-                touches += [replace(end, number=touch.number + 50 * i) for i, end in enumerate(ends)]
-            else:
-                touches.append(touch)
-        if [t.to for t in touches] == [t.to for t in held.mesh.touches]:
-            return held
-        source = held.prepared.model, held.corrected.state
-        return self.settler.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
-
-    def _left(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
-        """An equilibrium in contact left for a stable one along its escape shape, as far as that is found."""
-        if self.scene.analysis.unstable != "leave" or not can_leave(held) or self._judged(held, way).negative <= 0:
+    def _settled(self, held: Held, way: Way) -> tuple[Held, tuple[str, ...]]:
+        """An unstable state left for a stable one, where that is wanted and found."""
+        if not self.toucher.unstable(held, way):
             return held, ()
-        pressing = self._pressing(held, way)
-        loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
-        source = pressing.prepared.model, pressing.corrected.state
-        for start in (pressing, self.settler.solved(replace(pressing.mesh, touches=loose), source, way)):
-            found = None if start is None else self._downhill(start, loose, way)
-            if found is not None and self._judged(found, way).negative <= 0:
-                return found, ("left an unstable equilibrium in contact along its escape shape",)
-        return held, (STAYS,)
-
-    def _downhill(self, start: Held, touches: tuple[Touch, ...], way: Way) -> Held | None:
-        """From an unstable state along its escape shape, then what touches is looked at again."""
-        prepared = start.prepared
-        try:
-            corrected, _ = prepared.leave(start.corrected.state, prepared.stability(start.corrected), start.loading)
-            touched = Touched(prepared.equations, corrected.state, start.loading)
-            there = Held(prepared, corrected, start.loading, touched)
-            return self.toucher.resolved(replace(start.mesh, touches=()), there, touches, way)
-        except SolveError:
-            return None
-
-    def _freed(self, held: Held, way: Way) -> int:
-        """How many more ways out there are when places of contact may slide along their members.
-
-        With f the force and g the gap, the Lagrangian ``Pi - f g(x, s)`` has the places s among its unknowns;
-        its inertia counted with s eliminated last and first gives the two numbers of ways out.
-        """
-        touched, touches = held.touched, held.mesh.touches
-        free = [(i, k) for i, t in enumerate(touches) for k, x in enumerate(t.places) if 0.0 < x < 1.0]
-        # Rolling on planes is among the entries already.
-        kinds = [touched.obstacles[touches[i].contact].kind for i, _ in free]
-        single = [
-            j for j, (i, _) in enumerate(free) if touches[i].to is None and not touches[i].flat and kinds[j] != "flat"
-        ]
-        # Where the member is straight at an edge, as before an end that hangs over, sliding changes nothing.
-        single = [j for j in single if not self._straight_over_edge(held, touches[free[j][0]])]
-        if not single:
-            return 0
-        slopes = self.settler.slopes(held, way)
-        if slopes is None:
-            return 0
-        own = np.array([touched.gap_curvature(touches[free[j][0]]) for j in single])
-        push = np.array([touched.push(touches[free[j][0]]) for j in single])
-        sharp = np.array([touched.obstacles[touches[free[j][0]].contact].kind == "sharp" for j in single])
-        weight = np.where(sharp, push * own, -push)
-        last = weight[:, None] * slopes[np.ix_(single, single)]
-        first = np.where(sharp, push * own, -push * own)
-        return int((np.linalg.eigvalsh(0.5 * (last + last.T)) < 0.0).sum()) - int((first < 0.0).sum())
-
-    @staticmethod
-    def _straight_over_edge(held: Held, touch: Touch) -> bool:
-        bent = abs(held.touched.gap_curvature(touch)) * held.prepared.model.scales.length
-        return held.touched.obstacles[touch.contact].kind == "sharp" and bent < STRAIGHT
-
-
-def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
-    """What touches as it was read from cushions; then without single places on members that lie on the obstacle too."""
-    yield touches
-    lying = {(t.contact, t.member) for t in touches if t.to is not None}
-    fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
-    if len(fewer) < len(touches):
-        yield fewer
+        there = self.toucher.left(held.mesh, held, way)
+        return (held, (STAYS,)) if there is None else (there, (LEFT,))
 
 
 def _judge(one: Held, other: Held, factor: float) -> tuple[float, float]:

@@ -106,28 +106,36 @@ class Cushions:
         ``left``, an attribute, is then the factors at which an unstable state was left on the way.
         """
         self.left = []
-        mesh = self._divided(base)
+        mesh, loading = self._divided(base), lambda model: model.loading(factors[-1])
         # What is free to move without obstacles; cushions themselves count as springs.
         bare = self.prepare(base)
         falls = bool(bare.diagnosis.mobility) or bare.lacks_slack
-        prepared = self.prepare(self._cushioned(mesh, THICKEST, factors[-1]))
+        prepared = self.prepare(self._cushioned(mesh, THICKEST, loading))
         found = self._grown(prepared, factors, falls) or self._direct(prepared, factors[-1])
         if found is None:
             return None
-        thickness = THICKEST
-        shrink = SHRINK
+        cushioned, rolled = self._thinned(mesh, prepared, found, loading)
+        self.left += [factors[-1]] if rolled else []
+        return cushioned
+
+    def _thinned(
+        self, mesh: Mesh, prepared: Prepared, found: Corrected, loading: Callable[[Model], Loading]
+    ) -> tuple[Cushioned, bool]:
+        """The state on thin cushions, and whether it was left there as unstable."""
+        thickness, shrink, rolled = THICKEST, SHRINK, False
         while thickness > 1.01 * THINNEST and shrink < LEAST_SHRINK:
             trial = max(shrink * thickness, THINNEST)
-            stiffer = self.prepare(self._cushioned(mesh, trial, factors[-1]))
-            there = self._settled(stiffer, found.state, stiffer.model.loading(factors[-1]))
+            stiffer = self.prepare(self._cushioned(mesh, trial, loading))
+            there = self._settled(stiffer, found.state, loading(stiffer.model))
             if there is None:
                 shrink = np.sqrt(shrink)
                 continue
             # What soft cushions hold thin ones may not: it rolls away over them, which what touches at places cannot.
-            prepared, found, thickness = stiffer, self._rolled(stiffer, there, factors[-1]), trial
-        loading = prepared.model.loading(factors[-1])
-        held = Held(prepared, found, loading, Touched(prepared.equations, found.state, loading))
-        return Cushioned(held, self._touches(held))
+            away = self._rolled(stiffer, there, loading(stiffer.model))
+            prepared, found, thickness, rolled = stiffer, away, trial, rolled or away is not there
+        here = loading(prepared.model)
+        held = Held(prepared, found, here, Touched(prepared.equations, found.state, here))
+        return Cushioned(held, self._touches(held)), rolled
 
     def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Corrected | None:
         """Loads growing through the factors from the undeformed scene."""
@@ -155,16 +163,19 @@ class Cushions:
     def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
         leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
 
-        def allowed(before: State, after: State) -> bool:
-            return self._passes(prepared, before, after, way(1.0))
+        def allowed(before: State, at: Loading, after: State, there: Loading) -> bool:
+            return self._passes(prepared, before, after, there, at)
 
         result = follow(prepared, way, state, leave=leave, allowed=allowed)
         self._parts = result.left
         return result.state if result.reached else None
 
-    def _passes(self, prepared: Prepared, before: State, after: State, loading: Loading) -> bool:
-        """Whether no member runs over an obstacle from one state to the next."""
-        courses = [self._courses(prepared, state, loading) for state in (before, after)]
+    def _passes(
+        self, prepared: Prepared, before: State, after: State, loading: Loading, at: Loading | None = None
+    ) -> bool:
+        """Whether no member runs over an obstacle from one state, ``at`` another loading if so, to the next."""
+        states = (before, loading if at is None else at), (after, loading)
+        courses = [self._courses(prepared, state, loading) for state, loading in states]
         return not any(
             swept(stop, courses[0][member], courses[1][member])
             for name, stop in self.obstacles.items()
@@ -206,20 +217,16 @@ class Cushions:
         start = prepared.equations.start(model.loading(0.0, 0.0))
         return found if found is not None and self._passes(prepared, start, found.state, loading) else None
 
-    def _rolled(self, prepared: Prepared, found: Corrected, factor: float) -> Corrected:
+    def _rolled(self, prepared: Prepared, found: Corrected, loading: Loading) -> Corrected:
         """Where an unstable state goes to, if that is not over an obstacle; else the state."""
         leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
         if not leave or not prepared.negative(found):
             return found
-        loading = prepared.model.loading(factor)
         try:
             there = prepared.leave(found.state, prepared.stability(found), loading)[0]
         except SolveError:
             return found
-        if not self._passes(prepared, found.state, there.state, loading):
-            return found
-        self.left.append(factor)
-        return there
+        return there if self._passes(prepared, found.state, there.state, loading) else found
 
     def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium near a state; downhill from there where Newton's method does not find it, if not far."""
@@ -254,11 +261,11 @@ class Cushions:
             cuts[name] = np.append(np.concatenate(parts), 1.0)
         return replace(base, order=ORDER, cuts=cuts, touches=())
 
-    def _cushioned(self, mesh: Mesh, thickness: float, factor: float) -> Mesh:
+    def _cushioned(self, mesh: Mesh, thickness: float, loading: Callable[[Model], Loading]) -> Mesh:
         """The mesh with its cushions."""
         bare = self.prepare(mesh).model
         thick = thickness * self.scene.size
-        stiffness = self._largest_force(bare, factor) * bare.scales.force / thick
+        stiffness = self._largest_force(loading(bare)) * bare.scales.force / thick
         found: list[Cushion] = []
         for contact in self.obstacles:
             seen: set[str] = set()
@@ -277,9 +284,8 @@ class Cushions:
         return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), self.obstacles[contact])
 
     @staticmethod
-    def _largest_force(model: Model, factor: float) -> float:
+    def _largest_force(loading: Loading) -> float:
         """Size of the forces that obstacles may have to take, dimensionless."""
-        loading = model.loading(factor)
         loads = float(np.linalg.norm(loading.force.sum(axis=0))), float(np.abs(loading.force).max(initial=0.0))
         return max(1.0, *loads, float(np.abs(loading.moment).max(initial=0.0)))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..description.obstacles import Obstacle, members_of, obstacle, swept, takes_part
+from ..description.obstacles import members_of, obstacle, takes_part
 from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mechanics.loading import Loading
@@ -29,9 +29,6 @@ ROUNDED = 1e-14
 
 LOADS = 1e-6
 """Share of the largest force or moment from which a load may open a stretch."""
-
-BEHIND = 1e-3
-"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
 
 CORNER = 1e-4
 """Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
@@ -82,26 +79,25 @@ class Reviser:
             tried.collapsed.add((touch.contact, touch.member))
             middle = 0.5 * sum(touch.places)
             at = middle if min(touch.places) > 0.0 and max(touch.places) < 1.0 else float(round(middle))
-            return _numbered((*rest, replace(touch, at=at, to=None)))
+            return self.numbered((*rest, replace(touch, at=at, to=None)))
         end = float(round(touch.places[k]))
         member = self.scene.members[touch.member]
         node = member.nodes[int(end)]
         if touch.to is not None:
-            return _numbered((*rest, moved(touch, k, end)))
+            return self.numbered((*rest, moved(touch, k, end)))
         others = [n for n, m in self.scene.members.items() if node in m.nodes and n != touch.member]
         sharp = self.scene.contacts[touch.contact].type in ("point", "line")
         if not self.takes_part(touch.contact, node) or (sharp and not others):
-            return _numbered(rest)
+            return self.numbered(rest)
         back = node in tried.crossed
         tried.crossed.add(node)
         for other in () if back else others:
             if self.scene.nodes[node].joint == "rigid" and self.scene.members[other].type == "flexible":
                 at = 1e-3 if self.scene.members[other].nodes[0] == node else 1.0 - 1e-3
-                return _numbered((*rest, replace(touch, member=other, at=at)))
-        return _numbered((*rest, replace(touch, at=end)))
+                return self.numbered((*rest, replace(touch, member=other, at=at)))
+        return self.numbered((*rest, replace(touch, at=end)))
 
-    @staticmethod
-    def _met(touches: Touches, one: int, other: int) -> Touches:
+    def _met(self, touches: Touches, one: int, other: int) -> Touches:
         """Two touches that ran into each other as one: a stretch over both; of two places the one between them."""
         places = (*touches[one].places, *touches[other].places)
         rest = tuple(touch for i, touch in enumerate(touches) if i not in (one, other))
@@ -109,7 +105,7 @@ class Reviser:
         joined = (
             replace(touches[one], at=low, to=high) if len(places) > 2 else replace(touches[one], at=0.5 * (low + high))
         )
-        return _numbered((*rest, joined))
+        return self.numbered((*rest, joined))
 
     def lying_to_the_end(self, ran: Ran) -> Touches | None:
         """A place that ran to an end where the end alone was wrong before: what is between them lies flat."""
@@ -122,7 +118,7 @@ class Reviser:
         if ran.collapsed or touch.to is not None or not flat or not self.takes_part(touch.contact, node):
             return None
         low, high = sorted((touch.at, end))
-        return _numbered((*touches[:i], replace(touch, at=low, to=high), *touches[i + 1 :])) if low < high else None
+        return self.numbered((*touches[:i], replace(touch, at=low, to=high), *touches[i + 1 :])) if low < high else None
 
     def check(self, touches: Touches) -> None:
         """Refuse what cannot be modelled.
@@ -164,30 +160,6 @@ class Reviser:
             found.append(touch)
         return tuple(found)
 
-    def ran_over(self, now: Held | None, there: Held) -> bool:
-        """Whether a step takes a member over an obstacle, or to the other side of one that it touches."""
-        touched = [touch.contact for touch in there.mesh.touches]
-        for contact, stop in there.touched.obstacles.items():
-            # On an edge itself no side can be told.
-            if stop.kind == "sharp" and contact in touched:
-                continue
-            for member in members_of(self.scene.contacts[contact], self.scene.members):
-                line = self.scene.center_lines[member]
-                begin = line.positions(np.linspace(0.0, 1.0, 65)) if now is None else now.touched.course(member)
-                if swept(self._behind(now, contact, member, stop), begin, there.touched.course(member)):
-                    return True
-        return False
-
-    def _behind(self, now: Held | None, contact: str, member: str, stop: Obstacle) -> Obstacle:
-        """An edge that a member begins to leave a little behind where it is: on the edge itself no side can be told."""
-        if now is None or stop.kind != "sharp":
-            return stop
-        for touch in now.mesh.touches:
-            if (touch.contact, touch.member) == (contact, member):
-                shift = BEHIND * self.scene.size * now.touched.normal(touch, touch.at)
-                return replace(stop, place=stop.place - shift)
-        return stop
-
     def wrong(self, held: Held, way: Way, tried: Tried | None = None) -> Touches | None:
         """What has to touch otherwise at this state, after what was ``tried``; None where all is right."""
         tried = tried or Tried()
@@ -196,18 +168,18 @@ class Reviser:
         pulls = [(touched.push(touch), i) for i, touch in enumerate(touches) if touch.to is None]
         if pulls and min(pulls)[0] < -smallest:
             i = min(pulls)[1]
-            return _numbered(touches[:i] + touches[i + 1 :])
+            return self.numbered(touches[:i] + touches[i + 1 :])
         for i, touch in enumerate(touches):
             loose = touched.loose_end(touch)
             if loose is not None:
-                return _numbered((*touches[:i], *self._loosened(held, touch, loose), *touches[i + 1 :]))
+                return self.numbered((*touches[:i], *self._loosened(held, touch, loose), *touches[i + 1 :]))
         flatter = self._opened(held) or self._flattened(held, way, tried) or self._joined(held, way)
         if flatter is not None:
             return flatter
         gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size, self.noise * self.scene.size)
         if not gaps:
             return self._lifted(held)
-        return _numbered(self._with(held, min(gaps, key=lambda gap: gap.depth)))
+        return self.numbered(self._with(held, min(gaps, key=lambda gap: gap.depth)))
 
     def _loosened(self, held: Held, touch: Touch, loose: Loose) -> list[Touch]:
         """A stretch with an end that cannot lie there: shorter, or longer where the next member is pressed as well."""
@@ -235,7 +207,7 @@ class Reviser:
             if opened.node is None:
                 low = opened.at - min(wide, 0.9 * (opened.at - touch.at))
                 high = opened.at + min(wide, 0.9 * (float(touch.to or 0.0) - opened.at))
-                return _numbered((*rest, replace(touch, to=low), replace(touch, at=high)))
+                return self.numbered((*rest, replace(touch, to=low), replace(touch, at=high)))
             found = []
             for other in touches:
                 nodes = self.scene.members[other.member].nodes
@@ -245,7 +217,7 @@ class Reviser:
                     inwards = (1.0 - 2.0 * ends[0]) * min(scale * wide, 0.9 * (other.to - other.at))
                     other = moved(other, int(ends[0]), ends[0] + inwards)
                 found.append(other)
-            return _numbered(tuple(found))
+            return self.numbered(tuple(found))
         return None
 
     def _flattened(self, held: Held, way: Way, tried: Tried) -> Touches | None:
@@ -266,7 +238,7 @@ class Reviser:
             lying = [None if self._humps(held, part, way) else self._laid(held, part) for part in beside]
             found = [part for part in lying if part is not None]
             if found:
-                return _numbered((*touches[:i], *found, *touches[i + 1 :]))
+                return self.numbered((*touches[:i], *found, *touches[i + 1 :]))
         return None
 
     def _across_node(self, touch: Touch) -> list[Touch]:
@@ -352,7 +324,7 @@ class Reviser:
                 low, high = (low, high) if gone is None else (min(low, *gone.places), max(high, *gone.places))
                 lying = replace(touch, at=low, to=high, way=self._bend(held, touch))
                 rest = tuple(t for t in touches if t is not touch and t is not gone)
-                return _numbered((*rest, lying))
+                return self.numbered((*rest, lying))
         return None
 
     def _lifted(self, held: Held) -> Touches | None:
@@ -371,7 +343,7 @@ class Reviser:
                     short = high - low < 0.05 * (touch.to - touch.at)
                     outer = low if low == touch.at else high
                     parts.append(replace(touch, at=outer if short else low, to=None if short else high))
-                return _numbered((*rest, *parts))
+                return self.numbered((*rest, *parts))
         return None
 
     def _with(self, held: Held, gap: Gap) -> Touches:
@@ -418,17 +390,21 @@ class Reviser:
         point, tangent = fields.positions(touch.member, x)[0], fields.tangents(touch.member, x)[0]
         return float(np.sign(stop.curvature(point, tangent))) or 1.0
 
-
-def _numbered(touches: Touches) -> Touches:
-    """Touches of the same two told apart by numbers, in the order of their places; each place once."""
-    count: dict[tuple[str, str], int] = {}
-    found: list[Touch] = []
-    lying = [(t.contact, t.member, x) for t in touches if t.to is not None for x in t.places]
-    for touch in sorted(touches, key=lambda t: (t.contact, t.member, t.at)):
-        key = (touch.contact, touch.member)
-        if touch.to is None and (*key, touch.at) in lying:
-            continue
-        lying += [(*key, touch.at)] if touch.to is None else []
-        found.append(replace(touch, number=count.get(key, 0)))
-        count[key] = count.get(key, 0) + 1
-    return tuple(found)
+    def numbered(self, touches: Touches) -> Touches:
+        """Touches of the same two told apart by numbers, in the order of their places; each place and node once."""
+        count: dict[tuple[str, str], int] = {}
+        found: list[Touch] = []
+        lying: list[tuple[str, str, float | None]] = [
+            (t.contact, t.member, x) for t in touches if t.to is not None for x in t.places
+        ]
+        for touch in sorted(touches, key=lambda t: (t.contact, t.member, t.at)):
+            key = (touch.contact, touch.member)
+            node = self.scene.members[touch.member].node_at(touch.at)
+            sharp = self.scene.contacts[touch.contact].type in ("point", "line")
+            at_node = (touch.contact, node, None) if node and not sharp else (*key, touch.at)
+            if touch.to is None and ((*key, touch.at) in lying or at_node in lying):
+                continue
+            lying += [(*key, touch.at), at_node] if touch.to is None else []
+            found.append(replace(touch, number=count.get(key, 0)))
+            count[key] = count.get(key, 0) + 1
+        return tuple(found)

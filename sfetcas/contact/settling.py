@@ -18,11 +18,24 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch, breaks_of
 from ..mechanics.model import Model
+from ..solvers.dragging import Drag
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from .touches import Touched
 
-__all__ = ["APART", "SETTLED", "Held", "Ran", "Settler", "Way", "free_places", "moved", "placed", "stretched"]
+__all__ = [
+    "APART",
+    "SETTLED",
+    "Held",
+    "Ran",
+    "Settler",
+    "Way",
+    "carried_over",
+    "free_places",
+    "moved",
+    "placed",
+    "stretched",
+]
 
 NEAR = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
@@ -73,10 +86,15 @@ class Held:
 
 @dataclass(frozen=True)
 class Way:
-    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m."""
+    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m.
+
+    With ``drag`` rotations since the state ``since`` are resisted, see :mod:`~sfetcas.solvers.dragging`.
+    """
 
     loading: Callable[[Model], Loading]
     offsets: Mapping[str, float]
+    since: tuple[Model, State] | None = None
+    drag: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -174,6 +192,16 @@ def closed(equations: Equations, state: State, loading: Loading, known: Collecti
     return replace(state, y=y)
 
 
+def carried_over(
+    scene: Scene, source: tuple[Model, State], before: Loading, prepared: Prepared, loading: Loading
+) -> State:
+    """A state of one model as the start on another: nodes where they were, closings met, multipliers in balance."""
+    state = _carried(source, before, prepared.model, transferred(source[0], source[1], prepared.model))
+    known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in scene.nodes for axis in "xyz")}
+    state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
+    return balanced(prepared.equations, state, loading)
+
+
 class Settler:
     """Equilibria of one scene with given touches.
 
@@ -208,12 +236,11 @@ class Settler:
         elif same:
             state = source[1]
         else:
-            state = transferred(source[0], source[1], prepared.model)
-            state = _carried(source, way.loading(source[0]), prepared.model, state)
-            known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in self.scene.nodes for axis in "xyz")}
-            state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
-            state = balanced(prepared.equations, state, loading)
-        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN)
+            state = carried_over(self.scene, source, way.loading(source[0]), prepared, loading)
+        drag = None
+        if way.since is not None:
+            drag = Drag(prepared.equations, transferred(*way.since, prepared.model), way.drag)
+        corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN, drag=drag)
         if not corrected.converged and not corrected.residual <= 1e-9:
             return None
         return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))

@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,11 +19,14 @@ from ..description.scene import Scene
 from ..errors import SolveError
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.prepared import Prepared
+from .contact_stability import ContactStability, can_leave
+from .cushions import Cushioned, Cushions
+from .passing import Passing
 from .revising import Reviser, Tried
 from .settling import Held, Ran, Settler, Way, placed
 from .touches import Touched
 
-__all__ = ["Toucher", "can_leave"]
+__all__ = ["Toucher"]
 
 CHANGES = 24
 """Changes of what touches at one point of the way before the step is taken to be too long."""
@@ -31,17 +34,35 @@ CHANGES = 24
 SHORTEST = 2e-5, 5e-4
 """First and later steps below this part of the way end the search."""
 
-SNAP = 2e-3
-"""Part of the way beyond a limit point at which a state is left for another."""
+SNAPS = 5e-3, 2e-2, 5e-2
+"""Parts of the way beyond a limit point or a bifurcation at which a state is left for another, nearer ones first."""
 
-MOST_SNAPS = 4
+MOST_SNAPS = 8
 """Snaps on one way."""
 
-MOST_SOLVES = 200
-"""Equilibria with places held that are solved on one way."""
+MOST_SOLVES, MOST_ON_WAY = 200, 3000
+"""Equilibria with places held that are solved at one point of a way, and on all of it."""
 
-TRIES = 60
+TRIES = 500
 """Steps tried before giving up."""
+
+FALLS = 80
+"""Steps of a fall."""
+
+FIRST_DRAG, LEAST_DRAG, MOST_DRAG, DRAG_BEYOND = 1.0, 1e-6, 1e7, 2.0
+"""Drag at first, least and most, and at least over the size of the lowest eigenvalue below zero."""
+
+SLOW = 0.1
+"""What turns by less in a step, rad, may be near where it comes to rest."""
+
+NUDGE = 0.05
+"""Angle, rad, by which an unstable equilibrium is moved along its escape shape to begin to fall."""
+
+FIRST, AFTER_JUMP = 0.25, 0.05
+"""Parts of the way of the first step, and of the one after a state was left."""
+
+NARROW = 0.02
+"""The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
 
 class Toucher:
@@ -67,6 +88,9 @@ class Toucher:
     ) -> None:
         self.scene, self.prepare = scene, prepare
         self.settler, self.reviser = Settler(scene, prepare), Reviser(scene, limit, sides)
+        self.stability = ContactStability(self.settler)
+        self.cushions = Cushions(scene, prepare, sides)
+        self.passing = Passing(scene, self.cushions.obstacles)
         self.leave = scene.analysis.unstable == "leave"
         self.snapped: list[float] = []
 
@@ -101,67 +125,168 @@ class Toucher:
                 continue
             wrong = self.reviser.wrong(found, way, tried)
             if wrong is None:
-                return None if self.reviser.ran_over(now, found) else found
+                return None if self.passing.over(now, found) else found
             touches = wrong
             source = found.prepared.model, found.corrected.state
         return None
 
-    def follow(
-        self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...], longest: float = 1.0
-    ) -> Held | None:
+    def follow(self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...]) -> Held | None:
         """Follow from the begin of a way to its end; from a state there, or from the undeformed scene.
 
-        No step is longer than ``longest``, a part of the way.
+        No step turns a place by more than :data:`~sfetcas.contact.passing.STRIDE` or may have passed an obstacle, and
+        a state that ceases to be stable is left as soon as that is seen, if that is wanted.
 
-        ``snapped``, an attribute, is then the parts of the way at which a state was left that ceased to be.
+        ``snapped``, an attribute, is then the parts of the way at which a state was left, or ceased to be.
         """
         self.snapped = []
-        now = start if isinstance(start, Held) else None
+        most = self.settler.solves + MOST_ON_WAY
+        now = start if isinstance(start, Held) else self.resolved(base, None, start, way(0.0))
         touches = start.mesh.touches if isinstance(start, Held) else start
-        done, step = 0.0, min(0.5, longest)
-        most = self.settler.solves + MOST_SOLVES
+        stands = now is not None and not self.unstable(now, way(0.0))
+        done, step, barrier = 0.0, FIRST, np.inf
         for _ in range(TRIES):
             if done >= 1.0:
                 return now
             if self.settler.solves > most:
                 return None
+            # Beyond a place that was seen to be wrong there is no use in trying.
+            step = min(step, 0.5 * (barrier - done))
             trial = min(1.0, done + step)
-            there = self.resolved(base, now, touches, way(trial), most)
+            there = self.resolved(base, now, touches, way(trial))
+            if there is not None and now is not None and self.passing.possible(now, there, way(trial).offsets):
+                there = None
+            falls = there is not None and stands and self.unstable(there, way(trial))
+            if falls and trial - done > max(NARROW * trial, SHORTEST[0]):
+                barrier = trial
+                continue
             if there is None:
                 step *= 0.25
                 if step >= SHORTEST[done > 0.0]:
                     continue
-                trial = min(1.0, done + SNAP)
-                there = self._snapped(base, now, way(trial))
-                if there is None:
+            if there is None or falls:
+                jump = self._jumped(base, there or now, trial if falls else done, way)
+                if jump is None and there is None:
                     return None
-                self.snapped.append(trial)
-                step = 0.05
+                if jump is not None:
+                    trial, there = jump
+                    self.snapped.append(trial)
+                step, barrier = AFTER_JUMP, np.inf
+            assert there is not None
             now, touches, done = there, there.mesh.touches, trial
-            step = min(2.0 * step, longest)
+            barrier = np.inf if done >= barrier else barrier
+            stands = not self.unstable(now, way(done))
+            step *= 2.0
         return None
 
-    def _snapped(self, base: Mesh, now: Held | None, way: Way) -> Held | None:
-        """Where a state that ceases to be goes to: downhill on what touches, then what touches is looked at again."""
+    # -- unstable states ------------------------------------------------------------------------
+
+    def unstable(self, held: Held, way: Way) -> bool:
+        """Whether a state is unstable, and such states are to be left."""
+        return self.leave and can_leave(held) and self.stability.judged(held, way).negative > 0
+
+    def left(self, base: Mesh, held: Held, way: Way) -> Held | None:
+        """A stable state that an unstable one goes to, past no obstacle; None where none is found."""
+        pressing = self.stability.pressing(held, way)
+        loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
+        source = pressing.prepared.model, pressing.corrected.state
+        for start in (pressing, self.settler.solved(replace(pressing.mesh, touches=loose), source, way)):
+            found = None if start is None else self._along_escape(start, way, loose)
+            if found is not None and not self.unstable(found, way) and not self._passed(held, found, way):
+                return found
+        return self._fallen(base, self._nudged(pressing), loose, way)
+
+    def _passed(self, held: Held, found: Held, way: Way) -> bool:
+        """Whether a state may be beyond an obstacle: the ends of a jump may be far apart."""
+        return self.passing.possible(held, found, way.offsets, stride=np.inf)
+
+    def _jumped(
+        self, base: Mesh, now: Held | None, done: float, way: Callable[[float], Way]
+    ) -> tuple[float, Held] | None:
+        """A part of the way shortly beyond one at which a state ceases to be, or to be stable, and where it goes."""
         if now is None or not self.leave or not can_leave(now) or len(self.snapped) >= MOST_SNAPS:
             return None
-        touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in now.mesh.touches)
-        prepared = self.prepare(replace(now.mesh, touches=touches))
+        ways_out = self.unstable(now, way(done))
+        for beyond in SNAPS:
+            trial = min(1.0, done + beyond)
+            at = way(trial)
+            there = self.resolved(base, now, now.mesh.touches, at) if ways_out else None
+            if there is not None and self.passing.possible(now, there, at.offsets):
+                there = None
+            found = self._along_escape(now, at, now.mesh.touches) if there is None else self.left(base, there, at)
+            if there is None and (found is None or self._passed(now, found, at)):
+                found = self._fallen(base, now, now.mesh.touches, at)
+            if found is not None:
+                return trial, found
+            if trial == 1.0:
+                break
+        return None
+
+    def _along_escape(self, start: Held, way: Way, touches: tuple[Touch, ...]) -> Held | None:
+        """Downhill from a state along its escape shape, then what touches is looked at again."""
+        prepared = start.prepared
+        if way.offsets:
+            mesh_touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in start.mesh.touches)
+            prepared = self.prepare(replace(start.mesh, touches=mesh_touches))
         loading = way.loading(prepared.model)
-        stability = now.prepared.stability(now.corrected)
         try:
-            corrected, _ = prepared.leave(now.corrected.state, stability, loading)
+            corrected, _ = prepared.leave(start.corrected.state, start.prepared.stability(start.corrected), loading)
+            touched = Touched(prepared.equations, corrected.state, loading)
+            there = Held(prepared, corrected, loading, touched)
+            return self.resolved(replace(start.mesh, touches=()), there, touches, way)
         except SolveError:
             return None
-        there = Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
-        found = self.resolved(base, there, touches, way)
-        return None if found is None or self.reviser.ran_over(now, found) else found
+
+    def _fallen(self, base: Mesh, now: Held, touches: tuple[Touch, ...], way: Way) -> Held | None:
+        """Where a state falls to through something viscous, stopped by obstacles; None where it does not come to rest.
+
+        Steps become longer as it slows down.  Drag stays beyond the lowest eigenvalue below zero, so that each step has
+        one minimum.
+        """
+        drag = FIRST_DRAG
+        for _ in range(FALLS):
+            stability = self.stability.judged(now, way)
+            drag = max(drag, -DRAG_BEYOND * stability.smallest if stability.negative > 0 else 0.0, LEAST_DRAG)
+            since = now.prepared.model, now.corrected.state
+            there = self.resolved(base, now, touches, replace(way, since=since, drag=drag))
+            if there is None or self.passing.possible(now, there, way.offsets):
+                drag *= 4.0
+                if drag > MOST_DRAG:
+                    return None
+                continue
+            turned = self.passing.turned(now, there)
+            now, touches = there, there.mesh.touches
+            if turned < SLOW and not self.unstable(now, way):
+                rest = self.resolved(base, now, touches, way)
+                if rest is not None and not self.passing.possible(now, rest, way.offsets):
+                    return None if self.unstable(rest, way) else rest
+            drag *= 0.25 if turned < 0.5 * SLOW else 0.5 if turned < SLOW else 1.0
+        return None
+
+    @staticmethod
+    def _nudged(held: Held) -> Held:
+        """An unstable equilibrium moved along its escape shape, so that it begins to fall."""
+        prepared, loading = held.prepared, held.loading
+        stability = prepared.stability(held.corrected)
+        state = prepared.nudged(held.corrected.state, stability, loading, NUDGE)
+        corrected = replace(held.corrected, state=state, point=prepared.equations.at(state, loading))
+        return Held(prepared, corrected, loading, Touched(prepared.equations, state, loading))
+
+    def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
+        """The state in contact that one on cushions stands for."""
+        for touches in _readings(found.touches):
+            held = self.resolved(base, found.held, touches, way)
+            if held is not None:
+                return held
+        return None
 
 
-def can_leave(held: Held) -> bool:
-    """Whether there is an energy and anything left to move."""
-    equations = held.prepared.equations
-    return held.prepared.model.minimisable and equations.rows < equations.unknowns
+def _readings(touches: tuple[Touch, ...]) -> Iterator[tuple[Touch, ...]]:
+    """What touches as it was read from cushions; then without single places on members that lie on the obstacle too."""
+    yield touches
+    lying = {(t.contact, t.member) for t in touches if t.to is not None}
+    fewer = tuple(t for t in touches if t.to is not None or (t.contact, t.member) not in lying)
+    if len(fewer) < len(touches):
+        yield fewer
 
 
 def _alike(a: tuple[Touch, ...], b: tuple[Touch, ...]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -59,9 +60,6 @@ CRITICAL = (
     f"that come no closer; {SHARED}"
 )
 
-CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
-"""Growth of the loads from step to step where a structure between obstacles becomes unstable."""
-
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
@@ -83,6 +81,7 @@ class Piloting(Meshing):
     def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
         super().__init__(scene, settings, stops)
         self.leave = scene.analysis.unstable == "leave"
+        self.allowed: Callable[[Prepared], Callable[[State, Loading, State, Loading], bool]] | None = None
         self.started = any(node.start is not None for node in scene.nodes.values())
 
     def _found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
@@ -267,11 +266,12 @@ class Piloting(Meshing):
     def _followed(self, pilot: Prepared, way: Any, state: State, factors: tuple[float, float] | None) -> Found | None:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
-        result = follow(pilot, way, state, leave=leave)
+        allowed = self.allowed and self.allowed(pilot)
+        result = follow(pilot, way, state, leave=leave, allowed=allowed)
         passed = not result.reached and leave and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
-            result = follow(pilot, way, state, leave=False)
+            result = follow(pilot, way, state, leave=False, allowed=allowed)
         if not result.reached:
             return None
         corrected = pilot.correct(result.state, way(1.0))

@@ -124,8 +124,9 @@ class Refining(Piloting):
         near = prepared.correct(state, loading, iterations=25, most=1.5)
         if not flat or not near.converged:
             return near
-        shape = prepared.stability(near).shape
-        held = prepared.correct(state, loading, iterations=25, most=1.5, flat=shape)
+        _, values, shapes = prepared.around_zero(near.point)
+        still = shapes[:, np.abs(values) <= prepared.stability(near).limit]
+        held = prepared.correct(state, loading, iterations=25, most=1.5, flat=still)
         return held if held.converged else near
 
     def _refined(self, pilot: Found, factor: float) -> Equilibrium:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 from ..contact.contact_balance import refuse_lost_forces, refuse_unbalanced
@@ -30,7 +29,7 @@ from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 from ..solvers.unheld import refuse_unheld
 from .meshing import Found
-from .piloting import NO_ENERGY, NO_POTENTIAL
+from .piloting import NO_ENERGY
 from .quantities import WHERE
 from .refining import LEVELS, Refining
 from .scanning import Scan, scan
@@ -40,9 +39,6 @@ from .single import finished, solve_model, unjudged
 from .solution import Equilibrium, Solution, at_factor
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
-
-CREEP = (1.002, 1.01, 1.03, *(1.1 + 0.1 * i for i in range(40)))
-"""Growth of the loads from step to step where a structure between obstacles becomes unstable."""
 
 
 @single_threaded
@@ -89,7 +85,6 @@ class _Run(Refining):
 
     def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
         super().__init__(scene, settings, stops)
-        self.creeping = False
         self.others: list[tuple[Model, State]] = []
 
     def solution(self) -> Solution:
@@ -207,34 +202,40 @@ class _Run(Refining):
     def _in_contact(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium:
         """The answer where obstacles may stop members."""
         base = self.pilot_mesh.refined()
-        notes: tuple[str, ...] = ()
-        last = contact.continued(base, factor)
+        notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
         falls = bool(pilot.diagnosis.mobility) and not contact.first_touches(base)
-        held, failure = None, None
-        if last is None or not last.mesh.touches:
-            free, failure = self._unstopped(pilot, factor)
-            if free is not None and free.left and not self.creeping and not self.scene.histories:
-                return self._crept(contact, pilot, factor, free.left[0])
-            last = None
-            if free is not None:
-                there = self._onto(base, free, factor)
-                held = _as_held(there, factor)
-                # What was seen on the way without obstacles says nothing about the one in contact.
-                notes = tuple(note for note in there.notes if note != NO_POTENTIAL)
-                free_way = contact.reviser.wrong(held, contact.at(factor)) is None
-                over = contact.reviser.ran_over(None, held)
-                if free_way and not over:
-                    answer = self._refined(free, factor)
-                    if contact.clear(answer.fields):
-                        contact.last = (factor, held)
-                        return answer
-                # Beyond an obstacle and clear of it: only a start may choose that.
-                held = None if free_way and over and not self.started else held
-        ways = contact.reached(base, factor, held, nearer=self.started or bool(notes), falls=falls)
-        notes += () if pilot.model.conservative else (NO_ENERGY,)
-        # Of what is free to move nothing else says more: without obstacles it falls, whatever they hold.
-        failure = None if pilot.diagnosis.mobility else failure
-        return self._first_pressed(contact, chain([last], ways), factor, notes, failure)
+        known = pilot.model.minimisable and not (pilot.diagnosis.mobility or pilot.lacks_slack)
+        if known and not (self.started or contact.last or contact.first_touches(base)):
+            found = self._clear_all_the_way(contact, pilot, factor)
+            if found is not None:
+                return found
+        unstopped, failure = self._unstopped(pilot, factor) if self.started else (None, None)
+        free = None
+        if unstopped is not None:
+            there = self._onto(base, unstopped, factor)
+            notes += there.notes
+            free = _as_held(there, factor)
+            if contact.reviser.wrong(free, contact.at(factor)) is None:
+                answer = self._refined(unstopped, factor)
+                if contact.clear(answer.fields):
+                    contact.last = (factor, free)
+                    return answer
+        ways = contact.reached(base, factor, free, falls=falls)
+        return self._first_pressed(contact, ways, factor, notes, failure)
+
+    def _clear_all_the_way(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium | None:
+        """The answer without obstacles, where the growing loads lead there past none of them; else None."""
+        self.allowed = contact.unstopped
+        try:
+            found = self._grown_from_zero(pilot, factor)
+        except SolveError:
+            found = None
+        finally:
+            self.allowed = None
+        if found is None or (self.leave and found.stability.negative > 0):
+            return None
+        answer = self._refined(found, factor)
+        return answer if contact.clear(answer.fields) else None
 
     def _first_pressed(
         self,
@@ -270,20 +271,6 @@ class _Run(Refining):
         """How far two states in contact are apart, and the estimated error of the finer one."""
         one, other = (unjudged(held.prepared, held.corrected, held.loading, factor) for held in (coarse, fine))
         return self.judged(one, other)
-
-    def _crept(self, contact: ContactRun, pilot: Prepared, factor: float, unstable: float) -> Equilibrium:
-        """The same by small steps from where the loads would make it jump: nothing jumps over an obstacle."""
-        self.creeping = True
-        try:
-            beyond = unstable
-            for growth in CREEP:
-                beyond *= growth
-                if beyond >= 1.0:
-                    break
-                self._in_contact(contact, pilot, beyond * factor)
-            return self._in_contact(contact, pilot, factor)
-        finally:
-            self.creeping = False
 
     def _unstopped(self, pilot: Prepared, factor: float) -> tuple[Found | None, SolveError | None]:
         """The answer as if there were no obstacles; None where nothing else holds the structure."""

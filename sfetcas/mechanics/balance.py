@@ -135,16 +135,17 @@ class Balance:
             return sum((self._totals[turn] for turn in self._pinned(node)), np.zeros(3))
         if self._shared(number):
             return self._rigid[1].get(node, np.zeros(3))
-        return self._held(node, number)
+        left = self._totals[number]
+        free = self.model.rotations.kind[number] == Turn.FREE
+        return left if free and self.model.scene.nodes[node].support == "universal" else self.held(number, left)
 
-    def _held(self, node: str, number: int) -> Array:
-        """What is left of the moments on a rotation about what the ground holds: the rest is not exactly in balance."""
-        kind, left = self.model.rotations.kind[number], self._totals[number]
+    def held(self, number: int, moment: Array) -> Array:
+        """The share of a moment on a rotation that the ground holds: about what is free nothing does."""
+        kind = self.model.rotations.kind[number]
         if kind == Turn.AXIS:
             axis = self.model.rotations.axis[number]
-            return left - (axis @ left) * axis
-        free = kind == Turn.FREE and self.model.scene.nodes[node].support != "universal"
-        return np.zeros(3) if free else left
+            return moment - (axis @ moment) * axis
+        return np.zeros(3) if kind == Turn.FREE else moment
 
     def _pinned(self, node: str) -> list[int]:
         """Rotations of member ends that the support itself pins, the node having none."""

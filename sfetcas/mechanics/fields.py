@@ -89,7 +89,9 @@ class Fields:
                 raw, laid = (self._along(touch.member, np.array([at]), pressed=pressed) for pressed in (False, True))
                 sign = 2.0 * i - 1.0
                 force = force + sign * (laid["force"][0] - raw["force"][0])
-                moment = moment + sign * (laid["moment"][0] - raw["moment"][0])
+                # What the support does not hold the rows of the obstacle take already.
+                turn = self.model.rotations.ends[touch.member][i]
+                moment = moment + self.balance.held(turn, sign * (laid["moment"][0] - raw["moment"][0]))
         return force, moment
 
     def spring(self, name: str) -> SpringState:

@@ -238,7 +238,7 @@ class Tracer:
         if released != held.mesh.touches:
             return released
         changed = reviser.wrong(held, way)
-        return now.held.mesh.touches if changed is None and reviser.ran_over(now.held, held) else changed
+        return now.held.mesh.touches if changed is None and self.run.toucher.passing.over(now.held, held) else changed
 
     # -- over changes of what touches -----------------------------------------------------------
 

@@ -40,6 +40,9 @@ HALF_TURN = np.pi
 NARROW = 0.02
 """The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
+BLOCKED = 1e-3
+"""Part of the way of a step that is short enough to end the way where it is not allowed."""
+
 MOST = 400
 """Steps tried before giving up."""
 
@@ -86,12 +89,13 @@ def follow(
     state: State,
     *,
     leave: bool = True,
-    allowed: Callable[[State, State], bool] | None = None,
+    allowed: Callable[[State, Loading, State, Loading], bool] | None = None,
 ) -> Followed:
     """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
     With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A step
-    that is not ``allowed`` from one state to the next is too long.
+    that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
+    the way ends.
     """
     # In space a whole turn of what is held or driven looks like none: no step may turn it by more than a radian.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
@@ -100,6 +104,10 @@ def follow(
     done, step = 0.0, 0.5
     left: list[float] = []
     now = prepared.correct(state, way(0.0))
+
+    def free(there: State, at: float) -> bool:
+        return allowed is None or allowed(now.state, way(done), there, way(at))
+
     for _ in range(MOST if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL):
         if done >= 1.0:
             return Followed(now.state, True, tuple(left))
@@ -110,7 +118,12 @@ def follow(
         )
         # Where turns are counted a step that turns by more than half of one could lose one.
         far = prepared.model.winding.count and there.first > HALF_TURN
-        good = there.converged and not far and (allowed is None or allowed(now.state, there.state))
+        good = there.converged and not far
+        if good and not free(there.state, trial):
+            if step <= BLOCKED:
+                break
+            step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
+            continue
         if not good:
             if step > max(SHORTEST * done, TINY):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
@@ -119,7 +132,7 @@ def follow(
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
             snapped = _left(prepared, now, way(trial))
-            if snapped is None or not (allowed is None or allowed(now.state, snapped.state)):
+            if snapped is None or not free(snapped.state, trial):
                 break
             now = snapped
             left.append(done)
@@ -130,7 +143,7 @@ def follow(
                 step = 0.5 * (trial - done)
                 continue
             escaped = _left(prepared, there, way(trial))
-            if escaped is None or not (allowed is None or allowed(now.state, escaped.state)):
+            if escaped is None or not free(escaped.state, trial):
                 break
             there = escaped
             left.append(trial)

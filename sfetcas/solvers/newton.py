@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -99,6 +100,7 @@ def correct(
     contraction: float = 1.0,
     tangent: Array | None = None,
     flat: Array | None = None,
+    drag: Callable[[State, Point], Point] | None = None,
 ) -> Corrected:
     """Newton's method from a near state down to rounding.
 
@@ -116,10 +118,18 @@ def correct(
         Entries of the Newton matrix of the equilibrium that is left, for the first step: then it goes along the
         path, while the matrix under the new load may already point away from it.
     flat : ndarray, optional
-        A shape (turning unknowns) of a flat energy: no step goes along it.
+        Shapes of a flat energy, columns (turning unknowns, shapes): no step goes along them.
+    drag : callable, optional
+        Adds couples that resist to the equations, see :mod:`~sfetcas.solvers.dragging`; the point that is returned
+        has none.
     """
+
+    def dragged(state: State) -> Point:
+        point = equations.at(state, loading)
+        return point if drag is None else drag(state, point)
+
     state = equations.holding(state, loading)
-    point = equations.at(state, loading)
+    point = dragged(state)
     residual = relative_residual(equations, point)
     first = second = last = np.inf
     begun = state, point, residual
@@ -137,7 +147,8 @@ def correct(
             break
         turning = step[: equations.turning_unknowns]
         if flat is not None:
-            turning -= flat * (turning @ (weight * flat)) / (flat @ (weight * flat))
+            weighted = weight[:, None] * flat
+            turning -= flat @ np.linalg.lstsq(flat.T @ weighted, weighted.T @ turning, rcond=None)[0]
         length = float(np.abs(turning).max(initial=0.0))
         if not np.isfinite(length):
             break
@@ -151,7 +162,7 @@ def correct(
             return Corrected(state, point, False, count, first, second, residual)
         last = length
         trial = equations.moved(state, step)
-        there = equations.at(trial, loading)
+        there = dragged(trial)
         gained = relative_residual(equations, there)
         if residual <= tolerance and gained > 0.25 * residual and (count or _balanced(equations, point)):
             if gained < residual:
@@ -163,7 +174,9 @@ def correct(
     if not residual <= tolerance and begun[2] <= tolerance:
         state, point, residual = begun
     second = 0.0 if second == np.inf else second
-    if residual <= tolerance:
+    if drag is not None:
+        point = equations.at(state, loading)
+    elif residual <= tolerance:
         state, point = with_sharing(equations, state, loading, point, tolerance)
         residual = relative_residual(equations, point)
     return Corrected(state, point, residual <= tolerance, count, first, second, residual)

@@ -282,7 +282,7 @@ class Prepared:
         amplitude = 0.2
         for _ in range(ESCAPES):
             try:
-                found = self._fallen(self._nudged(state, stability, loading, amplitude), loading)
+                found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
             except SolveError:
                 if not self.model.minimisable:
                     # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
@@ -306,7 +306,7 @@ class Prepared:
             raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
         return found
 
-    def _nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
+    def nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
         """The state moved along the escape shape to the side of lower energy, closings restored."""
         equations = self.equations
         sides = []

@@ -1,0 +1,166 @@
+"""Whether members may have passed an obstacle between two states, though neither of them is inside it.
+
+From one state to the next a place of a member does not move further from the chord between its two positions than an
+arc of its length that turns as much as the members do.  Where that tube stays out of an obstacle nothing was passed;
+where it does not, the step is too long to tell, and a shorter one has a thinner tube.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..description.obstacles import Obstacle, members_of, swept
+from ..description.scene import Scene
+from ..mathematics.arrays import Array
+from .settling import Held
+from .touches import Touched
+
+__all__ = ["STRIDE", "Course", "Passing"]
+
+FINENESS, LEAST, MOST = 0.25, 64, 400
+"""Places along a member stand nearer than this share of the smallest radius; fewest and most intervals of a member."""
+
+STRIDE = 0.5
+"""Largest angle, rad, that a place turns in a step."""
+
+DEVIATION = 0.2
+"""How far a path of given length deviates from its chord over length times turn: 1/8 for an arc, 1/4 for a corner."""
+
+PASSED = 1e-3
+"""Share of the size of the scene, and of a radius times 50, up to which a tube may be inside: what dips in by so little
+is pushed out again to where it came from."""
+
+BEHIND = 1e-3
+"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
+
+ALONG = 0.25
+"""The same share of a radius for a member that touches the obstacle before and after: it slides along it."""
+
+FLAT = 0.02
+"""The same share of the size of the scene for planes, which nothing passes: only what touches first may change."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """Places (n, 3), m, and tangents (n, 3) of each member at fixed fractions of their lengths."""
+
+    positions: Mapping[str, Array]
+    tangents: Mapping[str, Array]
+
+    def turned(self, other: Course) -> float:
+        """Largest angle between tangents of the same place, rad."""
+        cosines = [
+            np.einsum("ni,ni->n", self.tangents[name], other.tangents[name]).min(initial=1.0) for name in self.tangents
+        ]
+        return float(np.arccos(np.clip(min(cosines, default=1.0), -1.0, 1.0)))
+
+
+class Passing:
+    """Steps of one scene between its obstacles.
+
+    Parameters
+    ----------
+    scene : Scene
+    obstacles : mapping
+        By name.
+    """
+
+    def __init__(self, scene: Scene, obstacles: Mapping[str, Obstacle]) -> None:
+        self.scene, self.obstacles = scene, obstacles
+        self.pairs = [
+            (contact, member) for contact in obstacles for member in members_of(scene.contacts[contact], scene.members)
+        ]
+        radius = min((stop.radius for stop in obstacles.values() if stop.kind == "round"), default=np.inf)
+        counts = {m: scene.center_lines[m].length / (FINENESS * radius) for _, m in self.pairs}
+        self.fractions = {m: np.linspace(0.0, 1.0, int(np.clip(n, LEAST, MOST)) + 1) for m, n in counts.items()}
+
+    def course(self, touched: Touched) -> Course:
+        """Where the members of a state are."""
+        fields = touched.fields
+        return Course(
+            {name: fields.positions(name, x) for name, x in self.fractions.items()},
+            {name: fields.tangents(name, x) for name, x in self.fractions.items()},
+        )
+
+    def turned(self, before: Held, after: Held) -> float:
+        """Largest angle between tangents of the same place in two states, rad."""
+        return self.course(before.touched).turned(self.course(after.touched))
+
+    def possible(self, before: Held, after: Held, offsets: Mapping[str, float], stride: float = STRIDE) -> bool:
+        """Whether something may have been passed between two states, or they are more than a ``stride`` (rad) apart."""
+        one, other = self.course(before.touched), self.course(after.touched)
+        if self._over(before, after, one, other):
+            return True
+        touching = [{(t.contact, t.member) for t in held.mesh.touches} for held in (before, after)]
+        turned = one.turned(other)
+        return turned > stride or any(
+            self._passed(pair, one, other, turned, pair in touching[0] & touching[1], offsets.get(pair[0], 0.0))
+            for pair in self.pairs
+        )
+
+    def over(self, before: Held | None, after: Held) -> bool:
+        """Whether a step, from the undeformed scene with None, surely leads over an obstacle, or across an edge."""
+        return self._over(before, after, self._undeformed if before is None else self.course(before.touched))
+
+    def _over(self, before: Held | None, after: Held, here: Course, there: Course | None = None) -> bool:
+        touched = {touch.contact for touch in after.mesh.touches}
+        there = there or self.course(after.touched)
+        for contact, member in self.pairs:
+            stop = self.obstacles[contact]
+            # On an edge itself no side can be told.
+            if stop.kind == "sharp" and contact in touched:
+                continue
+            if swept(self._behind(before, contact, member, stop), here.positions[member], there.positions[member]):
+                return True
+        return False
+
+    @functools.cached_property
+    def _undeformed(self) -> Course:
+        lines = {name: (self.scene.center_lines[name], x) for name, x in self.fractions.items()}
+        return Course(
+            {name: line.positions(x) for name, (line, x) in lines.items()},
+            {name: line.tangents(x) for name, (line, x) in lines.items()},
+        )
+
+    def _behind(self, before: Held | None, contact: str, member: str, stop: Obstacle) -> Obstacle:
+        """An edge that a member begins to leave a little behind where it is: on the edge itself no side can be told."""
+        if before is None or stop.kind != "sharp":
+            return stop
+        for touch in before.mesh.touches:
+            if (touch.contact, touch.member) == (contact, member):
+                shift = BEHIND * self.scene.size * before.touched.normal(touch, touch.at)
+                return replace(stop, place=stop.place - shift)
+        return stop
+
+    def _passed(
+        self, pair: tuple[str, str], one: Course, other: Course, turned: float, slides: bool, offset: float
+    ) -> bool:
+        contact, member = pair
+        stop, size = self.obstacles[contact], self.scene.size
+        before, after = one.positions[member], other.positions[member]
+        if stop.kind == "sharp":
+            return False
+        chords = after - before
+        tube = DEVIATION * turned * np.linalg.norm(chords, axis=1)
+        depth = float((tube - _closest(stop, before, chords) - offset).max())
+        if stop.kind == "flat" or stop.sign < 0.0:
+            return depth > FLAT * size
+        if slides:
+            return depth > ALONG * stop.radius
+        return depth > PASSED * min(size, 50.0 * stop.radius)
+
+
+def _closest(stop: Obstacle, begin: Array, chords: Array) -> Array:
+    """Smallest gaps (n,) on the chords from places (n, 3)."""
+    nothing = np.zeros_like(begin)
+    ends = np.minimum(stop.gaps(begin, nothing), stop.gaps(begin + chords, nothing))
+    if stop.kind == "flat" or stop.sign < 0.0:
+        return np.asarray(ends)
+    out, along = (begin - stop.place) @ stop.across, chords @ stop.across
+    share = -np.einsum("ni,ni->n", out, along) / np.maximum(np.einsum("ni,ni->n", along, along), 1e-300)
+    nearest = begin + np.clip(share, 0.0, 1.0)[:, None] * chords
+    return np.minimum(ends, stop.gaps(nearest, nothing))
