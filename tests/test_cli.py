@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sfetcas import cli
 from sfetcas.cli import main
 from sfetcas.description.records import counted
 
@@ -402,3 +403,16 @@ def test_reports_count_in_words(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "unstable (1 way out)" in printed
     assert "no flexible member, 1 unknown," in printed
+
+
+def test_seconds_are_those_of_solving_and_not_of_pictures(monkeypatch, capsys):
+    clock = [0.0]
+
+    class Slow:
+        def write(self, solution):
+            clock[0] += 1000.0
+
+    monkeypatch.setattr(cli.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(cli, "outputs_of", lambda options, scene: [Slow()])
+    assert main(["run", str(PROBLEMS / "cantilever_tip_force.toml")]) == 0
+    assert "solved in 0.000 s" in capsys.readouterr().out
