@@ -227,9 +227,10 @@ def _run(options: argparse.Namespace) -> int:
     outputs = outputs_of(options, scene)
 
     def told(solution: Answer) -> None:
+        solved = time.perf_counter() - begin
         for output in outputs:
             output.write(solution)
-        report(solution, time.perf_counter() - begin)
+        report(solution, solved)
 
     try:
         solution, checks = _answered(options.file, scene, settings)

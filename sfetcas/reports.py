@@ -31,7 +31,7 @@ UNITS = {"moment": "N m", "force": "N"}
 
 
 def report(solution: Answer, seconds: float) -> None:
-    """Print an answer that took so many seconds, file and report included."""
+    """Print an answer that took so many seconds from its file on, without pictures and other files."""
     model = solution.last.model
     print(printable(solution.scene.title) or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")

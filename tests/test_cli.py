@@ -427,3 +427,16 @@ def test_a_note_of_several_steps_is_printed_once(tmp_path, capsys):
     file.write_text(BEAM + 'frame = "follower"\n[analysis]\nsteps = [0.1, 0.2, 0.3]\n')
     assert main(["run", str(file)]) == 0
     assert capsys.readouterr().out.count("note: loads without potential") == 1
+
+
+def test_seconds_are_those_of_solving_and_not_of_pictures(monkeypatch, capsys):
+    clock = [0.0]
+
+    class Slow:
+        def write(self, solution):
+            clock[0] += 1000.0
+
+    monkeypatch.setattr(cli.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(cli, "outputs_of", lambda options, scene: [Slow()])
+    assert main(["run", str(PROBLEMS / "cantilever_tip_force.toml")]) == 0
+    assert "solved in 0.000 s" in capsys.readouterr().out

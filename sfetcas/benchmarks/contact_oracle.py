@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.threads import single_threaded
 from .contact_chain import Chain, ChainState, NotAChainError, in_space
 
 __all__ = ["ChainAnswer", "chain_contact", "free_way"]
@@ -81,6 +82,7 @@ class ChainAnswer:
         return bool(self.snaps)
 
 
+@single_threaded
 def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
     """Follow the loads of a scene, a dictionary as in its file, from zero to factor 1.
 
@@ -121,6 +123,7 @@ def chain_contact(scene: Table, links: int | None = None) -> ChainAnswer:
     )
 
 
+@single_threaded
 def free_way(scene: Table, links: int = 8) -> Array:
     """Places (n, 3), m, that a chain passes from zero to factor 1 where no obstacle stops it.
 

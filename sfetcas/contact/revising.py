@@ -335,6 +335,10 @@ class Reviser:
             x = np.linspace(touch.at, touch.to, 9)
             pressed = held.touched.pressures(touch, x)
             if pressed.min() < -1e-6 * max(np.abs(pressed).max(), held.prepared.model.scales.force):
+                if pressed.max() <= 0.0:
+                    # Pulled off all along it lies on the obstacle nowhere, but for what is beside it.
+                    ends = (replace(touch, at=x, to=None) for x in touch.places)
+                    return self.numbered((*held.mesh.touches[:i], *ends, *held.mesh.touches[i + 1 :]))
                 j = int(np.argmin(pressed))
                 rest = held.mesh.touches[:i] + held.mesh.touches[i + 1 :]
                 halves = [(touch.at, float(x[j])), (float(x[j + 1]), float(touch.to))]

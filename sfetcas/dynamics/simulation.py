@@ -34,7 +34,7 @@ from .motion import Instant, Mover, Trajectory
 from .stages import StageEquations
 from .watching import Measure, Watch, finer
 
-__all__ = ["INTEGRATORS", "Simulation", "simulate"]
+__all__ = ["INTEGRATORS", "Simulation", "left", "simulate"]
 
 USUAL = "radau-3"
 """Integrator where none is asked for: of all it needs the least time for an accuracy of 1e-2 or finer (measured)."""
@@ -53,6 +53,14 @@ OUTPUTS = 100
 
 GAINED = 3.0
 """A finer run is taken to be more accurate than it differs from the coarser one by this: 2^order - 1 of order 2."""
+
+UNSUPPORTED = 3.0
+"""Times the last difference that the error is told as where runs do not come nearer to each other, at most."""
+
+SENSITIVE = (
+    "runs of finer and finer steps do not come nearer to each other: so sensitive a motion cannot be told for so long"
+)
+"""What is said where the last two differences support no estimate."""
 
 RESCUES = 2
 """Finer meshes that are tried where the first run fails."""
@@ -230,6 +238,7 @@ class Simulation:
         """Runs until two agree."""
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
+        apart: float | None = None
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
             failed = run.failure is not None
@@ -246,13 +255,17 @@ class Simulation:
                 run.interrupted = finer.interrupted
                 run.failure = finer.failure
                 break
-            error, run = self._difference(run, finer), finer
+            before = apart
+            apart, run = self._difference(run, finer), finer
+            error = left(apart, before, self.accuracy)
             if error <= self.accuracy:
                 break
+        if error is not None and apart is not None and error > max(self.accuracy, apart):
+            run.notes = (*run.notes, SENSITIVE)
         return self._answer(run, error)
 
     def _difference(self, coarse: _Run, fine: _Run) -> float:
-        """Estimated error of the finer run: distances of nodes and middles of members, over the size of the scene."""
+        """How far runs are apart: distances of nodes and middles of members, over the size of the scene."""
         if self.quantity is not None:
             return self._difference_of(self.quantity, coarse, fine)
         scene, apart = self.scene, 0.0
@@ -275,10 +288,10 @@ class Simulation:
                 middle = np.array([0.5])
                 moved = one.fields.positions(member, middle) - other.fields.positions(member, middle)
                 apart = max(apart, float(np.abs(moved).max()))
-        return apart / scene.size / GAINED
+        return apart / scene.size
 
     def _difference_of(self, quantity: Quantity, coarse: _Run, fine: _Run) -> float:
-        """Estimated error of a quantity of the finer run, over its largest value."""
+        """How far runs are apart in a quantity, over its largest value."""
         own: list[Array] = []
         apart = 0.0
         try:
@@ -288,7 +301,7 @@ class Simulation:
                 apart = max(apart, quantity.apart(a, b) if one.time == other.time else 0.0)
         except SceneError as error:
             raise SceneError(str(error), WHERE) from None
-        return apart / quantity.unit(fine.instants[0], own) / GAINED
+        return apart / quantity.unit(fine.instants[0], own)
 
     @staticmethod
     def _arm(run: _Run, name: str) -> float:
@@ -342,6 +355,36 @@ class Simulation:
             share = f"{100.0 * changed / most:.0f} % of what moves"
             return (f"nothing here gives or takes energy, but the total changes by {share}: the step is long for it",)
         return ()
+
+
+def left(apart: float, before: float | None, accuracy: float) -> float:
+    """Estimated error of the finest of some runs, relative.
+
+    That it gained by the order of the integrator is believed where two runs agree to the accuracy itself, or where
+    differences fall as they then would; what further runs would change is the sum of their series.  Runs that have
+    lost each other, as those of a chaotic motion do, tell nothing of how differences fall.
+
+    Parameters
+    ----------
+    apart : float
+        How far it is from the run before.
+    before : float, optional
+        How far that is from its own.
+    accuracy : float
+
+    Example
+    -------
+    >>> [round(left(0.024, before, 0.01), 3) for before in (None, 0.5, 0.09, 0.025)]
+    [0.024, 0.024, 0.009, 0.072]
+    """
+    if before is None or before > LOST_RUNS:
+        return apart if apart > accuracy else apart / GAINED
+    ratio = min(apart / before, UNSUPPORTED / (1.0 + UNSUPPORTED)) if before > 0.0 else 0.0
+    return apart * max(ratio / (1.0 - ratio), 1.0 / GAINED)
+
+
+LOST_RUNS = 0.1
+"""Difference of runs, relative, beyond which they do not follow the same motion to its end."""
 
 
 def _keeps_energy(scene: Scene) -> bool:
