@@ -85,7 +85,8 @@ def integration(nodes: Array, x: ArrayLike) -> Array:
     """Matrix (len(x), len(nodes)) that takes nodal values to integrals from 0 to x of their interpolant."""
     x = np.atleast_1d(np.asarray(x, dtype=float))
     points, weights = gauss((len(nodes) + 1) // 2 + 1)
-    return np.stack([xi * (weights @ evaluation(nodes, xi * points)) for xi in x])
+    inner = evaluation(nodes, (x[:, None] * points).ravel()).reshape(len(x), len(points), len(nodes))
+    return np.asarray(x[:, None] * np.einsum("k,xkn->xn", weights, inner))
 
 
 def legendre_tail(nodes: Array) -> Array:
