@@ -58,6 +58,9 @@ SLOW = 0.1
 NUDGE = 0.05
 """Angle, rad, by which an unstable equilibrium is moved along its escape shape to begin to fall."""
 
+SUDDEN, STEEP = 0.02, 4.0
+"""A step is sudden that turns a place by more than this angle, rad, and by so many times what the one before tells."""
+
 FIRST, AFTER_JUMP = 0.25, 0.05
 """Parts of the way of the first step, and of the one after a state was left."""
 
@@ -143,18 +146,27 @@ class Toucher:
         now = start if isinstance(start, Held) else self.resolved(base, None, start, way(0.0))
         touches = start.mesh.touches if isinstance(start, Held) else start
         stands = now is not None and not self.unstable(now, way(0.0))
-        done, step, barrier = 0.0, FIRST, np.inf
+        done, step, barrier, rate = 0.0, FIRST, np.inf, np.inf
         for _ in range(TRIES):
             if done >= 1.0:
                 return now
             if self.settler.solves > most:
                 return None
-            # Beyond a place that was seen to be wrong there is no use in trying.
-            step = min(step, 0.5 * (barrier - done))
+            # Beyond a place where it was seen to be unstable there is no use in trying; near to it that place is next.
+            ahead = barrier - done
+            step = min(step, ahead if ahead <= max(NARROW * barrier, SHORTEST[0]) else 0.5 * ahead)
             trial = min(1.0, done + step)
             there = self.resolved(base, now, touches, way(trial))
-            if there is not None and now is not None and self.passing.possible(now, there, way(trial).offsets):
-                there = None
+            turned = 0.0
+            if there is not None and now is not None:
+                turned = self.passing.turned(now, there)
+                if self.passing.possible(now, there, way(trial).offsets):
+                    there = None
+            # What moves much faster than before either begins to, which short steps show, or has jumped.
+            sudden = there is not None and turned > max(SUDDEN, STEEP * rate * (trial - done))
+            if sudden and 0.25 * step >= SHORTEST[1]:
+                step *= 0.25
+                continue
             falls = there is not None and stands and self.unstable(there, way(trial))
             if falls and trial - done > max(NARROW * trial, SHORTEST[0]):
                 barrier = trial
@@ -171,7 +183,10 @@ class Toucher:
                     trial, there = jump
                     self.snapped.append(trial)
                 step, barrier = AFTER_JUMP, np.inf
+            elif sudden:
+                self.snapped.append(trial)
             assert there is not None
+            rate = np.inf if falls or trial in self.snapped or now is None else turned / (trial - done)
             now, touches, done = there, there.mesh.touches, trial
             barrier = np.inf if done >= barrier else barrier
             stands = not self.unstable(now, way(done))
