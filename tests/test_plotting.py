@@ -255,6 +255,18 @@ def test_motions_go_from_the_old_to_the_new_place():
     assert sorted(texts(figure, "motion-lift")) == ["0.224 m", "0.5 rad"]
 
 
+def test_a_moved_guide_is_told_as_given_not_as_its_node_goes():
+    table = scenes.cantilever((0, 0))
+    table["nodes"]["B"] |= {"support": "slider", "direction": [1, 0], "rotation": "hinge"}
+    table |= {"loads": {}, "histories": {"half": {"t": [0, 1], "value": [0, 0.5]}}}
+    table |= {"motions": {"drop": {"node": "B", "displacement": [0, -0.6], "history": "half"}}}
+    solution = solve(scenes.made(table))
+    assert np.linalg.norm(solution.last.position("B") - [1, 0, 0]) > 0.303
+    figure = picture(solution)
+    np.testing.assert_allclose(arrow(figure, "motion-drop"), [[1, 0], [1, -0.3]], atol=1e-12)
+    assert texts(figure, "motion-drop") == ["0.3 m"]
+
+
 def test_distributed_loads_follow_their_profile():
     spread = {"type": "distributed", "member": "m", "value": [0, -2], "profile": {"polynomial": [0, 1]}}
     figure = picture(beam(loads={"w": spread}))

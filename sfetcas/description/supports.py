@@ -21,6 +21,7 @@ __all__ = [
     "check_motions_once",
     "drives",
     "free_to_move",
+    "turned_about",
     "upwards",
 ]
 
@@ -171,6 +172,14 @@ def _check_rotation(motion: Motion, node: Node, dimension: str, reason: str) -> 
         raise SceneError(f"found {found}, accepted: a number, the angle about the axis of the hinge", where)
     if node.turn == "fixed" and number and dimension == "space":
         raise SceneError(f"found {found}, accepted: a rotation vector [x, y, z], as {reason}", where)
+
+
+def turned_about(motion: Motion, node: Node, members: Mapping[str, Member]) -> Triple:
+    """Axis about which a motion turns its node, or where it drives a joint its second member against the first."""
+    if motion.between is None:
+        return node.turn_axis
+    hinged = node.joint != "rigid" or "hinge" in members[motion.between[1]].release
+    return node.axis if hinged or node.direction is None else node.direction
 
 
 def check_driven_joint(motion: Motion, node: Node, members: Mapping[str, Member]) -> None:

@@ -91,7 +91,10 @@ class Instant(Posture):
 
     @property
     def energy(self) -> dict[str, float]:
-        """Kinetic and elastic energy, potential of the loads as they are now, and their sum, N m."""
+        """Kinetic and elastic energy, potential of the loads as they are now, and their sum, N m.
+
+        ``loads`` is minus the present forces times displacements, so that the sum changes where the loads do, too.
+        """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
         return {"kinetic": kinetic, "elastic": elastic, "loads": loads, "total": kinetic + elastic + loads}
 

@@ -22,7 +22,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
-from ..mechanics.model import assemble
+from ..mechanics.model import Model, assemble
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
 from .idas import Idas
@@ -351,7 +351,7 @@ class Simulation:
         total = kinetic + elastic + loads
         most = float(kinetic.max() + np.ptp(elastic) + np.ptp(loads))
         changed = float(np.abs(total - total[0]).max())
-        if _keeps_energy(self.scene) and changed > LOST * most > 0.0:
+        if _keeps_energy(run.instants[0].model) and changed > LOST * most > 0.0:
             share = f"{100.0 * changed / most:.0f} % of what moves"
             return (f"nothing here gives or takes energy, but the total changes by {share}: the step is long for it",)
         return ()
@@ -387,9 +387,11 @@ LOST_RUNS = 0.1
 """Difference of runs, relative, beyond which they do not follow the same motion to its end."""
 
 
-def _keeps_energy(scene: Scene) -> bool:
-    """Whether nothing changes the total energy: no history, motion, follower, drag or damping."""
-    given = any(load.history is not None or load.follows for load in scene.loads.values()) or bool(scene.motions)
+def _keeps_energy(model: Model) -> bool:
+    """Whether nothing changes the total energy: no history, motion, load without potential, drag or damping."""
+    scene = model.scene
+    given = any(load.history is not None for load in scene.loads.values()) or bool(scene.motions)
+    given = given or not model.has_potential
     taken = any(part.damping or part.drag for part in scene.sections.values())
     taken = taken or any(spring.damping for spring in scene.springs.values())
     return not (given or taken or scene.rotating is not None or any(node.drag for node in scene.nodes.values()))

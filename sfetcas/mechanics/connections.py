@@ -10,6 +10,7 @@ import numpy as np
 from ..description.obstacles import Obstacle, obstacle, rounded, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
+from ..description.supports import turned_about
 from ..mathematics.arrays import Array, Index
 from .beams import Scales
 from .bodies import BodyData, body_of
@@ -181,8 +182,7 @@ class _Maker:
             node, row = self.scene.nodes[motion.node], f"motions.{name}"
             first, second = motion.between
             if motion.rotation is not None:
-                released = node.joint != "rigid" or "hinge" in self.scene.members[second].release
-                axis = node.axis if released or node.direction is None else node.direction
+                axis = turned_about(motion, node, self.scene.members)
                 sides = self._end(first, motion.node), self._end(second, motion.node)
                 yield _One(DrivenTurn(self.space), name, motion.node, _unit(axis), sides, row=row)
             if motion.displacement is not None:

@@ -17,6 +17,7 @@ from ..description.obstacles import obstacle
 from ..description.sections import evaluate
 from ..description.springs import Spring
 from ..description.structure import SLIDING, Node, unit
+from ..description.supports import turned_about
 from ..equilibria.solution import Posture
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
@@ -284,21 +285,28 @@ def _anchor(sketch: Sketch, spring: Spring, end: Array) -> Array:
 
 def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
     factor, node = _factor(sketch.step, motion.history), sketch.scene.nodes[motion.node]
-    old, new = np.array(node.position) / sketch.course.unit, sketch.at(motion.node)
     ink = Ink(f"motion-{name}", MOTION, 1.4, dotted=True)
     if motion.displacement is not None and motion.between is not None:
-        # How far one side slides along the other, not where both go.
-        sketch.tell(norm(factor * np.array(motion.displacement)), "m", new, np.array([0.0, 1.0]), ink)
-    elif motion.displacement is not None and norm(new - old) > 0.02 * sketch.size:
-        sketch.arrow(np.array([old, new]), ink)
-        away = flat_unit(left_of(sketch.view.flat(new - old) / norm(new - old)), (0.0, 1.0))
-        sketch.tell(norm(new - old) * sketch.course.unit, "m", 0.5 * (old + new), away, ink)
+        # How far one side slides along the other, not where both go; what is given across the line does nothing.
+        assert node.direction is not None
+        along = np.array(unit(node.direction))
+        travel = factor * float(along @ np.array(motion.displacement))
+        sketch.tell(travel, "m", sketch.at(motion.node), np.array([0.0, 1.0]), ink)
+    elif motion.displacement is not None:
+        # As given: a guide that is moved leaves its node to slide somewhere else.
+        shift = factor * np.array(motion.displacement) / sketch.course.unit
+        way, length = np.array(node.position) / sketch.course.unit + np.outer([0.0, 1.0], shift), norm(shift)
+        if length > 0.02 * sketch.size:
+            sketch.arrow(way, ink)
+        if length > 0.0:
+            away = flat_unit(left_of(sketch.view.flat(shift) / length), (0.0, 1.0))
+            sketch.tell(length * sketch.course.unit, "m", way.mean(axis=0), away, ink)
     if motion.rotation is not None:
         turn = motion.rotation
-        about = np.array(unit(node.axis)) if node.turn == "hinge" else np.array([0.0, 0.0, 1.0])
+        about = np.array(unit(turned_about(motion, node, sketch.scene.members)))
         vector = factor * (turn * about if isinstance(turn, float) else np.array(turn))
         ink = Ink(f"motion-{name}", MOTION, 1.2, dotted=True)
-        _sketch_turn(sketch, new, sketch.leaving(motion.node)[0], vector, "rad", ink)
+        _sketch_turn(sketch, sketch.at(motion.node), sketch.leaving(motion.node)[0], vector, "rad", ink)
 
 
 def _largest_force(sketch: Sketch) -> float:
