@@ -42,6 +42,9 @@ MOST_FURTHER = 300
 DRIFT = 1.0
 """An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
 
+DRIFTS = 3
+"""So many finer meshes on which it is not the same show that there is none: one too coarse to begin with may happen."""
+
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -95,9 +98,14 @@ class Refining(Piloting):
             corrected = deflated(prepared, state, loading, ()) or corrected
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
+        drifts = source.drifts
         if not corrected.converged:
             corrected, _ = prepared.minimise(loading, state)
-        return replace(source, prepared=prepared, corrected=corrected)
+            drifts += prepared.distance(state, corrected.state) > DRIFT
+            if drifts == DRIFTS:
+                detail = f"each of {DRIFTS} finer meshes has another equilibrium, far from that of the mesh before"
+                raise SolveError(Status.FAILED, detail, state)
+        return replace(source, prepared=prepared, corrected=corrected, drifts=drifts)
 
     @staticmethod
     def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:

@@ -43,8 +43,10 @@ class TangentTest:
     def __init__(self, equations: Equations, weight: Array, symmetric: bool) -> None:
         self._equations, self._symmetric = equations, symmetric
         n = equations.unknowns
-        self._softest = float(weight.max(initial=1.0) / equations.mass.max(initial=1.0))
-        self._root = np.sqrt(np.concatenate([weight, np.full(n - len(weight), LIGHT * self._softest)]))
+        softest = float(weight.max(initial=1.0) / equations.mass.max(initial=1.0))
+        self._root = np.sqrt(np.concatenate([weight, np.full(n - len(weight), LIGHT * softest)]))
+        # All weights are the same multiple of the masses.
+        self._by_mass = float(weight.sum() / equations.mass.sum()) if len(weight) else 1.0
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
@@ -106,7 +108,7 @@ class TangentTest:
         """How far eigenvalues, or their real parts, are below zero, by ``equations.mass``; zero where none is."""
         tangent, limit, free = self._tangent(point)
         lowest = float(self._eigenvalues(tangent)[0].real) if free else 0.0
-        return -lowest * self._softest if lowest < -limit else 0.0
+        return -lowest * self._by_mass if lowest < -limit else 0.0
 
     def below(self, point: Point) -> int:
         """Number of real eigenvalues below zero: where there are some the tangent was singular on the way there."""

@@ -40,6 +40,9 @@ SOLVED = 1e-9
 STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
 """Where IPOPT gets no nearer, as in the valley of a spin that next to nothing resists, Newton's method goes on."""
 
+ITERATIONS = 250
+"""Of IPOPT at most: what needs more lies in such a valley too, or there is no equilibrium at all."""
+
 SAME = 1e-3
 """Two states nearer than this, rad, are the same but for what a prestress bends."""
 
@@ -104,7 +107,7 @@ class Prepared:
 
     @functools.lru_cache(maxsize=8)  # noqa: B019 - lives as long as the model
     def _solvers(self, scale: float) -> Callable[..., NLPResult]:
-        return Ipopt(objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
+        return Ipopt(iterations=ITERATIONS, objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
 
     def guess(self, loading: Loading) -> tuple[State, float]:
         """A state to start from, and the gap of its closings."""
