@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import SOFT, made
 
-from sfetcas import SceneError, SolveError, Status, load, solve
+from sfetcas import Scene, SceneError, SolveError, Status, load, solve
 from sfetcas.checks import look_up
 from sfetcas.contact.touches import Touched, edge_sides
 from sfetcas.description.obstacles import obstacle
@@ -974,3 +974,18 @@ def test_what_sliding_makes_stable_has_no_negative_eigenvalue():
     proof = solve(made(table)).last.certificate
     assert proof.stable is True
     assert not proof.smallest < 0.0
+
+
+def test_node_held_inside_an_obstacle_is_told_before_anything_is_solved(monkeypatch):
+    from sfetcas.equilibria.statics import _Run
+
+    monkeypatch.setattr(_Run, "_in_contact", lambda *_: pytest.fail("solved"))
+    scene = Scene(
+        sections={"s": {"EI3": 1.0}},
+        nodes={"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1.5, 0], "support": "clamped"}},
+        members={"b": {"nodes": ["A", "B"], "section": "s", "shape": {"type": "arc", "angle": -0.5}}},
+        contacts={"ceiling": {"type": "plane", "point": [0, 0.12], "normal": [0, -1], "members": "all"}},
+        motions={"d": {"node": "B", "displacement": [-0.1, 0.14]}},
+    )
+    with pytest.raises(SolveError, match=r"node B is held 0\.02 m inside contacts\.ceiling"):
+        solve(scene)

@@ -778,3 +778,29 @@ def test_what_is_printed_is_short():
     # No arrays and no scene: some numbers and notes each.
     assert len(repr(step)) < 600
     assert len(repr(path)) < 600 * (1 + len(path.steps) + len(path.limit_points))
+
+
+def test_no_point_of_a_path_is_outside_its_range(monkeypatch):
+    """Rounding may put a singular point at the end of the range, and a branch from one, beyond it."""
+    from sfetcas.paths import paths
+    from sfetcas.solvers import tracing
+
+    def moved(events):
+        return [
+            replace(e, standing=replace(e.standing, factor=-1e-24 if e.standing.factor < 15 else 20)) for e in events
+        ]
+
+    monkeypatch.setattr(tracing, "events_between", lambda *ends: moved(events_between(*ends)))
+    monkeypatch.setattr(paths, "switched", lambda curve, event, *_: replace(event.standing, factor=-1e-3))
+    scene = Scene(
+        sections={"s": {"EI3": 1.0}},
+        nodes={"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        members={"m": {"nodes": ["A", "B"], "section": "s", "elements": 2}},
+        loads={"l": {"type": "force", "node": "B", "value": [-1, 0]}},
+        analysis={"type": "path", "range": [0, 30], "branches": 1},
+    )
+    path = solve(scene)
+    assert len(path.branches) == 1
+    assert all(0.0 <= factor <= 30.0 for factor in path.main.factors)
+    assert [point.kind for point in path.points].count("bifurcation") == 1
+    assert "the branch leaves the range at once" in path.notes[0]

@@ -217,3 +217,49 @@ def test_an_angle_of_which_rounding_leaves_nothing_is_no_answer():
     }
     with pytest.raises(SolveError, match=r"turns by 1\.0e\+12 rad, of which rounding leaves no angle"):
         sfetcas.solve(made(table))
+
+
+def test_straight_member_between_clamps_is_refused_on_the_third_finer_mesh(monkeypatch):
+    """It cannot bend: only coarse meshes have states under its weight, wound up, and each mesh others."""
+    from sfetcas.equilibria.refining import Refining
+
+    meshes = []
+    onto = Refining._onto
+    monkeypatch.setattr(Refining, "_onto", lambda self, mesh, *rest: (meshes.append(mesh), onto(self, mesh, *rest))[1])
+    scene = {
+        "gravity": [0, -9.80665],
+        "sections": {"s": {"shape": "circle", "radius": 0.01, "E": 1e4, "nu": 0.5, "rho": 636.62}},
+        "nodes": {"a": {"position": [0, 0], "support": "clamped"}, "b": {"position": [1, 0], "support": "clamped"}},
+        "members": {"m": {"nodes": ["a", "b"], "section": "s"}},
+    }
+    with pytest.raises(SolveError, match=r"straight between places that come no closer|fully stretched"):
+        sfetcas.solve(made(scene))
+    assert len(meshes) < 20
+
+
+def test_moment_that_drives_a_loop_on_and_on_is_given_up_soon(monkeypatch):
+    """Hinges let the bar turn over and over, and nothing balances the moment: falls without end are not repeated."""
+    from sfetcas.solvers.prepared import Prepared
+
+    falls = []
+    minimise = Prepared.minimise
+    monkeypatch.setattr(Prepared, "minimise", lambda self, *rest: (falls.append(1), minimise(self, *rest))[1])
+    scene = {
+        "sections": {"soft": {"EI3": 0.242878}, "stiff": {"EI3": 1.869864}},
+        "nodes": {
+            "n0": {"position": [0.891992, -0.903388], "support": "hinge"},
+            "n1": {"position": [0.734778, 1.035308], "joint": "hinge"},
+            "n2": {"position": [-0.775804, 1.004932], "joint": "hinge"},
+            "n3": {"position": [-1.205392, -0.398485], "support": "slider", "direction": [-0.326816, -0.945088]},
+        },
+        "members": {
+            "m0": {"nodes": ["n0", "n1"], "section": "stiff"},
+            "m1": {"nodes": ["n1", "n2"], "section": "soft"},
+            "m2": {"nodes": ["n2", "n3"], "section": "stiff", "shape": {"type": "arc", "angle": 0.669984}},
+            "m3": {"nodes": ["n3", "n0"], "section": "stiff", "shape": {"type": "arc", "angle": -0.263692}},
+        },
+        "loads": {"l": {"type": "moment", "member": "m1", "at": 0.75, "value": -11.037107}},
+    }
+    with pytest.raises(SolveError, match="used up its iterations"):
+        sfetcas.solve(made(scene))
+    assert len(falls) < 10

@@ -239,13 +239,13 @@ class ContactRun:
             self.jumps, self.elsewhere = [], note
             yield way()
 
-    def refuse_what_cannot_be(self, pilot: Prepared, factor: float) -> None:
-        """Say why there can be no state: a node is held inside an obstacle, or nothing holds a direction.
+    def refuse_held_inside(self, pilot: Prepared, factor: float) -> None:
+        """Refuse a node that a support or a motion holds inside an obstacle, which the data alone tell.
 
         Raises
         ------
         SolveError
-            Naming the node and the obstacle, or the direction.
+            Naming the node and the obstacle.
         """
         model = pilot.model
         stops, axes = obstacles_of(model), model.element.axes
@@ -263,6 +263,16 @@ class ContactRun:
                 if gap < -COARSE * self.scene.size:
                     detail = f"node {node} is held {-gap:.3g} m inside contacts.{contact}"
                     raise SolveError(Status.INFEASIBLE, detail)
+
+    def refuse_unheld(self, pilot: Prepared) -> None:
+        """Say why there can be no state where nothing holds a direction.
+
+        Raises
+        ------
+        SolveError
+            Naming the direction.
+        """
+        stops, axes = obstacles_of(pilot.model), pilot.model.element.axes
         free = np.array(pilot.diagnosis.drifts).reshape(-1, axes)
         if not len(free) or any(stop.kind != "flat" for stop in stops.values()):
             return

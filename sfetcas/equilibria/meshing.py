@@ -33,7 +33,10 @@ PILOT_ORDER = 4
 
 @dataclass
 class Found:
-    """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other."""
+    """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other.
+
+    ``drifts`` counts finer meshes on which it was not the same.
+    """
 
     prepared: Prepared
     corrected: Corrected
@@ -42,6 +45,7 @@ class Found:
     iterations: int = 0
     left: tuple[float, ...] = ()
     kept: bool = False
+    drifts: int = 0
 
 
 class Meshing:

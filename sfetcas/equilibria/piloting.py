@@ -91,6 +91,9 @@ class Piloting(Meshing):
         except SolveError as error:
             if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
                 raise
+            # What falls on and on does so on a finer mesh too; one that is too coarse is left by other ways.
+            if error.status is Status.ITERATIONS:
+                raise
             try:
                 finer = self._prepared(pilot.model.mesh.refined().refined())
                 return _with_change_point(self._on_pilot(finer, factor, None))

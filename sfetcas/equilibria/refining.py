@@ -49,6 +49,9 @@ ELSEWHERE = (
     "it may be another one"
 )
 
+DRIFTS = 3
+"""So many finer meshes on which it is not the same show that there is none: one too coarse to begin with may happen."""
+
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -109,14 +112,19 @@ class Refining(Piloting):
             corrected = deflated(prepared, state, loading, ()) or corrected
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
+        drifts = source.drifts
         if not corrected.converged:
             try:
                 corrected, _ = prepared.minimise(loading, state)
             except SolveError as error:
                 raise SolveError(error.status, error.detail + more_than(mesh, source), error.last) from None
+            drifts += prepared.distance(state, corrected.state) > DRIFT
+            if drifts == DRIFTS:
+                detail = f"each of {DRIFTS} finer meshes has another equilibrium, far from that of the mesh before"
+                raise SolveError(Status.FAILED, detail, state)
         apart = prepared.distance(state, corrected.state) > DRIFT and ELSEWHERE not in source.notes
         notes = (*source.notes, ELSEWHERE) if apart else source.notes
-        return replace(source, prepared=prepared, corrected=corrected, notes=notes)
+        return replace(source, prepared=prepared, corrected=corrected, notes=notes, drifts=drifts)
 
     @staticmethod
     def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:

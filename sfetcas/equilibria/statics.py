@@ -102,6 +102,7 @@ class _Run(Refining):
             refuse_unheld(pilot, factor)
             try:
                 if contact is not None:
+                    contact.refuse_held_inside(pilot, factor)
                     steps.append(self._in_contact(contact, pilot, factor))
                     continue
                 found = self._found(pilot, factor, last)
@@ -263,7 +264,7 @@ class _Run(Refining):
             return unstable
         if refused is not None:
             raise refused
-        contact.refuse_what_cannot_be(self._prepared(self.pilot_mesh), factor)
+        contact.refuse_unheld(self._prepared(self.pilot_mesh))
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
         raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
 

@@ -273,6 +273,9 @@ class _Run:
         if first is None:
             level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
             return
+        if not self._in_range(first):
+            level.notes += (f"bifurcation {number} to the side {side}: the branch leaves the range at once",)
+            return
         along = next((part for part in level.stretches if passes(level.curve, part.traced, first)), None)
         if along is not None:
             told = f"branch {level.stretches.index(along)}" if along.bifurcation else "the path itself"
@@ -285,9 +288,12 @@ class _Run:
     def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
         """The branch at a bifurcation to one side; None where none is found."""
         first = switched(curve, event, shapes_at(curve, event)[:, shape - 1], side)
-        if first is None:
+        if first is None or not self._in_range(first):
             return None
         return without(trace(curve, first, self.span, points, self.knots), [event.standing])
+
+    def _in_range(self, standing: Standing) -> bool:
+        return self.span[0] <= standing.factor <= self.span[1]
 
     def stretch(self, part: _Stretch, curve: Curve) -> _Stretch:
         """The same with the crossings of the factors asked for."""

@@ -47,6 +47,8 @@ class TangentTest:
         softest = float(weight.max(initial=1.0) / equations.mass.max(initial=1.0))
         self._root = np.sqrt(np.concatenate([weight, np.full(n - len(weight), LIGHT * softest)]))
         self._sides = Sides(equations)
+        # All weights are the same multiple of the masses.
+        self._by_mass = float(weight.sum() / equations.mass.sum()) if len(weight) else 1.0
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
@@ -104,21 +106,11 @@ class TangentTest:
         nearest = values[np.argsort(np.abs(values.real))[:count]]
         return bool((np.abs(nearest.imag) <= SINGULAR).all())
 
-    def falling(self, point: Point) -> Stability:
-        """As :meth:`test`, but without a potential by the real parts of the eigenvalues: what a flow runs away from."""
-        if self._symmetric:
-            return self.test(point)
-        equations = self._equations
-        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
-        tangent, limit, _ = self._tangent(point)
-        values, vectors = np.linalg.eig(tangent)
-        negative = int((values.real < -limit).sum())
-        if not negative:
-            return Stability("not defined", 0, 0.0, np.zeros(turning), nothing)
-        lowest = int(np.argmin(values.real))
-        shape = self._sides.taken(vectors[:, [lowest]] / self._root[:, None], self._root**2)
-        quotient = float(values[lowest].real) / self._size(shape)
-        return Stability("not defined", negative, quotient, shape.real[:turning], shape.real[turning:])
+    def depth(self, point: Point, near: float = 0.0) -> float:
+        """How far eigenvalues, or their real parts, are below zero, by ``equations.mass``; zero where none is."""
+        tangent, limit, free = self._tangent(point)
+        lowest = float(self._eigenvalues(tangent)[0].real) if free else 0.0
+        return -lowest * self._by_mass if lowest < -limit else 0.0
 
     def below(self, point: Point) -> int:
         """Number of real eigenvalues below zero: where there are some the tangent was singular on the way there."""

@@ -15,7 +15,6 @@ import numpy as np
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .newton import newton_step
-from .stability import Stability
 
 __all__ = ["flow"]
 
@@ -34,21 +33,30 @@ FIRMER, SMALL = 4.0, 1e-9
 A spin of a member between balls is resisted by 1e-7 of its bending: a firmer beginning would creep along it.
 """
 
+LASTING = 5
+"""The lowest eigenvalue is looked for after so many steps, and where they have arrived.
 
-def flow(equations: Equations, state: State, loading: Loading, test: Callable[[Point], Stability]) -> State | None:
+On the way it only keeps the flow from running back, and to find it costs ten times as much as a step.
+"""
+
+
+def flow(equations: Equations, state: State, loading: Loading, depth: Callable[[Point, float], float]) -> State | None:
     """Where the flow leads from a state; None where it does not come to rest.
 
     Parameters
     ----------
-    test : callable
-        Stability at a point of the equations.
+    depth : callable
+        At a point of the equations, and with what it was before: how far eigenvalues are below zero, or a number
+        that is not much larger; zero where none is.
     """
     turning = equations.turning_unknowns
+    length, deep, last, age = 0.0, 0.0, SMALL, 0
     for _ in range(MOST):
         point = equations.at(state, loading)
-        found = test(point)
-        shift = 2.0 * max(0.0, -found.smallest) if found.negative else 0.0
-        length = np.inf
+        if length < ARRIVED or age == LASTING:
+            deep, age = depth(point, deep), 0
+        age += 1
+        shift, length = 2.0 * deep, np.inf
         while length > LONGEST:
             entries = point.entries.copy()
             entries[equations.diagonal[:turning]] += shift * equations.mass
@@ -59,8 +67,9 @@ def flow(equations: Equations, state: State, loading: Loading, test: Callable[[P
             length = float(np.abs(step[:turning]).max(initial=0.0))
             if not np.isfinite(length):
                 return None
-            shift = max(FIRMER * shift, abs(found.smallest), SMALL)
+            used, shift = shift, max(FIRMER * shift, last / FIRMER**2, SMALL)
+        last = used
         state = equations.moved(state, step)
-        if not found.negative and length < ARRIVED:
+        if deep == 0.0 and age == 1 and length < ARRIVED:
             return state
     return None

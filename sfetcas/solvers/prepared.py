@@ -42,11 +42,14 @@ SOLVED = 1e-9
 STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
 """Where IPOPT gets no nearer, as in the valley of a spin that next to nothing resists, Newton's method goes on."""
 
+ITERATIONS = 250
+"""Of IPOPT at most: what needs more lies in such a valley too, or there is no equilibrium at all."""
+
 SAME = 1e-3
 """Two states nearer than this, rad, are the same but for what a prestress bends."""
 
-ESCAPES = 8
-"""Unstable equilibria that are left in a row before giving up."""
+ESCAPES, FALLS = 8, 2
+"""Unstable equilibria that are left in a row before giving up, and falls that end nowhere: they end so again."""
 
 
 class Prepared:
@@ -106,7 +109,7 @@ class Prepared:
 
     @kept(8)
     def _solvers(self, scale: float) -> Callable[..., NLPResult]:
-        return Ipopt(objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
+        return Ipopt(iterations=ITERATIONS, objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
 
     def guess(self, loading: Loading, *, settle: bool = True) -> tuple[State, float]:
         """A state to start from, downhill from the ``start`` places unless it is not to ``settle``, and its gap."""
@@ -266,8 +269,7 @@ class Prepared:
 
         Its tangent has no eigenvalue with a real part below zero.
         """
-        test = self._test.test if self.model.has_potential else self._tangent.falling
-        there = flow(self.equations, state, loading, test)
+        there = flow(self.equations, state, loading, self._tester.depth)
         found = None if there is None else self.correct(there, loading)
         return found if found is not None and found.converged else None
 
@@ -279,13 +281,14 @@ class Prepared:
         SolveError
             None was found.
         """
-        amplitude = 0.2
+        amplitude, falls = 0.2, 0
         for _ in range(ESCAPES):
             try:
                 found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
             except SolveError:
-                if not self.model.minimisable:
-                    # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
+                falls += 1
+                # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
+                if falls == FALLS or not self.model.minimisable:
                     break
                 amplitude *= 1.7
                 continue

@@ -186,6 +186,28 @@ class StabilityTest:
             return self._below(point, entries, -limit)
         return int((np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]) < -limit).sum())
 
+    def depth(self, point: Point, near: float = 0.0) -> float:
+        """How far eigenvalues are below zero, by ``equations.mass``; zero where none is.
+
+        Many unknowns: a bound of that, by the signs of pivots alone, found soon where it is ``near`` that given.
+        """
+        if self._n == 0:
+            return 0.0
+        entries = self._weighted(point)
+        limit = self._limit(entries)
+        if self._is_graded(limit):
+            values, _, limits = self._mode_by_mode(point, entries)
+            return -float(values[0]) * self._softest if (values < -limits).any() else 0.0
+        if self._is_dense:
+            values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
+            return -float(values[0]) * self._softest if (values < -limit).any() else 0.0
+        if not self._below(point, entries, -limit):
+            return 0.0
+        deep = max(near / self._softest / DEEPER, limit)
+        while deep < LOWEST and self._below(point, entries, -deep):
+            deep *= DEEPER
+        return deep * self._softest
+
     @staticmethod
     def _limit(entries: Array) -> float:
         """Largest eigenvalue that cannot be told from zero, whatever its mode."""
@@ -433,6 +455,9 @@ class StabilityTest:
             last = values[nearest]
         return values[nearest], block[:, nearest]
 
+
+DEEPER = 4.0
+"""Factor by which a bound of the lowest eigenvalue grows until none is below it."""
 
 LOWEST = 1e30
 """No eigenvalue is sought below minus this."""

@@ -105,7 +105,11 @@ def trace(
             now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
         stride = (span[1] - span[0]) / SHARE
         part = _piece(here, now, ahead[0], stride, count - len(traced.points) + len(traced.events))
-        traced = Traced(traced.points + part.points[1:], traced.events + part.events, part.end)
+        # A path that touches the end of its range may be singular there, and rounding puts that beyond.
+        events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
+        outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
+        points = [point for point in part.points[1:] if id(point) not in outside]
+        traced = Traced(traced.points + points, traced.events + events, part.end)
     return _with_crossed_folds(traced, usual)
 
 
