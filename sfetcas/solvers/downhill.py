@@ -40,8 +40,10 @@ On the way it only keeps the flow from running back, and to find it costs ten ti
 """
 
 
-def flow(equations: Equations, state: State, loading: Loading, depth: Callable[[Point, float], float]) -> State | None:
-    """Where the flow leads from a state; None where it does not come to rest.
+def flow(
+    equations: Equations, state: State, loading: Loading, depth: Callable[[Point, float], float]
+) -> tuple[State | None, int]:
+    """Where the flow leads from a state, None where it does not come to rest, and its steps.
 
     Parameters
     ----------
@@ -51,9 +53,9 @@ def flow(equations: Equations, state: State, loading: Loading, depth: Callable[[
     """
     turning = equations.turning_unknowns
     length, deep, last, age = 0.0, 0.0, SMALL, 0
-    for _ in range(MOST):
+    for count in range(MOST):
         point = equations.at(state, loading)
-        if length < ARRIVED or age == LASTING:
+        if not length > ARRIVED or age == LASTING:
             deep, age = depth(point, deep), 0
         age += 1
         shift, length = 2.0 * deep, np.inf
@@ -63,13 +65,13 @@ def flow(equations: Equations, state: State, loading: Loading, depth: Callable[[
             try:
                 step = newton_step(equations, replace(point, entries=entries), equations.mass)
             except np.linalg.LinAlgError:
-                return None
+                return None, count
             length = float(np.abs(step[:turning]).max(initial=0.0))
             if not np.isfinite(length):
-                return None
+                return None, count
             used, shift = shift, max(FIRMER * shift, last / FIRMER**2, SMALL)
         last = used
         state = equations.moved(state, step)
-        if deep == 0.0 and age == 1 and length < ARRIVED:
-            return state
-    return None
+        if deep == 0.0 and length < ARRIVED and (age == 1 or depth(point, deep) == 0.0):
+            return state, count
+    return None, MOST

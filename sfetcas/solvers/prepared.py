@@ -48,8 +48,8 @@ ITERATIONS = 250
 SAME = 1e-3
 """Two states nearer than this, rad, are the same but for what a prestress bends."""
 
-ESCAPES, FALLS = 8, 2
-"""Unstable equilibria that are left in a row before giving up, and falls that end nowhere: they end so again."""
+ESCAPES, FALLEN = 8, 400
+"""Unstable equilibria that are left in a row before giving up, and iterations of falls that end nowhere."""
 
 
 class Prepared:
@@ -69,6 +69,7 @@ class Prepared:
         self.model = model
         self._evaluations = evaluations
         self.kernels: Kernels = kernels
+        self._spent = 0
 
     @functools.cached_property
     def equations(self) -> Equations:
@@ -213,6 +214,7 @@ class Prepared:
             guess=problem.unknowns(state),
             lam=problem.multipliers(state) / scale,
         )
+        self._spent += result.iterations
         trial = problem.state(result.x, result.lam, loading, state)
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
@@ -269,7 +271,8 @@ class Prepared:
 
         Its tangent has no eigenvalue with a real part below zero.
         """
-        there = flow(self.equations, state, loading, self._tester.depth)
+        there, steps = flow(self.equations, state, loading, self._tester.depth)
+        self._spent += steps
         found = None if there is None else self.correct(there, loading)
         return found if found is not None and found.converged else None
 
@@ -281,14 +284,15 @@ class Prepared:
         SolveError
             None was found.
         """
-        amplitude, falls = 0.2, 0
+        amplitude, lost = 0.2, 0
         for _ in range(ESCAPES):
+            begun = self._spent
             try:
                 found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
             except SolveError:
-                falls += 1
+                lost += self._spent - begun
                 # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
-                if falls == FALLS or not self.model.minimisable:
+                if lost >= FALLEN or not self.model.minimisable:
                     break
                 amplitude *= 1.7
                 continue
