@@ -167,7 +167,8 @@ class Toucher:
             if sudden and 0.25 * step >= SHORTEST[1]:
                 step *= 0.25
                 continue
-            falls = there is not None and stands and self.unstable(there, way(trial))
+            stays = there is not None and not self.unstable(there, way(trial))
+            falls = there is not None and stands and not stays
             if falls and trial - done > max(NARROW * trial, SHORTEST[0]):
                 barrier = trial
                 continue
@@ -181,6 +182,7 @@ class Toucher:
                     return None
                 if jump is not None:
                     trial, there = jump
+                    stays = True
                     self.snapped.append(trial)
                 step, barrier = AFTER_JUMP, np.inf
             elif sudden:
@@ -189,7 +191,7 @@ class Toucher:
             rate = np.inf if falls or trial in self.snapped or now is None else turned / (trial - done)
             now, touches, done = there, there.mesh.touches, trial
             barrier = np.inf if done >= barrier else barrier
-            stands = not self.unstable(now, way(done))
+            stands = stays
             step *= 2.0
         return None
 
