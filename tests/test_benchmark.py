@@ -30,7 +30,7 @@ def rows(printed):
 
 
 def test_benchmark_of_another_name_is_refused():
-    accepted = "net, path, motion, steps, code, accuracy, pieces, sweep, start, extremes, random or contact"
+    accepted = "net, path, motion, steps, code, accuracy, pieces, sweep, start, extremes, random, jitter, contact"
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         benchmark.main(["nets"])
 

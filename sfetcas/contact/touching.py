@@ -55,6 +55,9 @@ FIRST_DRAG, LEAST_DRAG, MOST_DRAG, DRAG_BEYOND = 1.0, 1e-6, 1e7, 2.0
 SLOW = 0.1
 """What turns by less in a step, rad, may be near where it comes to rest."""
 
+NEARER = 0.3
+"""How much slower it has to be than where it was found not to rest yet, to be asked again."""
+
 NUDGE = 0.05
 """Angle, rad, by which an unstable equilibrium is moved along its escape shape to begin to fall."""
 
@@ -259,7 +262,7 @@ class Toucher:
         Steps become longer as it slows down.  Drag stays beyond the lowest eigenvalue below zero, so that each step has
         one minimum.
         """
-        drag = FIRST_DRAG
+        drag, slow = FIRST_DRAG, SLOW
         for _ in range(FALLS):
             stability = self.stability.judged(now, way)
             drag = max(drag, -DRAG_BEYOND * stability.smallest if stability.negative > 0 else 0.0, LEAST_DRAG)
@@ -272,10 +275,13 @@ class Toucher:
                 continue
             turned = self.passing.turned(now, there)
             now, touches = there, there.mesh.touches
-            if turned < SLOW and not self.unstable(now, way):
+            if turned < slow and not self.unstable(now, way):
                 rest = self.resolved(base, now, touches, way)
-                if rest is not None and not self.passing.possible(now, rest, way.offsets):
-                    return None if self.unstable(rest, way) else rest
+                stays = rest is not None and not self.passing.possible(now, rest, way.offsets)
+                if rest is not None and stays and not self.unstable(rest, way):
+                    return rest
+                # Without drag Newton's method goes from here to where it fell from: nearer to rest it will not.
+                slow = NEARER * turned
             drag *= 0.25 if turned < 0.5 * SLOW else 0.5 if turned < SLOW else 1.0
         return None
 
