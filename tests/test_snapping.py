@@ -311,7 +311,8 @@ def test_mirrored_rotations_of_hinges_in_space_stay_about_their_axes():
 def test_how_the_search_was_done_is_told_once():
     steps = solve(column(steps=[30.0], equilibria="all")).steps
     assert len(steps) > 1
-    assert [any("Newton runs" in note for note in step.notes) for step in steps] == [True] + [False] * (len(steps) - 1)
+    told = [any("a scan of the angle" in note for note in step.notes) for step in steps]
+    assert told == [True] + [False] * (len(steps) - 1)
 
 
 def test_switch_takes_a_whole_path():
@@ -381,7 +382,8 @@ def test_straight_columns_that_snap_say_so():
     below = solve(made(table | {"analysis": {"steps": [23.0]}})).last
     np.testing.assert_allclose(below.position("top"), 0.0, atol=1e-9)
     snapped = solve(made(table | {"analysis": {"steps": [60.0]}})).last
-    told = [float(re.search(r"jumped near factor ([0-9.e+]+):", note)[1]) for note in snapped.notes]
+    jumps = [re.search(r"jumped near factor ([0-9.e+]+):", note) for note in snapped.notes]
+    told = [float(jump[1]) for jump in jumps if jump]
     critical = solve(made(table | {"analysis": {"type": "path", "range": [0, 30]}})).bifurcations[0].factor
     # The way is followed until a stable and an unstable state are 2 % apart.
     assert told[0] == pytest.approx(critical, rel=0.025)

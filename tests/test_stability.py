@@ -232,7 +232,7 @@ def test_leaving_goes_to_the_side_of_less_energy(side):
     loading = prepared.model.loading(1.0)
     straight_state = prepared.equations.start(loading)
     found = prepared._test.test(prepared.equations.at(straight_state, loading))
-    nudged = prepared._nudged(straight_state, found, loading, 0.2)
+    nudged = prepared.nudged(straight_state, found, loading, 0.2)
     assert side * nudged.q[prepared.model.chain("m")[-1], 0] > 0.1
 
 

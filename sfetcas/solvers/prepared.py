@@ -291,10 +291,11 @@ class Prepared:
                 found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
             except SolveError:
                 lost += self._spent - begun
-                # The flow leads down from wherever it begins: where it finds no rest a longer step finds none.
-                if lost >= FALLEN or not self.model.minimisable:
+                # The flow leads down from wherever it begins: where it finds no rest a longer step finds none, but
+                # the other side of the shape may lead elsewhere.
+                if lost >= FALLEN or (not self.model.minimisable and amplitude < 0.0):
                     break
-                amplitude *= 1.7
+                amplitude *= 1.7 if self.model.minimisable else -1.0
                 continue
             there = self.stability(found)
             if there.negative == 0:
