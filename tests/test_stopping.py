@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
@@ -19,8 +20,10 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="
 
 def started(folder, *words, before=""):
     """The command line as a process that says when it is where ``before`` puts a word on its standard error."""
-    (folder / "tmp").mkdir(exist_ok=True)
-    environment = {**os.environ, "TMPDIR": str(folder / "tmp"), "SFETCAS_CACHE": str(folder / "cache")}
+    # Sockets of processes stand there, whose paths may have hardly more than a hundred characters.
+    short = tempfile.mkdtemp(dir=folder.parent)
+    (folder / "tmp").symlink_to(short)
+    environment = {**os.environ, "TMPDIR": short, "SFETCAS_CACHE": str(folder / "cache")}
     code = f"import sys, os, signal\nsys.argv = ['sfetcas', *{words!r}]\nsay = lambda: os.write(2, b'here\\n')\n"
     code += f"signal.signal(signal.SIGINT, signal.default_int_handler)\n{before}\n"
     code += "from sfetcas.cli import main\nsys.exit(main())"
