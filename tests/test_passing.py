@@ -81,6 +81,13 @@ def test_the_answer_does_not_depend_on_steps():
     np.testing.assert_allclose(many.position("B"), one.position("B"), atol=2e-5)
 
 
+class Stand:
+    """In the place of contact at a state: only where its members are."""
+
+    def __init__(self, fields):
+        self.fields = fields
+
+
 def moved(angle, *, center=(0.5, 0.5), radius=0.05, **touching):
     """Whether a straight lever that turns by an angle from the x axis may have passed a circle."""
     scene = made(lever([0, 1], peg(*center, radius)))
@@ -92,7 +99,7 @@ def moved(angle, *, center=(0.5, 0.5), radius=0.05, **touching):
         fields = SimpleNamespace(
             positions=lambda name, s: s[:, None] * way, tangents=lambda name, s: np.tile(way, (len(s), 1))
         )
-        touched = SimpleNamespace(fields=fields)
+        touched = Stand(fields)
         return SimpleNamespace(touched=touched, mesh=SimpleNamespace(touches=()))
 
     assert len(x) > 4.0 / radius / 4.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -111,7 +112,7 @@ class ContactRun:
 
     def grown(self, base: Mesh, factor: float) -> Held | None:
         """From the undeformed scene, loads and motions growing together."""
-        start: Held | tuple[Touch, ...] = self.first_touches(base)
+        start: Held | tuple[Touch, ...] = self.first_touches
         if self.scene.histories and factor != 0.0:
             held = self.toucher.follow(base, lambda t: Way(lambda model: model.loading(0.0, t), {}), start)
             if held is None:
@@ -163,11 +164,11 @@ class ContactRun:
         self.jumps = list(self.cushions.left)
         return self.toucher.read(base, found, self.at(factor))
 
-    def first_touches(self, base: Mesh) -> tuple[Touch, ...]:
+    @functools.cached_property
+    def first_touches(self) -> tuple[Touch, ...]:
         """What touches in the undeformed scene."""
-        model = self.prepare(base).model
         found: list[Touch] = []
-        for contact, stop in obstacles_of(model).items():
+        for contact, stop in self.cushions.obstacles.items():
             for member in members_of(self.scene.contacts[contact], self.scene.members):
                 line = self.scene.center_lines[member]
                 x = np.linspace(0.0, 1.0, 257)

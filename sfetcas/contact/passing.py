@@ -8,6 +8,7 @@ where it does not, the step is too long to tell, and a shorter one has a thinner
 from __future__ import annotations
 
 import functools
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -71,6 +72,8 @@ class Passing:
 
     def __init__(self, scene: Scene, obstacles: Mapping[str, Obstacle]) -> None:
         self.scene, self.obstacles = scene, obstacles
+        # A state is looked at as the end of one step and the begin of the next.
+        self._courses: weakref.WeakKeyDictionary[Touched, Course] = weakref.WeakKeyDictionary()
         self.pairs = [
             (contact, member) for contact in obstacles for member in members_of(scene.contacts[contact], scene.members)
         ]
@@ -80,11 +83,14 @@ class Passing:
 
     def course(self, touched: Touched) -> Course:
         """Where the members of a state are."""
-        fields = touched.fields
-        return Course(
-            {name: fields.positions(name, x) for name, x in self.fractions.items()},
-            {name: fields.tangents(name, x) for name, x in self.fractions.items()},
-        )
+        known = self._courses.get(touched)
+        if known is None:
+            fields = touched.fields
+            known = self._courses[touched] = Course(
+                {name: fields.positions(name, x) for name, x in self.fractions.items()},
+                {name: fields.tangents(name, x) for name, x in self.fractions.items()},
+            )
+        return known
 
     def turned(self, before: Held, after: Held) -> float:
         """Largest angle between tangents of the same place in two states, rad."""

@@ -204,9 +204,9 @@ class _Run(Refining):
         """The answer where obstacles may stop members."""
         base = self.pilot_mesh.refined()
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
-        falls = bool(pilot.diagnosis.mobility) and not contact.first_touches(base)
+        falls = bool(pilot.diagnosis.mobility) and not contact.first_touches
         known = pilot.model.minimisable and not (pilot.diagnosis.mobility or pilot.lacks_slack)
-        if known and not (self.started or contact.last or contact.first_touches(base)):
+        if known and not (self.started or contact.last or contact.first_touches):
             found = self._clear_all_the_way(contact, pilot, factor)
             if found is not None:
                 return found
