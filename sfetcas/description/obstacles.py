@@ -171,16 +171,17 @@ def nearest(edge: Obstacle, positions: Curve, tangents: Curve, samples: Array) -
     found = []
     for i in np.flatnonzero((slopes[:-1] <= 0.0) & (slopes[1:] > 0.0)):
         low, high = samples[i], samples[i + 1]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            below = edge_slopes(edge, positions, tangents, np.array([middle]))[0] <= 0.0
-            low, high = (middle, high) if below else (low, middle)
+        for _ in range(FINER):
+            inner = np.linspace(low, high, PARTS + 1)
+            before = edge_slopes(edge, positions, tangents, inner[1:-1]) <= 0.0
+            k = PARTS - 1 if before.all() else int(np.argmin(before))
+            low, high = inner[k], inner[k + 1]
         found.append(float(low))
     return found
 
 
-HALVINGS = 48
-"""Bisections of a sampling interval: to rounding."""
+PARTS, FINER = 32, 10
+"""Parts into which a sampling interval is cut, so many times: to rounding."""
 
 
 def edge_slopes(edge: Obstacle, positions: Curve, tangents: Curve, x: Array) -> Array:

@@ -99,7 +99,7 @@ def rotate(q: ArrayLike, v: ArrayLike) -> Array:
 def matrix(q: ArrayLike) -> Array:
     """Rotation matrices, shape (..., 3, 3); the columns are the turned unit vectors."""
     q = np.asarray(q, dtype=float)
-    return np.stack([rotate(q, axis) for axis in np.eye(3)], axis=-1)
+    return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
 
 
 def from_rotation_vector(phi: ArrayLike) -> Array:

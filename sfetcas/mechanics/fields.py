@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..description.obstacles import obstacle
-from ..mathematics import interpolation, quaternion
+from ..mathematics import curves, interpolation, quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
@@ -270,7 +270,7 @@ class Fields:
 
     def _tangents(self, member: str, x: Array, rotation: Array) -> Array:
         """Tangents (n, 3) at fractions of the length."""
-        return self._frames(member, x, rotation)[:, :, 0]
+        return quaternion.rotate(self._axes(member, x, rotation), curves.FORWARD)
 
     def tangents(self, member: str, x: Array) -> Array:
         """Tangents (n, 3) at fractions of the length."""
@@ -337,12 +337,15 @@ class Fields:
 
     def _frames(self, member: str, x: Array, rotation: Array) -> Array:
         """Section axes as columns, (n, 3, 3)."""
-        line = self.model.scene.center_lines[member]
+        return quaternion.matrix(self._axes(member, x, rotation))
+
+    def _axes(self, member: str, x: Array, rotation: Array) -> Array:
+        """Quaternions (n, 4) of the section axes."""
         if not self.model.space:
             zero = np.zeros(len(x))
             vectors = np.stack([zero, zero, rotation[:, 0]], axis=-1)
             rotation = quaternion.from_rotation_vector(vectors)
-        return quaternion.matrix(quaternion.multiply(rotation, line.quaternions(x)))
+        return quaternion.multiply(rotation, self.model.scene.center_lines[member].quaternions(x))
 
     def _along_body(self, member: str, x: Array) -> dict[str, Array]:
         """Fields of a small member: its ends, and between them the shape of a beam that carries no load."""
