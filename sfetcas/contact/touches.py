@@ -364,15 +364,15 @@ class Touched:
     @functools.cached_property
     def conditions(self) -> Array:
         """What has to be zero at each place of contact within a member, dimensionless, in their order."""
-        found = []
+        found: list[float] = []
         for touch in self.model.mesh.touches:
             if touch.to is not None:
-                found += [self._moment_jump(touch, at, way) for at, way in zip(touch.places, (-1.0, 1.0), strict=True)]
+                found += self._moment_jumps(touch)
             elif 0.0 < touch.at < 1.0:
                 sharp = self.obstacles[touch.contact].kind == "sharp"
                 out = self._from_edge(touch) if sharp else self.normal(touch, touch.at)
                 found.append(float(out @ self._tangent(touch, touch.at)))
-        return np.array([value for value in found if value is not None])
+        return np.array(found)
 
     def _from_edge(self, touch: Touch) -> Array:
         """Distance (3,) of a place from an edge, across it, dimensionless."""
@@ -382,14 +382,16 @@ class Touched:
             out = out + touch.offset * stop.side / np.linalg.norm(stop.side)
         return np.asarray(out @ stop.across / self.model.scales.length)
 
-    def _moment_jump(self, touch: Touch, at: float, way: float) -> float | None:
-        """Moment just outside a stretch less the one that the obstacle's shape takes; None at a member's end."""
-        if not 0.0 < at < 1.0:
-            return None
-        x = np.array([np.nextafter(at, at + way)])
-        outside = self.fields.along(touch.member, x, dimensionless=True)["moment"][0]
-        pressed, axes = self.fields.pressed_moments(touch, np.array([at]))
-        return float(outside @ axes[0] - pressed[0])
+    def _moment_jumps(self, touch: Touch) -> list[float]:
+        """Moments just outside the ends of a stretch less those that the obstacle's shape takes; not at member's ends."""
+        ends = np.array([touch.at, float(touch.to or 0.0)])
+        inner = (ends > 0.0) & (ends < 1.0)
+        if not inner.any():
+            return []
+        beside = np.nextafter(ends, [-1.0, 2.0])[inner]
+        outside = self.fields.along(touch.member, beside, dimensionless=True)["moment"]
+        pressed, axes = self.fields.pressed_moments(touch, ends[inner])
+        return [float(value) for value in np.einsum("ni,ni->n", outside, axes) - pressed]
 
     def gap_curvature(self, touch: Touch) -> float:
         """Second derivative of the gap along the member at a place of contact, 1/m."""
