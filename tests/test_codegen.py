@@ -27,7 +27,7 @@ PROBLEMS = Path(__file__).parent.parent / "problems"
 STATIC = [
     file for file in sorted(PROBLEMS.glob("*.toml")) if load(file).analysis.type == "static" and not load(file).contacts
 ]
-FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
+FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
 
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
 
@@ -59,8 +59,9 @@ def beam(**more):
 def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
     scene = load(file)
     solver = export(scene, tmp_path / "c", name="structure")
-    # Whatever the compiler makes faster keeps the bits: other tests have -O2.
-    program = built(tmp_path / "c", "structure", flags=["-O1" if flag == "-O2" else flag for flag in FLAGS])
+    # Whatever the compiler makes faster keeps the bits; -O2 takes three times as long to compile, so that one has it.
+    level = "-O2" if file == STATIC[0] else "-O1"
+    program = built(tmp_path / "c", "structure", flags=[*FLAGS, level])
     words = re.fullmatch(r"(\d+) of (\d+) cases agree, (\d+) of them to the last bit.*\n", said(program))
     assert words
     outcome, results = solver.solve()
