@@ -512,6 +512,30 @@ def test_rigid_arc_rolls_on_its_way_to_a_floor():
     assert entry["force"][1] * at == pytest.approx(length * np.trapezoid(x, dx=1 / 2000), rel=1e-6)  # the sum
 
 
+@pytest.mark.parametrize("reach", [1.0008, 1.0])
+def test_rigid_bar_rolls_off_its_end_onto_a_peg(reach):
+    """A peg hardly within reach is met by the end, and held a little before it: at sqrt(d^2 - r^2) of its hinge."""
+    angle, radius = -0.54, 0.0777
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"b": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"k": {"type": "rotational", "node": "A", "stiffness": 1.5}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, -20]}},
+        "contacts": {
+            "peg": {
+                "type": "circle",
+                "center": [reach * math.cos(angle), reach * math.sin(angle)],
+                "radius": radius,
+                "members": "all",
+            }
+        },
+    }
+    step = solve(made(table)).last
+    assert step.contacts["peg"]["at"] == pytest.approx(math.sqrt(reach**2 - radius**2), abs=1e-6)
+    held = angle + math.asin(radius / reach)
+    assert step.position("B") == pytest.approx([math.cos(held), math.sin(held), 0.0], abs=1e-9)
+
+
 def test_rigid_links_hang_over_a_drum():
     drum = {"type": "circle", "center": [1.5, -0.6], "radius": 0.5, "members": "all"}
     step = solve(made(rods(3, 0.3, contact=drum))).last

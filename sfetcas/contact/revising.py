@@ -354,10 +354,12 @@ class Reviser:
         """The touches with one that keeps a run of places out of an obstacle."""
         touches = held.mesh.touches
         width = max(gap.end - gap.begin, 1e-4)
-        for i, touch in enumerate(() if self._stiff(gap.member) else touches):
+        stiff = self._stiff(gap.member)
+        for i, touch in enumerate(touches):
             if (touch.contact, touch.member) != (gap.contact, gap.member):
                 continue
-            beside = [x for x in touch.places if gap.begin - width <= x <= gap.end + width]
+            # What is rigid touches at places only: it rolls off its end, or touches once more.
+            beside = [] if stiff else [x for x in touch.places if gap.begin - width <= x <= gap.end + width]
             if not beside and touch.at in (0.0, 1.0) and touch.to is None and self._sinks(held, touch, gap.at):
                 beside = [touch.at]
             if not beside:
