@@ -38,8 +38,8 @@ NOISE = 1e-4
 """On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
 
 GRID, FINER = 33, 6
-"""Places of an interval at which a smallest gap is looked for, and times it is cut to the two parts beside the smallest:
-to 6e-8 of the interval, a gap within rounding."""
+"""Places of an interval at which a smallest gap is looked for, and times it is cut to the parts beside the smallest: to
+6e-8 of the interval, a gap within rounding."""
 
 FIRST_RISE, MOST_RISE = 0.05, 0.9
 """Shares of a stretch: how much of it rises where nothing tells, and at most."""
@@ -383,7 +383,7 @@ class Touched:
         return np.asarray(out @ stop.across / self.model.scales.length)
 
     def _moment_jumps(self, touch: Touch) -> list[float]:
-        """Moments just outside the ends of a stretch less those that the obstacle's shape takes; not at member's ends."""
+        """Moments just outside the ends of a stretch within the member, less those that the obstacle's shape takes."""
         ends = np.array([touch.at, float(touch.to or 0.0)])
         inner = (ends > 0.0) & (ends < 1.0)
         if not inner.any():
