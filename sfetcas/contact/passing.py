@@ -92,6 +92,16 @@ class Passing:
             )
         return known
 
+    def departed(self, first: Held, before: Held, after: Held, share: float) -> float:
+        """Largest angle, rad, by which tangents depart from where they would go on to.
+
+        The step from ``before`` to ``after`` is ``share`` times that from ``first`` to ``before``.
+        """
+        one, other, there = (self.course(held.touched).tangents for held in (first, before, after))
+        on = {name: other[name] + share * (other[name] - one[name]) for name in other}
+        unit = {name: t / np.maximum(np.linalg.norm(t, axis=1, keepdims=True), 1e-300) for name, t in on.items()}
+        return Course({}, unit).turned(Course({}, there))
+
     def turned(self, before: Held, after: Held) -> float:
         """Largest angle between tangents of the same place in two states, rad."""
         return self.course(before.touched).turned(self.course(after.touched))

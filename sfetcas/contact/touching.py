@@ -64,6 +64,9 @@ NUDGE = 0.05
 SUDDEN, STEEP = 0.02, 4.0
 """A step is sudden that turns a place by more than this angle, rad, and by so many times what the one before tells."""
 
+DEPARTS = 0.15
+"""... or that turns it by so much, rad, elsewhere than the step before tells: onto another branch, or past a corner."""
+
 FIRST, AFTER_JUMP = 0.25, 0.05
 """Parts of the way of the first step, and of the one after a state was left."""
 
@@ -150,6 +153,7 @@ class Toucher:
         touches = start.mesh.touches if isinstance(start, Held) else start
         stands = now is not None and not self.unstable(now, way(0.0))
         done, step, barrier, rate = 0.0, FIRST, np.inf, np.inf
+        since: tuple[float, Held] | None = None
         for _ in range(TRIES):
             if done >= 1.0:
                 return now
@@ -167,6 +171,9 @@ class Toucher:
                     there = None
             # What moves much faster than before either begins to, which short steps show, or has jumped.
             sudden = there is not None and turned > max(SUDDEN, STEEP * rate * (trial - done))
+            if there is not None and now is not None and since is not None:
+                share = (trial - done) / (done - since[0])
+                sudden = sudden or self.passing.departed(since[1], now, there, share) > DEPARTS
             if sudden and 0.25 * step >= SHORTEST[1]:
                 step *= 0.25
                 continue
@@ -184,14 +191,20 @@ class Toucher:
                 if jump is None and there is None:
                     return None
                 if jump is not None:
+                    goes_on = STEEP * rate * (jump[0] - done) if there is None and np.isfinite(rate) else 0.0
                     trial, there = jump
                     stays = True
-                    self.snapped.append(trial)
+                    turned = np.inf if now is None else self.passing.turned(now, there)
+                    # Where Newton's method is lost though the state goes on, nothing has jumped.
+                    if turned > min(goes_on, SUDDEN):
+                        self.snapped.append(trial)
                 step, barrier = AFTER_JUMP, np.inf
             elif sudden:
                 self.snapped.append(trial)
             assert there is not None
-            rate = np.inf if falls or trial in self.snapped or now is None else turned / (trial - done)
+            jumped = falls or trial in self.snapped or now is None
+            rate = np.inf if jumped else turned / (trial - done)
+            since = None if jumped or now is None else (done, now)
             now, touches, done = there, there.mesh.touches, trial
             barrier = np.inf if done >= barrier else barrier
             stands = stays

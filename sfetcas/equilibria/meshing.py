@@ -11,7 +11,7 @@ from ..errors import SceneError
 from ..mechanics.accuracy import gained, halving, remaining
 from ..mechanics.elements import ELEMENTS
 from ..mechanics.mesh import Mesh, first_mesh, uniform_mesh
-from ..mechanics.model import assemble
+from ..mechanics.model import Model, assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability
@@ -75,6 +75,7 @@ class Meshing:
         self.quantity = Quantity.named(name) if name else None
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
+        self.model: Model | None = None
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
         self.asked = self.asked or not self.fixed
@@ -133,9 +134,10 @@ class Meshing:
 
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
-        prepared = Prepared(assemble(self.scene, mesh, assembly=self.assembly), kernels=self.settings.kernels)
         # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
-        self.assembly = prepared.model.assembly
+        self.model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)
+        self.assembly = self.model.assembly
+        prepared = Prepared(self.model, kernels=self.settings.kernels)
         _ = prepared.equations
         self.seconds["model"] += time.perf_counter() - begin
         return prepared

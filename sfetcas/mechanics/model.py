@@ -226,6 +226,7 @@ def assemble(
     *,
     assembly: Literal["auto", "closing", "nodal"] = "auto",
     scales: Scales | None = None,
+    like: Model | None = None,
 ) -> Model:
     """The model of a scene on a mesh.
 
@@ -240,6 +241,9 @@ def assemble(
         cut, as masses need.
     scales : Scales, optional
         Units; without them those that suit the scene.
+    like : Model, optional
+        Of the same scene: its numbers of rotations and maps of places serve again where nothing but the lengths of
+        elements differs, as where a place of contact moves.
 
     Raises
     ------
@@ -249,14 +253,19 @@ def assemble(
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
-    scales, rotations = scales or scales_of(scene), number_rotations(scene, mesh, element)
+    scales = scales or scales_of(scene)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
-    names = ("closing", "nodal") if assembly == "auto" else (assembly,)
-    bodies = {name: ends[0] for name, ends in rotations.ends.items() if scene.members[name].type == "rigid"}
-    both = {name: place_nodes(scene, segments, element.axes, name == "closing", bodies) for name in names}
-    if assembly == "auto":
-        closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
-        assembly = "closing" if closing <= nodal else "nodal"
+    if like is not None and like.element is element and like.assembly == assembly and segments.alike(like.segments):
+        rotations, positions = like.rotations, like.positions
+    else:
+        rotations = number_rotations(scene, mesh, element)
+        names = ("closing", "nodal") if assembly == "auto" else (assembly,)
+        bodies = {name: ends[0] for name, ends in rotations.ends.items() if scene.members[name].type == "rigid"}
+        both = {name: place_nodes(scene, segments, element.axes, name == "closing", bodies) for name in names}
+        if assembly == "auto":
+            closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
+            assembly = "closing" if closing <= nodal else "nodal"
+        positions = both[assembly]
     connections = connect(scene, mesh, segments, rotations, element, scales)
     followers = find_followers(scene, mesh, element, segments, rotations)
     model = Model(
@@ -268,7 +277,7 @@ def assemble(
         beams=beams,
         segments=segments,
         rotations=rotations,
-        positions=both[assembly],
+        positions=positions,
         connections=connections,
         followers=followers,
         groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections, followers),

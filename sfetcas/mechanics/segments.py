@@ -56,6 +56,10 @@ class Segments:
     owner: Index
     ends: Mapping[tuple[str, int], str]
 
+    def alike(self, other: Segments) -> bool:
+        """Whether others of the same scene join the same places by as many elements."""
+        return (self.places, self.kept, self.parts) == (other.places, other.kept, other.parts)
+
     @property
     def first(self) -> Index:
         """Number of the first element of each segment."""

@@ -22,7 +22,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.mesh import Mesh
-from ..mechanics.model import assemble
+from ..mechanics.model import Model, assemble
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, check_slack
 from ..solvers.critical import Event, at_factors, shapes_at
@@ -184,6 +184,7 @@ class _Run:
         self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set or not self.fixed
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
+        self.model: Model | None = None
         knots = {t for h in scene.histories.values() for t in h.t if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
 
@@ -239,9 +240,9 @@ class _Run:
 
     def _prepared(self, mesh: Mesh) -> Prepared:
         begin = time.perf_counter()
-        model = assemble(self.scene, mesh, assembly=self.assembly)
-        prepared = Prepared(model, kernels=self.settings.kernels, evaluations=EVALUATIONS)
-        self.assembly = model.assembly
+        self.model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)
+        prepared = Prepared(self.model, kernels=self.settings.kernels, evaluations=EVALUATIONS)
+        self.assembly = self.model.assembly
         _ = prepared.equations
         self.seconds["model"] += time.perf_counter() - begin
         return prepared

@@ -34,8 +34,9 @@ SHORTEST = 1e-4
 TINY = 1e-12
 """The first step is never below this part of the way."""
 
-HALF_TURN = np.pi
-"""Where turns are counted a step turns a node by this at most, rad."""
+HALF_TURN, LINEAR = np.pi, 1e-3
+"""A step turns a node by at most half a turn, rad, beyond which Newton's method may end whole turns away as well as it
+ends here, unless its corrections, rad, show that the answer is linear; where turns are counted also then."""
 
 NARROW = 0.02
 """The share of the way done at which a stable and an unstable state are near enough to leave between them."""
@@ -116,8 +117,7 @@ def follow(
         there = prepared.correct(
             now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
         )
-        # Where turns are counted a step that turns by more than half of one could lose one.
-        far = prepared.model.winding.count and there.first > HALF_TURN
+        far = there.first > HALF_TURN and (prepared.model.winding.count > 0 or there.second > LINEAR)
         good = there.converged and not far
         if good and not free(there.state, trial):
             if step <= BLOCKED:
