@@ -17,7 +17,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
-from ..solvers.newton import Corrected, loose_rows, named_in, relative_residual
+from ..solvers.newton import Corrected, changed_by, loose_rows, named_in, relative_residual
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import Stability
@@ -327,8 +327,9 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
     SceneError
         Names the motion.
     """
-    softest = float(prepared.weight.max(initial=1.0) / prepared.equations.mass.max(initial=1.0))
-    if stability.stable != "neutral" or not prepared.diagnosis.mobility or stability.smallest > HELD * softest:
+    if stability.stable != "neutral" or not prepared.diagnosis.mobility:
+        return
+    if stability.smallest > HELD * prepared.softest:
         return
     shape = np.concatenate([stability.shape, stability.travel])
     if moves_nodes(prepared.equations, shape, found.state):
@@ -377,11 +378,8 @@ def _grow(equations: Equations, point: Point, nearly: Array) -> bool:
     To close what is left of the closings by rows of the size s takes a step (left / s) that changes s itself by as
     much: beside s only where the rows vanish at the closed state.
     """
-    n = equations.unknowns
-    chosen = (equations.row >= n) & (equations.column < n)
-    row, column, entries = equations.row[chosen] - n, equations.column[chosen], point.entries[chosen]
-    sizes = np.array([np.linalg.norm(np.bincount(column, weights=entries * way[row])) for way in nearly.T])
-    return bool((np.abs(nearly.T @ point.residual[n:]) > GROWING * sizes**2).any())
+    sizes = np.linalg.norm(changed_by(equations, point, nearly), axis=0)
+    return bool((np.abs(nearly.T @ point.residual[equations.unknowns :]) > GROWING * sizes**2).any())
 
 
 def _stretched(equations: Equations, loose: Array, corrected: Corrected) -> SolveError:

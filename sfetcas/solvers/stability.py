@@ -106,20 +106,21 @@ class StabilityTest:
     @functools.cached_property
     def weight(self) -> Array:
         """The weight M of the module's docstring, (turning unknowns,)."""
-        return self.equations.mass * self._softest
+        return self.equations.mass * self.softest
 
     @functools.cached_property
     def _weights(self) -> Array:
         """The weight of all that counts: displacements have next to none."""
         count = len(self.equations.elastic_displacements)
-        return np.concatenate([self.weight, np.full(count, LIGHT * self._softest)])
+        return np.concatenate([self.weight, np.full(count, LIGHT * self.softest)])
 
     @functools.cached_property
     def _masses(self) -> Array:
         return np.concatenate([self.equations.mass, np.full(len(self.equations.elastic_displacements), LIGHT)])
 
     @functools.cached_property
-    def _softest(self) -> float:
+    def softest(self) -> float:
+        """The smallest stiffness of all members over the square of their lengths, in the units of the model."""
         model = self.equations.model
         x, softest = np.linspace(0.0, 1.0, 5), np.inf
         for name, member in model.scene.members.items():
@@ -197,16 +198,16 @@ class StabilityTest:
         limit = self._limit(entries)
         if self._is_graded(limit):
             values, _, limits = self._mode_by_mode(point, entries)
-            return -float(values[0]) * self._softest if (values < -limits).any() else 0.0
+            return -float(values[0]) * self.softest if (values < -limits).any() else 0.0
         if self._is_dense:
             values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
-            return -float(values[0]) * self._softest if (values < -limit).any() else 0.0
+            return -float(values[0]) * self.softest if (values < -limit).any() else 0.0
         if not self._below(point, entries, -limit):
             return 0.0
-        deep = max(near / self._softest / DEEPER, limit)
+        deep = max(near / self.softest / DEEPER, limit)
         while deep < LOWEST and self._below(point, entries, -deep):
             deep *= DEEPER
-        return deep * self._softest
+        return deep * self.softest
 
     @staticmethod
     def _limit(entries: Array) -> float:
@@ -357,7 +358,7 @@ class StabilityTest:
         # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
         for soft in (SOFT,) if self._n <= FULL else SOFTER:
             softened = entries.copy()
-            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self._softest
+            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self.softest
             softened[diagonal[equations.unknowns :]] -= soft / size
             matrix, ones = ca.DM(self._bordered_pattern, softened), ca.DM.ones(equations.total)
             self._bordered.nfact(matrix)
