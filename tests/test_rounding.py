@@ -8,6 +8,8 @@ from scenes import made, model_of
 
 import sfetcas
 from sfetcas.description.scene import Scene
+from sfetcas.description.supports import upwards
+from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers import newton
 from sfetcas.solvers.divergence import TangentTest
 from sfetcas.solvers.prepared import Prepared
@@ -91,3 +93,57 @@ def test_rows_next_to_straight_are_told_from_straight():
     bowed = replace(straight, q=straight.q + 1e-8 * np.cos(np.pi * x)[:, None])
     loose = [newton.loose_rows(equations, equations.at(s, nothing), 1e-10).shape[-1] for s in (straight, bowed)]
     assert loose == [1, 0]
+
+
+def round_rod(order: int = 1, moved: float = 0.0) -> Scene:
+    """A round cantilever in space: each frequency of bending has two shapes."""
+    nodes = {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [0.6, 0.3, 0.2 + moved]}}
+    return made(
+        {
+            "dimension": "space",
+            "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0, "rhoA": 1.0}},
+            "nodes": dict([*nodes.items()][::order]),
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "analysis": {"type": "modes", "modes": 3},
+        }
+    )
+
+
+def test_shapes_of_equal_frequencies_are_chosen_by_a_rule():
+    """Also that of which only one is asked for; the second of a pair lies across the first."""
+    found = [sfetcas.solve(scene).modes for scene in (round_rod(), round_rod(-1, 1e-14))]
+    ends = np.array([[mode.nodes["B"]["position"] for mode in modes] for modes in found])
+    assert ends[1] == pytest.approx(ends[0], abs=1e-5)
+    assert ends[0, 0] @ ends[0, 1] == pytest.approx(0.0, abs=1e-5)
+    assert ends[0, 2] == pytest.approx(ends[0, 0], abs=1e-5)
+
+
+def test_directions_of_equal_components_have_the_sign_of_the_first():
+    found = [upwards(np.array([-0.5, 0.5 + rounding, -0.1])) for rounding in (-1e-14, 1e-14)]
+    assert found[0][0] > 0.0
+    assert found[1][0] > 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_twins_of_generated_code_are_those_of_a_solve(side):
+    """In space the start of the column turns about its own b3, wherever that points: no start has to say so."""
+    table = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 9.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "M": {"position": [0.5, 0, 0]},
+            "B": {"position": [1, 0, 0], "support": "slider", "direction": [1, 0, 0]},
+        },
+        "members": {
+            "m": {"nodes": ["A", "M"], "section": "s", "b2": [0, side, 0]},
+            "n": {"nodes": ["M", "B"], "section": "s", "b2": [0, side, 0]},
+        },
+        "loads": {"p": {"type": "force", "node": "B", "value": [-60.0, 0, 0]}},
+    }
+    scene = made(table)
+    bent = sfetcas.solve(scene).last.position("M")[1]
+    assert side * bent > 0.3
+    solver = equilibrium_solver(scene, "column", results=["nodes.M.position"])
+    assert solver.start is None
+    assert solver.by_name(solver.solve()[1])["nodes.M.position"][1] == pytest.approx(bent, abs=1e-4)

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mathematics.linear import InertiaSolver, pattern
+from ..mathematics.linear import InertiaSolver, blurred, pattern
 from ..mechanics.equations import Equations, Point
 from .sides import Sides, alike
 
@@ -30,9 +30,6 @@ NEUTRAL = 1e-7
 
 ROUNDING = 2e-15
 """The same, relative to the largest entry of the weighted matrix."""
-
-ENTRY = 5e-16
-"""Rounding of an entry, relative to itself."""
 
 GRADED = 1e-5
 """Limits above this come of members that are very short or stiff beside others: rounding is told mode by mode then."""
@@ -251,8 +248,8 @@ class StabilityTest:
         values = shift + 1.0 / np.maximum(found[::-1], 1.0 / LOWEST)
         vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))
         vectors = vectors / np.linalg.norm(vectors, axis=0)
-        blurred = np.einsum("ik,ik->k", np.abs(vectors[self._h_row]) * size[:, None], np.abs(vectors[self._h_column]))
-        return values, vectors, NEUTRAL + ENTRY * blurred + ROUNDING * abs(shift)
+        rounding = blurred(self._h_row, self._h_column, entries, vectors)
+        return values, vectors, NEUTRAL + rounding + ROUNDING * abs(shift)
 
     @property
     def _is_dense(self) -> bool:
