@@ -71,7 +71,7 @@ def test_residual_that_rounding_of_rotations_explains_has_converged(turns):
     worst = int(np.abs(found.point.residual).argmax())
     off = found.point.residual.copy()
     off[worst] = 1e-10 * found.point.scale[worst]
-    assert not newton._rounded(prepared.equations, found.state, replace(found.point, residual=off))
+    assert not newton.rounded(prepared.equations, found.state, replace(found.point, residual=off))
 
 
 def test_rows_next_to_straight_are_told_from_straight():

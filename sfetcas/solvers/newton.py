@@ -26,6 +26,7 @@ __all__ = [
     "newton_step",
     "redundant",
     "relative_residual",
+    "rounded",
     "rows_in",
     "with_sharing",
 ]
@@ -166,7 +167,7 @@ def correct(
         trial = equations.moved(state, step)
         there = dragged(trial)
         gained = relative_residual(equations, there)
-        low = residual <= tolerance or (count and gained > 0.25 * residual and _rounded(equations, state, point))
+        low = residual <= tolerance or (count and gained > 0.25 * residual and rounded(equations, state, point))
         if low and gained > 0.25 * residual and (count or _balanced(equations, point)):
             if gained < residual:
                 state, point, residual = trial, there, gained
@@ -176,7 +177,7 @@ def correct(
             break
     if not residual <= tolerance and begun[2] <= tolerance:
         state, point, residual = begun
-    if residual > tolerance and drag is None and _rounded(equations, state, point):
+    if residual > tolerance and drag is None and rounded(equations, state, point):
         tolerance = residual
     second = 0.0 if second == np.inf else second
     if drag is not None:
@@ -194,7 +195,7 @@ EPSILON = 1e-15
 """Rounding of unknowns over the largest of their kind, or one."""
 
 
-def _rounded(equations: Equations, state: State, point: Point) -> bool:
+def rounded(equations: Equations, state: State, point: Point) -> bool:
     """Whether rounding of the unknowns explains what is out of balance, and balance beside all that acts is good.
 
     A residual that does not fall may as well be what no unknown balances, however small it is: that explains nothing.
