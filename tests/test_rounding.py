@@ -118,6 +118,17 @@ def test_shapes_of_equal_frequencies_are_chosen_by_a_rule():
     assert ends[0, 2] == pytest.approx(ends[0, 0], abs=1e-5)
 
 
+def test_shapes_of_equal_eigenvalues_are_chosen_by_a_rule():
+    """Two of bending and one of twist: where a search for all equilibria begins does not hang on rounding."""
+    found = []
+    for moved in (0.0, 1e-14):
+        prepared = prepared_of(round_rod(1, moved), 4)
+        still = prepared.model.loading(0.0)
+        found.append(prepared.spectrum(prepared.correct(prepared.equations.start(still), still), 2))
+    assert found[0][0][:3] == pytest.approx(np.full(3, np.pi**2 / 4.0), rel=1e-4)
+    assert found[1][1] == pytest.approx(found[0][1], abs=1e-5)
+
+
 def test_directions_of_equal_components_have_the_sign_of_the_first():
     found = [upwards(np.array([-0.5, 0.5 + rounding, -0.1])) for rounding in (-1e-14, 1e-14)]
     assert found[0][0] > 0.0

@@ -379,21 +379,11 @@ SOFT = 1e-12
 
 def _by_rule(motion: SmallMotion, found: Eigenmotions, count: int) -> Eigenmotions:
     """The first motions, the shapes of those with the same frequency as :mod:`~sfetcas.solvers.sides` takes them."""
-    omega, shapes = found.omega, found.shapes.copy()
-    if not np.iscomplexobj(shapes):
-        sides, begin = Sides(motion.equations), 0
+    shapes = found.shapes
+    if not np.iscomplexobj(shapes) and len(found.omega):
         metric = np.append(motion.equations.mass, np.zeros(motion.unknowns - motion.equations.turning_unknowns))
-        while begin < len(omega):
-            same = slice(begin, begin + int((omega[begin:] <= omega[begin] * (1.0 + SAME)).sum()))
-            if same.stop - begin > 1:
-                size = np.sqrt(np.mean(metric @ shapes[:, same] ** 2)) or 1.0
-                shapes[:, same] = size * sides.ordered(shapes[:, same] / size, metric)
-            begin = same.stop
+        shapes = Sides(motion.equations).in_groups(found.omega, shapes, metric, 0.0)
     return replace(found, exponents=found.exponents[:count], shapes=shapes[:, :count])
-
-
-SAME = 1e-6
-"""Frequencies that differ by a smaller share are one, of which no shape is the only one."""
 
 
 def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:

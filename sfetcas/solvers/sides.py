@@ -75,7 +75,7 @@ class Sides:
         Parameters
         ----------
         shapes : ndarray
-            Columns, orthonormal with the metric.
+            Columns, orthonormal with the metric or otherwise.
         metric : ndarray
             Weight of each entry.
         """
@@ -90,13 +90,30 @@ class Sides:
             shapes = shapes @ np.linalg.qr(np.column_stack([share, np.eye(len(share))]))[0][:, 1 : len(share)]
         return np.column_stack(found)
 
+    def in_groups(self, values: Array, shapes: Array, metric: Array, unit: float = 1.0) -> Array:
+        """Shapes of rising eigenvalues, those of the same one as :meth:`ordered` takes them.
+
+        Parameters
+        ----------
+        unit : float
+            Size below which differences of eigenvalues do not count by themselves.
+        """
+        begin, found = 0, shapes.copy()
+        while begin < len(values):
+            near = ALIKE * max(unit, abs(float(values[begin])))
+            end = begin + int((values[begin:] - values[begin] <= near).sum())
+            found[:, begin:end] = self.ordered(shapes[:, begin:end], metric)
+            begin = end
+        return found
+
     def _share(self, shapes: Array, metric: Array) -> Array:
         """What the rule takes of each shape, of length one."""
         turning = self._equations.turning_unknowns
+        size = np.sqrt(float((metric @ np.abs(shapes) ** 2).max()))
         for field in self.fields:
             weighted = metric[:turning] * field
             parts = weighted @ shapes[:turning]
-            if np.linalg.norm(parts) > LEAST * np.sqrt(float(weighted @ field)):
+            if np.linalg.norm(parts) > LEAST * size * np.sqrt(float(weighted @ field)):
                 # A complex shape is turned until its part in the field is real.
                 return np.asarray(parts.conj() / np.linalg.norm(parts))
         share, shape = np.eye(shapes.shape[1])[0], shapes[:, 0]

@@ -261,8 +261,12 @@ class StabilityTest:
         entries, rows = self._weighted(point), self._rows(point)
         projected, basis = self._projected(entries, rows)
         values, vectors = np.linalg.eigh(projected)
-        turning = self.equations.turning_unknowns
-        shapes = ((basis @ vectors[:, :count]).T / np.sqrt(self._weights))[:, :turning]
+        turning, root = self.equations.turning_unknowns, np.sqrt(self._weights)[:, None]
+        # Of what has the eigenvalue of the last one the rule takes the shape, too.
+        most = min(count, len(values))
+        most += alike(values[most - 1 :]) - 1 if most else 0
+        shapes = self.sides.in_groups(values[:most], basis @ vectors[:, :most] / root, self._weights)
+        shapes = shapes[:turning, :count].T
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
