@@ -101,7 +101,7 @@ class Sides:
         begin, found = 0, shapes.copy()
         while begin < len(values):
             near = ALIKE * max(unit, abs(float(values[begin])))
-            end = begin + int((values[begin:] - values[begin] <= near).sum())
+            end = begin + 1 + int((values[begin + 1 :] - values[begin] <= near).sum())
             found[:, begin:end] = self.ordered(shapes[:, begin:end], metric)
             begin = end
         return found
