@@ -178,7 +178,8 @@ def correct(
     if not residual <= tolerance and begun[2] <= tolerance:
         state, point, residual = begun
     if residual > tolerance and drag is None and rounded(equations, state, point):
-        tolerance = residual
+        # Rounding may leave a little more where multipliers are shared.
+        tolerance = min(FLOOR, 4.0 * residual)
     second = 0.0 if second == np.inf else second
     if drag is not None:
         point = equations.at(state, loading)
