@@ -151,6 +151,10 @@ def _told(answer: Answer, how: Jittered) -> _Told:
         told.words["notes"], told.words["rigid"] = said(answer.notes), answer.rigid
         omegas = np.array([mode.omega for mode in answer.modes]) * how.time
         told.add("omega", omegas, (2.0 * answer.error_estimate + 1e-6) * float(omegas.max(initial=0.0)))
+        for i, mode in enumerate(answer.modes):
+            # Other axes may turn a shape round, and more a phase.
+            moved = np.concatenate([how.back(mode.nodes[name]["position"]) for name in sorted(mode.nodes)])
+            told.add(f"shape {i}", np.outer(moved, moved.conj()).real, ROUGH)
     elif isinstance(answer, Trajectory):
         told.words["notes"] = said(answer.notes)
         reach = (2.0 * (answer.error_estimate or 1e-6) + 1e-9) * size

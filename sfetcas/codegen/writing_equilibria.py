@@ -138,6 +138,8 @@ class EquilibriumWriter(Writer):
             table("sf_soft", solver.method.soft),
             table("sf_start", solver.start if solver.start is not None else np.zeros(0)),
         ]
+        if self.model.minimisable:
+            found.append(table("sf_seed", solver.method.seed))
         if self.model.has_potential:
             lower, order = self._lower
             found += [

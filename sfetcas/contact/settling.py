@@ -52,6 +52,9 @@ TOGETHER = 1e-3
 SETTLED = 1e-11
 """Steps of places shorter than this have arrived: fractions of the length."""
 
+OPEN = 1e-9
+"""Share of the largest singular value below which conditions leave places open: differences leave 1e-10 of it."""
+
 MISSED = 1e-6
 """Conditions of places, dimensionless, that are larger than this do not hold."""
 
@@ -263,7 +266,7 @@ class Settler:
             slopes = self.slopes(held, way) if slopes is None else slopes
             if slopes is None:
                 return None
-            step = -np.linalg.lstsq(slopes, here, rcond=1e-14)[0]
+            step = -np.linalg.lstsq(slopes, here, rcond=OPEN)[0]
             if not np.isfinite(step).all():
                 return None
             step, ran, room = _shortened(held.mesh.touches, free, step)

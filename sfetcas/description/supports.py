@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..mathematics.arrays import first_of_largest
 from .loads import Motion
 from .records import enumerated, say
 from .springs import Spring
@@ -114,8 +115,8 @@ def along(direction: Floats | Sequence[float]) -> str:
 
 
 def upwards(direction: Floats) -> Floats:
-    """The same direction with its largest component above zero."""
-    return np.asarray(direction * np.sign(direction[int(np.argmax(np.abs(direction)))]))
+    """The same direction with its largest component above zero, of equal ones the first."""
+    return np.asarray(direction * np.sign(direction[first_of_largest(direction)]))
 
 
 def _floating(part: list[str], held: Floats, free: Floats) -> str:

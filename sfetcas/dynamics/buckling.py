@@ -31,7 +31,8 @@ REAL = 1e-6
 """Imaginary parts of inverse factors below this share are rounding."""
 
 FAR = 1e-7
-"""Inverse factors below this share of the largest are what differencing leaves."""
+"""Inverse factors below this share of the largest, or of the largest rotation (rad) that the loads cause as they begin
+to grow, are what differencing leaves: linear theory does not reach so far."""
 
 BESIDE = 2
 """Times so many factors are looked for: those below zero belong to loads turned round, and come last."""
@@ -67,7 +68,9 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
 
     inverse, _ = largest(apply, equations.total, BESIDE * count)
     sizes = np.abs(inverse)
-    real = inverse[(np.abs(inverse.imag) <= REAL * sizes) & (sizes > FAR * sizes.max(initial=0.0))].real
+    turned = float(np.abs(start.tangent.z[:turning]).max(initial=0.0)) / abs(start.tangent.factor)
+    told = sizes > FAR * max(turned, sizes.max(initial=0.0))
+    real = inverse[(np.abs(inverse.imag) <= REAL * sizes) & told].real
     factors = 1.0 / real
     return np.asarray(factors[np.lexsort((np.abs(factors), factors < 0.0))][:count])
 

@@ -22,7 +22,7 @@ from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..equilibria.solution import Equilibrium, heading
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
 from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations, State
@@ -32,6 +32,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
 from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.sides import Sides
 from ..solvers.stability import Stability
 from .buckling import buckling_factors
 from .matrices import Matrices, matrices_of
@@ -66,6 +67,9 @@ STEP = 1e-5
 @dataclass(frozen=True, eq=False)
 class Mode:
     """One mode, its largest displacement 1 (m), or its largest rotation (rad) where nothing is displaced.
+
+    Of displacements that differ by less than a thousandth the first counts as the largest, in the order of the names of
+    nodes, then members.
 
     Attributes
     ----------
@@ -259,7 +263,9 @@ class _Run:
         motion = SmallMotion(prepared.equations, corrected.state, loading, corrected.point)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
-            return prepared, motion, motion.eigenmotions(self.count, negative)
+            # One more: of those with the frequency of the last one that is asked for a rule takes the shape.
+            more = int(motion.plain and motion.symmetric)
+            return prepared, motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
         except np.linalg.LinAlgError as error:
             raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
 
@@ -371,6 +377,15 @@ SOFT = 1e-12
 # -- shapes -------------------------------------------------------------------------------------------
 
 
+def _by_rule(motion: SmallMotion, found: Eigenmotions, count: int) -> Eigenmotions:
+    """The first motions, the shapes of those with the same frequency as :mod:`~sfetcas.solvers.sides` takes them."""
+    shapes = found.shapes
+    if not np.iscomplexobj(shapes) and len(found.omega):
+        metric = np.append(motion.equations.mass, np.zeros(motion.unknowns - motion.equations.turning_unknowns))
+        shapes = Sides(motion.equations).in_groups(found.omega, shapes, metric, 0.0)
+    return replace(found, exponents=found.exponents[:count], shapes=shapes[:, :count])
+
+
 def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:
     shape, exponent = found.shapes[:, number], complex(found.exponents[number])
     parts = [shape.real] + ([shape.imag] if np.iscomplexobj(shape) else [])
@@ -382,13 +397,13 @@ def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:
         }
         for kind in (0, 1)
     )
-    moved = np.concatenate(
-        [entry["position"] for entry in nodes.values()] + [e["position"].ravel() for e in members.values()]
-    )
-    turned = np.concatenate([np.zeros(1), *(entry["rotation"] for entry in nodes.values() if "rotation" in entry)])
+    # In the order of the alphabet: of displacements that a symmetry makes alike the first is the largest.
+    ends, lines = ([table[name] for name in sorted(table)] for table in (nodes, members))
+    moved = np.concatenate([entry["position"].ravel() for entry in (*ends, *lines)])
+    turned = np.concatenate([np.zeros(1), *(entry["rotation"] for entry in ends if "rotation" in entry)])
     # A shape that is nearly all twist has displacements that are rounding.
     values = moved if np.abs(moved).max() > STEP * motion.model.scales.length * np.abs(turned).max() else turned
-    unit = values[np.argmax(np.abs(values) > 0.999 * np.abs(values).max())]
+    unit = values[first_of_largest(values, 1e-3)]
     kinetic = float((shape.conj() @ (motion.mass @ shape.real + 1j * (motion.mass @ shape.imag))).real)
     scales, masses = motion.model.scales, motion.masses
     size = abs(exponent)

@@ -37,8 +37,11 @@ SOFT = 1e-14
 PROXIMAL = 1e-13
 """Stiffness, over that of the rotation itself, of what neither mass nor stiffness holds, as a straight rod's spin."""
 
-RIGID = 3e-15
-"""Squares of frequencies below this share of what was added up, or 3000 times that of the units, are zero."""
+RIGID = 3e-14
+"""Squares of frequencies below this share of what was added up, or 3000 times that of the units, are zero.
+
+Rounding leaves a sixtieth of it; the slowest of the reference cases has 1e8 times as much.
+"""
 
 DOUBLE = 1e-12
 """The same of exponents that are zero twice, of which rounding leaves the root."""

@@ -10,6 +10,7 @@ from ..description.records import counted
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.linear import blurred
 from ..mechanics.accuracy import every_other, roughness
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import Fields, transferred
@@ -17,10 +18,10 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
-from ..solvers.newton import Corrected, loose_rows, named_in, relative_residual
+from ..solvers.newton import Corrected, changed_by, loose_rows, named_in, relative_residual
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
-from ..solvers.stability import Stability
+from ..solvers.stability import LIGHT, Stability
 from .meshing import Found
 from .mirrors import has_twin
 from .piloting import BEYOND, KEPT, Piloting, multipliers
@@ -68,7 +69,7 @@ COARSE = 0.1
 """Share of the largest section moment by which moments of two meshes may differ without a note."""
 
 HELD = 2e-9
-"""Eigenvalues above this, in those of the softest member, hold a mechanism, if barely: rounding leaves about 1e-9."""
+"""Eigenvalues above this, in those of the softest member, and above rounding hold a mechanism, if barely."""
 
 UNBALANCED = 0.01
 """Share of what acts that is out of balance without redundant multipliers: these carry it on next to nothing."""
@@ -327,12 +328,16 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
     SceneError
         Names the motion.
     """
-    softest = float(prepared.weight.max(initial=1.0) / prepared.equations.mass.max(initial=1.0))
-    if stability.stable != "neutral" or not prepared.diagnosis.mobility or stability.smallest > HELD * softest:
+    if stability.stable != "neutral" or not prepared.diagnosis.mobility:
         return
-    shape = np.concatenate([stability.shape, stability.travel])
-    if moves_nodes(prepared.equations, shape, found.state):
-        raise SceneError(free_to_move(in_words(prepared.equations, shape)))
+    equations, shape = prepared.equations, np.concatenate([stability.shape, stability.travel])
+    inside = (equations.row < equations.unknowns) & (equations.column < equations.unknowns)
+    row, column, entries = equations.row[inside], equations.column[inside], found.point.entries[inside]
+    size = float(np.append(equations.mass, np.full(len(stability.travel), LIGHT)) @ shape**2)
+    if stability.smallest > HELD * prepared.softest + float(blurred(row, column, entries, shape[:, None])[0]) / size:
+        return
+    if moves_nodes(equations, shape, found.state):
+        raise SceneError(free_to_move(in_words(equations, shape)))
 
 
 def _with_unique_reactions(found: Found, loading: Loading) -> Found:
@@ -377,11 +382,8 @@ def _grow(equations: Equations, point: Point, nearly: Array) -> bool:
     To close what is left of the closings by rows of the size s takes a step (left / s) that changes s itself by as
     much: beside s only where the rows vanish at the closed state.
     """
-    n = equations.unknowns
-    chosen = (equations.row >= n) & (equations.column < n)
-    row, column, entries = equations.row[chosen] - n, equations.column[chosen], point.entries[chosen]
-    sizes = np.array([np.linalg.norm(np.bincount(column, weights=entries * way[row])) for way in nearly.T])
-    return bool((np.abs(nearly.T @ point.residual[n:]) > GROWING * sizes**2).any())
+    sizes = np.linalg.norm(changed_by(equations, point, nearly), axis=0)
+    return bool((np.abs(nearly.T @ point.residual[equations.unknowns :]) > GROWING * sizes**2).any())
 
 
 def _stretched(equations: Equations, loose: Array, corrected: Corrected) -> SolveError:

@@ -6,10 +6,19 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Array", "Index"]
+__all__ = ["Array", "Index", "first_of_largest"]
 
 Array = np.ndarray[Any, np.dtype[Any]]
 """An array of numbers."""
 
 Index = np.ndarray[Any, np.dtype[np.intp]]
 """An array of places in another one."""
+
+
+def first_of_largest(values: Array, alike: float = 1e-6) -> int:
+    """Place of the entry of largest size; of those that miss it by less than the share ``alike`` the first.
+
+    Entries that a symmetry makes the same differ by rounding, which chooses nothing then.
+    """
+    sizes = np.abs(values)
+    return int(np.argmax(sizes >= (1.0 - alike) * sizes.max()))

@@ -14,7 +14,7 @@ from .arrays import Array
 from .keeping import kept
 from .kernels import Batch
 
-__all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "pattern", "smallest"]
+__all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "blurred", "pattern", "smallest"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
@@ -248,6 +248,16 @@ TINY = 1e-300
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:
     """Sparsity of a square matrix by the places of its entries, column by column."""
     return ca.Sparsity(n, n, np.searchsorted(column, np.arange(n + 1)).tolist(), row.tolist())
+
+
+def blurred(row: Array, column: Array, entries: Array, vectors: Array) -> Array:
+    """What rounding of the entries of a square matrix may leave of ``x A x``, of columns x (n, k): (k,)."""
+    sizes, size = np.abs(vectors), np.abs(entries)
+    return np.array([ENTRY * float((size * x[row]) @ x[column]) for x in sizes.T])
+
+
+ENTRY = 5e-16
+"""Rounding of an entry, relative to itself."""
 
 
 def smallest(rows: SparseMap, right: Array, weights: Array) -> Array:

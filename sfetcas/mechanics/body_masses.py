@@ -112,7 +112,7 @@ def _possible(stiff: Array, rest: Array) -> Array:
     size = float(np.abs(rest).max())
     unit = np.tile([size, size, size, 1.0, 1.0, 1.0], len(rest))
     rows = stiff * unit
-    kept = np.eye(len(unit)) - np.linalg.pinv(rows) @ rows
+    kept = np.eye(len(unit)) - np.linalg.pinv(rows, rcond=SMALLEST) @ rows
     return np.asarray(unit[:, None] * kept / unit)
 
 

@@ -21,7 +21,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from .deflation import turned_between
-from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, redundant, relative_residual, with_sharing
+from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, redundant, relative_residual, rounded, with_sharing
 from .prepared import Prepared
 from .sharing import shared
 from .stability import LIGHT, Inertia
@@ -301,12 +301,14 @@ class Curve:
             trial = self.held(equations.moved(state, step), loading)
             there = equations.at(trial, loading)
             gained = relative_residual(equations, there)
-            if residual <= TOLERANCE and gained > 0.25 * residual and count:
+            still = count and gained > 0.25 * residual
+            if still and (residual <= TOLERANCE or rounded(equations, state, point)):
                 break
             state, factor, point, residual = trial, factor + change, there, gained
             if not np.isfinite(residual):
                 return None
-        if not (residual <= TOLERANCE or (not sharp and self._passes(point, residual))):
+        good = residual <= TOLERANCE or (not sharp and self._passes(point, residual))
+        if not good and not rounded(equations, state, point):
             return None
         loading = self.loading(factor)
         state, point = with_sharing(equations, state, loading, point, max(residual, TOLERANCE))

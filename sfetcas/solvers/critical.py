@@ -233,18 +233,10 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 def shapes_at(curve: Curve, event: Event) -> Array:
     """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest size 1.
 
-    Of several, the first is the one with most rotation about z, then about y: so that meshes agree.
+    Of several, the first is what :mod:`~sfetcas.solvers.sides` takes of their space, the next of what that leaves.
     """
     _, values, shapes = curve.prepared.around_zero(event.standing.point)
-    chosen = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]]
-    if chosen.shape[1] > 1:
-        number = curve.equations.number
-        liking = np.zeros(len(chosen))
-        for axis in range(number.shape[1]):
-            liking[number[number[:, axis] >= 0, axis]] = float(axis)
-        weight = curve.prepared.weight
-        chosen = chosen @ np.linalg.eigh(chosen.T @ ((weight * liking)[:, None] * chosen))[1][:, ::-1]
-    sides, weight = Sides(curve.equations), curve.prepared.weight
-    sizes = np.sqrt((weight[:, None] * chosen**2).sum(axis=0))
-    faced = [sides.taken(shape[:, None], weight) for shape in (chosen / sizes).T]
-    return np.column_stack([shape / np.abs(shape).max() for shape in faced])
+    chosen, weight = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]], curve.prepared.weight
+    chosen = np.linalg.qr(np.sqrt(weight)[:, None] * chosen)[0] / np.sqrt(weight)[:, None]
+    chosen = Sides(curve.equations).ordered(chosen, weight)
+    return np.asarray(chosen / np.abs(chosen).max(axis=0))

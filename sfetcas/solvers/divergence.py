@@ -35,20 +35,19 @@ class TangentTest:
     Parameters
     ----------
     equations : Equations
-    weight : ndarray (turning unknowns,)
-        Weight of the rotations, see :class:`~sfetcas.solvers.stability.StabilityTest`.
+    softest : float
+        What weights are of masses, see :class:`~sfetcas.solvers.stability.StabilityTest`.
     symmetric : bool
         Whether the loads have a potential all the same.
     """
 
-    def __init__(self, equations: Equations, weight: Array, symmetric: bool) -> None:
+    def __init__(self, equations: Equations, softest: float, symmetric: bool) -> None:
         self._equations, self._symmetric = equations, symmetric
         n = equations.unknowns
-        softest = float(weight.max(initial=1.0) / equations.mass.max(initial=1.0))
-        self._root = np.sqrt(np.concatenate([weight, np.full(n - len(weight), LIGHT * softest)]))
+        self._softest = softest
+        masses = np.concatenate([equations.mass, np.full(equations.displacement_unknowns, LIGHT)])
+        self._root = np.sqrt(softest * masses)
         self._sides = Sides(equations)
-        # All weights are the same multiple of the masses.
-        self._by_mass = float(weight.sum() / equations.mass.sum()) if len(weight) else 1.0
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
@@ -110,7 +109,7 @@ class TangentTest:
         """How far eigenvalues, or their real parts, are below zero, by ``equations.mass``; zero where none is."""
         tangent, limit, free = self._tangent(point)
         lowest = float(self._eigenvalues(tangent)[0].real) if free else 0.0
-        return -lowest * self._by_mass if lowest < -limit else 0.0
+        return -lowest * self._softest if lowest < -limit else 0.0
 
     def below(self, point: Point) -> int:
         """Number of real eigenvalues below zero: where there are some the tangent was singular on the way there."""

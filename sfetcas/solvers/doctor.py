@@ -17,7 +17,8 @@ import numpy as np
 
 from ..description.records import enumerated
 from ..description.supports import along, upwards
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
+from ..mathematics.linear import blurred
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from .newton import loose_rows, rows_in
@@ -25,7 +26,10 @@ from .newton import loose_rows, rows_in
 __all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
 SOFT = 1e-7
-"""Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing."""
+"""Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing.
+
+More than that where many elements are short: rounding of their stiffness leaves 2e-8 of 256 elements.
+"""
 
 MOST = 40
 """Free motions looked for at most: a chain of as many links without any spring."""
@@ -108,10 +112,12 @@ def free_motions(equations: Equations, weight: Array, state: State) -> Array:
     shifted[equations.diagonal[:n]] += 0.01 * SOFT * metric
     shifted[equations.diagonal[n:]] -= 1e-11
     equations.solver.factor(shifted)
+    chosen = (equations.row < n) & (equations.column < n)
+    row, column = equations.row[chosen], equations.column[chosen]
     count = min(4, n)
     while True:
         values, vectors = _lowest(equations, stiffness, metric, count)
-        free = vectors[:, values < SOFT]
+        free = vectors[:, values < SOFT + blurred(row, column, stiffness[chosen], vectors)]
         if free.shape[1] < count or count >= min(n, MOST):
             return _told_apart(free)
         count = min(4 * count, n, MOST)
@@ -141,8 +147,9 @@ def _told_apart(motions: Array) -> Array:
     """The same space with a basis in which each motion has an unknown that the others leave alone."""
     basis = motions.copy()
     for i in range(basis.shape[1]):
-        row = int(np.abs(basis[:, i:]).max(axis=1).argmax())
-        pivot = i + int(np.abs(basis[row, i:]).argmax())
+        # Of unknowns that move alike the first is taken, whatever rounding makes of them.
+        row = first_of_largest(np.abs(basis[:, i:]).max(axis=1), ALIKE)
+        pivot = i + first_of_largest(basis[row, i:])
         basis[:, [i, pivot]] = basis[:, [pivot, i]]
         basis[:, i] /= basis[row, i]
         others = np.arange(basis.shape[1]) != i

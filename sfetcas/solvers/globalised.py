@@ -23,6 +23,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from .program import Program
+from .sides import Sides
 
 __all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Outcome", "Rules"]
 
@@ -57,6 +58,9 @@ FAILED = -1_000_000
 
 FIRMEST = 1e12
 """Firmness at which there is no use in more."""
+
+LEAST = 1e-9
+"""What displacements have beside rotations where the softest shape is looked for from."""
 
 TINY = 1e-30
 """Keeps zero from being divided by."""
@@ -187,6 +191,9 @@ class Globalised:
         self.soft = np.repeat([0.0, 1.0, -1.0], [self._turning, self._unknowns - self._turning, equations.rows])
         row, column = (np.array(part) for part in program.sparsity.get_triplet())
         self.diagonal = np.flatnonzero(row == column)
+        # Where the softest shape is looked for from: a rule of the scene, and next to nothing where nothing turns.
+        beside = LEAST / (1.0 + np.arange(self._unknowns - self._turning))
+        self.seed = np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
         # What is large stays with CasADi from function to function: to change hands costs more than most of these.
         self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
@@ -377,9 +384,7 @@ class Globalised:
         firm = self.rules.firm
         while self._factor(entries, firm) != 0 and firm < FIRMEST:
             firm *= self.rules.firmer
-        x = np.zeros(self._total)
-        # Any shape that no symmetry makes orthogonal to the one that is looked for.
-        x[: self._unknowns] = 1.0 / (1.0 + np.arange(self._unknowns))
+        x = self.seed
         for _ in range(self.rules.sweeps):
             x = self._backward(self.mass * x)
             x[self._unknowns :] = 0.0

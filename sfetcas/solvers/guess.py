@@ -131,21 +131,24 @@ def _placed(equations: Equations, state: State, loading: Loading, weight: Array,
             bent = replace(state, q=_turned_by(equations, state, curl))
             placed, gap = lead(equations, bent, loading, weight, targets)
             sides.append((round(gap, 1), equations.at(placed, loading.unloaded()).strain, placed))
-        return min(sides, key=lambda side: side[:2])
+        return _least(sides)
 
     best = tried((0.5, -0.5))
     # Where both ends are held, curls would change the twist that motions prescribe.
     if best[0] > 0.0 and equations.rows <= equations.displacement_unknowns:
-        best = min(best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0)), key=lambda side: side[:2])
+        best = _least([best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0))])
     return replace(best[2], lam=np.zeros(equations.rows))
 
 
 def _curls(equations: Equations, turns: tuple[float, ...]) -> list[Array]:
-    """Rotation vectors growing with the distance from the ground to the given turns, rad, about section axes."""
+    """Rotation vectors growing with the distance from the ground to the given turns, rad, about section axes.
+
+    The axes are those of the member that comes first in the alphabet.
+    """
     model = equations.model
     far = _distances(model)
     far /= far.max()
-    frame = quaternion.matrix(model.scene.center_lines[model.members[0]].quaternions(np.array([0.0])))[0]
+    frame = quaternion.matrix(model.scene.center_lines[min(model.members)].quaternions(np.array([0.0])))[0]
     axes = [frame[:, 2], frame[:, 1]] if model.space else [np.array([0.0, 0.0, 1.0])]
     return [turn * far[:, None] * axis for axis in axes for turn in turns]
 
@@ -227,10 +230,14 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
             bent = replace(state, q=_turned_by(equations, state, sign * vectors))
             closed, gap = restore(equations, bent, loading, weight)
             sides.append((round(gap, 6), equations.at(closed, loading).potential, bent))
+    return _least(sides)[2]
+
+
+def _least(sides: list[tuple[float, float, State]]) -> tuple[float, float, State]:
+    """The state of least gap, then energy: symmetric ones differ by rounding only, of them the first."""
     least = min(side[:2] for side in sides)
     margin = 1e-9 * max(1.0, abs(least[1]))
-    # Symmetric sides differ by rounding only: then the first, so that answers repeat.
-    return next(bent for gap, energy, bent in sides if gap == least[0] and energy <= least[1] + margin)
+    return next(side for side in sides if side[0] == least[0] and side[1] <= least[1] + margin)
 
 
 def _tent(equations: Equations) -> Array:
@@ -240,7 +247,9 @@ def _tent(equations: Equations) -> Array:
     for name in model.members:
         chain = model.chain(name)
         direction = np.abs(bow[chain]).max(axis=0) * np.sign(bow[chain][1])
-        vectors[chain] = np.sign(np.gradient(far[chain], model.along(name)))[:, None] * direction
+        slope = np.gradient(far[chain], model.along(name)) / model.scene.center_lines[name].length
+        # In the middle of a chain it is zero, but for rounding.
+        vectors[chain] = np.sign(np.round(slope, 6))[:, None] * direction
     return vectors
 
 

@@ -18,6 +18,7 @@ __all__ = [
     "ROUNDING",
     "TURN",
     "Corrected",
+    "changed_by",
     "correct",
     "descend",
     "loose_rows",
@@ -25,6 +26,7 @@ __all__ = [
     "newton_step",
     "redundant",
     "relative_residual",
+    "rounded",
     "rows_in",
     "with_sharing",
 ]
@@ -109,7 +111,8 @@ def correct(
     weight : ndarray
         Weight of the proximal term, see :class:`~sfetcas.solvers.stability.StabilityTest`.
     tolerance : float
-        Relative residual that counts as converged; iterations go on while they still gain a factor of 4.
+        Relative residual that counts as converged; iterations go on while they still gain a factor of 4.  What
+        rounding of the state keeps above it has converged as well.
     most : float
         Give up when a later step than the first turns any node by more, rad.
     contraction : float
@@ -164,7 +167,8 @@ def correct(
         trial = equations.moved(state, step)
         there = dragged(trial)
         gained = relative_residual(equations, there)
-        if residual <= tolerance and gained > 0.25 * residual and (count or _balanced(equations, point)):
+        low = residual <= tolerance or (count and gained > 0.25 * residual and rounded(equations, state, point))
+        if low and gained > 0.25 * residual and (count or _balanced(equations, point)):
             if gained < residual:
                 state, point, residual = trial, there, gained
             break
@@ -173,6 +177,9 @@ def correct(
             break
     if not residual <= tolerance and begun[2] <= tolerance:
         state, point, residual = begun
+    if residual > tolerance and drag is None and rounded(equations, state, point):
+        # Rounding may leave a little more where multipliers are shared.
+        tolerance = min(FLOOR, 4.0 * residual)
     second = 0.0 if second == np.inf else second
     if drag is not None:
         point = equations.at(state, loading)
@@ -180,6 +187,27 @@ def correct(
         state, point = with_sharing(equations, state, loading, point, tolerance)
         residual = relative_residual(equations, point)
     return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+
+
+FLOOR = 1e-9
+"""Relative residual up to which it may be rounding."""
+
+EPSILON = 1e-15
+"""Rounding of unknowns over the largest of their kind, or one."""
+
+
+def rounded(equations: Equations, state: State, point: Point) -> bool:
+    """Whether rounding of the unknowns explains what is out of balance, and balance beside all that acts is good.
+
+    A residual that does not fall may as well be what no unknown balances, however small it is: that explains nothing.
+    """
+    if not relative_residual(equations, point) <= FLOOR or not _balanced(equations, point):
+        return False
+    turning, unknowns, total = equations.turning_unknowns, equations.unknowns, equations.total
+    sizes = [max(1.0, float(np.abs(part).max(initial=0.0))) for part in (state.q, state.y)]
+    size = np.concatenate([np.repeat(sizes, [turning, unknowns - turning]), np.abs(state.lam)])
+    noise = np.bincount(equations.row, np.abs(point.entries) * size[equations.column], minlength=total)
+    return bool((np.abs(point.residual) <= EPSILON * noise).all())
 
 
 def redundant(equations: Equations, point: Point) -> bool:
@@ -274,7 +302,20 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
     find = _smallest if equations.rows > MANY else _all_singular
     squares, left, largest = find(equations, point)
-    return np.asarray(left[:, squares < slack**2 * max(largest, usual)])
+    small = left[:, squares < ROUGHLY * max(largest, usual)]
+    # Squares are known to rounding of the largest, and sizes to the root of that: what is small is looked at itself.
+    changes, count = changed_by(equations, point, small), small.shape[1]
+    _, sizes, right = np.linalg.svd(np.pad(changes, ((0, max(0, count - len(changes))), (0, 0))), full_matrices=False)
+    return np.asarray(small @ right[sizes < slack * np.sqrt(max(largest, usual))].T)
+
+
+def changed_by(equations: Equations, point: Point, ways: Array) -> Array:
+    """Change of the unknowns' equations with combinations of rows, columns (rows, k): (unknowns, k)."""
+    n = equations.unknowns
+    chosen = (equations.row >= n) & (equations.column < n)
+    row, column, entries = equations.row[chosen] - n, equations.column[chosen], point.entries[chosen]
+    found = [np.bincount(column, weights=entries * way[row], minlength=n) for way in ways.T]
+    return np.array(found).reshape(ways.shape[1], n).T
 
 
 def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
@@ -308,6 +349,9 @@ def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
             return squares[::-1], left[:, ::-1], largest
         count *= 4
 
+
+ROUGHLY = 1e-4
+"""Share of the largest square below which singular values are looked at closely."""
 
 MANY = 300
 """From this many rows on only the loose ones are looked for."""

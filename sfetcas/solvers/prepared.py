@@ -127,7 +127,7 @@ class Prepared:
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:
-        return TangentTest(self.equations, self._test.weight, self.model.conservative)
+        return TangentTest(self.equations, self._test.softest, self.model.conservative)
 
     @property
     def _tester(self) -> StabilityTest | TangentTest:
@@ -186,6 +186,11 @@ class Prepared:
     def weight(self) -> Array:
         """Weight of the turning unknowns, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
         return self._test.weight
+
+    @property
+    def softest(self) -> float:
+        """The size of eigenvalues in what the softest member does, see the same."""
+        return self._test.softest
 
     def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
         """IPOPT from a state, then Newton's method to rounding; the equilibrium and IPOPT's iterations.

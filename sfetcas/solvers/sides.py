@@ -16,7 +16,7 @@ import functools
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
 from ..mechanics.equations import Equations
 from ..mechanics.rotations import Turn
 
@@ -27,6 +27,9 @@ DECAYS = (2.0, 0.7, 4.0)
 
 LEAST = 1e-3
 """Share of a field that shapes have at least: symmetry leaves none of it, and rounding 1e-10."""
+
+FADING = 0.125
+"""Share of a field beside the one before it where all are one."""
 
 ALIKE = 1e-6
 """Eigenvalues that are nearer to the lowest than this, beside it and the softest member, have one space of shapes."""
@@ -72,22 +75,59 @@ class Sides:
         Parameters
         ----------
         shapes : ndarray
-            Columns, orthonormal with the metric.
+            Columns, orthonormal with the metric or otherwise.
         metric : ndarray
             Weight of each entry.
         """
+        return np.asarray(shapes @ self._share(shapes, metric))
+
+    def ordered(self, shapes: Array, metric: Array) -> Array:
+        """The whole space (., n) by shapes that the rule takes one after the other, each across those before."""
+        found = []
+        while shapes.shape[1]:
+            share = self._share(shapes, metric)
+            found.append(shapes @ share)
+            shapes = shapes @ np.linalg.qr(np.column_stack([share, np.eye(len(share))]))[0][:, 1 : len(share)]
+        return np.column_stack(found)
+
+    def in_groups(self, values: Array, shapes: Array, metric: Array, unit: float = 1.0) -> Array:
+        """Shapes of rising eigenvalues, those of the same one as :meth:`ordered` takes them.
+
+        Parameters
+        ----------
+        unit : float
+            Size below which differences of eigenvalues do not count by themselves.
+        """
+        begin, found = 0, shapes.copy()
+        while begin < len(values):
+            near = ALIKE * max(unit, abs(float(values[begin])))
+            end = begin + 1 + int((values[begin + 1 :] - values[begin] <= near).sum())
+            found[:, begin:end] = self.ordered(shapes[:, begin:end], metric)
+            begin = end
+        return found
+
+    def _share(self, shapes: Array, metric: Array) -> Array:
+        """What the rule takes of each shape, of length one."""
         turning = self._equations.turning_unknowns
+        size = np.sqrt(float((metric @ np.abs(shapes) ** 2).max()))
         for field in self.fields:
             weighted = metric[:turning] * field
             parts = weighted @ shapes[:turning]
-            if np.linalg.norm(parts) > LEAST * np.sqrt(float(weighted @ field)):
+            if np.linalg.norm(parts) > LEAST * size * np.sqrt(float(weighted @ field)):
                 # A complex shape is turned until its part in the field is real.
-                return np.asarray(shapes @ (parts.conj() / np.linalg.norm(parts)))
-        shape = shapes[:, 0]
-        first = int(np.argmax(np.abs(shape) > 0.5 * np.abs(shape).max(initial=0.0))) if len(shape) else 0
-        return np.asarray(shape * np.sign(shape[first].real or 1.0)) if len(shape) else shape
+                return np.asarray(parts.conj() / np.linalg.norm(parts))
+        share, shape = np.eye(shapes.shape[1])[0], shapes[:, 0]
+        return share * np.sign(shape[first_of_largest(shape, 0.5)].real or 1.0) if len(shape) else share
+
+    @functools.cached_property
+    def seed(self) -> Array:
+        """All fields in one, (turning unknowns,): what inverse iteration makes of it lies to the side of the rule.
+
+        Each counts far less than the one before it, and far more than rounding.
+        """
+        return np.asarray(sum(FADING**i * field for i, field in enumerate(self.fields)))
 
 
 def alike(values: Array) -> int:
-    """How many of rising eigenvalues, in those of the softest member, are the lowest one."""
+    """How many of rising eigenvalues, in those of the softest member or of themselves, are the lowest one."""
     return int((values - values[0] <= ALIKE * max(1.0, abs(float(values[0])))).sum())

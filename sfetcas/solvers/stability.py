@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mathematics.linear import InertiaSolver, pattern
+from ..mathematics.linear import InertiaSolver, blurred, pattern
 from ..mechanics.equations import Equations, Point
 from .sides import Sides, alike
 
@@ -30,9 +30,6 @@ NEUTRAL = 1e-7
 
 ROUNDING = 2e-15
 """The same, relative to the largest entry of the weighted matrix."""
-
-ENTRY = 5e-16
-"""Rounding of an entry, relative to itself."""
 
 GRADED = 1e-5
 """Limits above this come of members that are very short or stiff beside others: rounding is told mode by mode then."""
@@ -106,20 +103,21 @@ class StabilityTest:
     @functools.cached_property
     def weight(self) -> Array:
         """The weight M of the module's docstring, (turning unknowns,)."""
-        return self.equations.mass * self._softest
+        return self.equations.mass * self.softest
 
     @functools.cached_property
     def _weights(self) -> Array:
         """The weight of all that counts: displacements have next to none."""
         count = len(self.equations.elastic_displacements)
-        return np.concatenate([self.weight, np.full(count, LIGHT * self._softest)])
+        return np.concatenate([self.weight, np.full(count, LIGHT * self.softest)])
 
     @functools.cached_property
     def _masses(self) -> Array:
         return np.concatenate([self.equations.mass, np.full(len(self.equations.elastic_displacements), LIGHT)])
 
     @functools.cached_property
-    def _softest(self) -> float:
+    def softest(self) -> float:
+        """The smallest stiffness of all members over the square of their lengths, in the units of the model."""
         model = self.equations.model
         x, softest = np.linspace(0.0, 1.0, 5), np.inf
         for name, member in model.scene.members.items():
@@ -197,16 +195,16 @@ class StabilityTest:
         limit = self._limit(entries)
         if self._is_graded(limit):
             values, _, limits = self._mode_by_mode(point, entries)
-            return -float(values[0]) * self._softest if (values < -limits).any() else 0.0
+            return -float(values[0]) * self.softest if (values < -limits).any() else 0.0
         if self._is_dense:
             values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
-            return -float(values[0]) * self._softest if (values < -limit).any() else 0.0
+            return -float(values[0]) * self.softest if (values < -limit).any() else 0.0
         if not self._below(point, entries, -limit):
             return 0.0
-        deep = max(near / self._softest / DEEPER, limit)
+        deep = max(near / self.softest / DEEPER, limit)
         while deep < LOWEST and self._below(point, entries, -deep):
             deep *= DEEPER
-        return deep * self._softest
+        return deep * self.softest
 
     @staticmethod
     def _limit(entries: Array) -> float:
@@ -250,8 +248,8 @@ class StabilityTest:
         values = shift + 1.0 / np.maximum(found[::-1], 1.0 / LOWEST)
         vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))
         vectors = vectors / np.linalg.norm(vectors, axis=0)
-        blurred = np.einsum("ik,ik->k", np.abs(vectors[self._h_row]) * size[:, None], np.abs(vectors[self._h_column]))
-        return values, vectors, NEUTRAL + ENTRY * blurred + ROUNDING * abs(shift)
+        rounding = blurred(self._h_row, self._h_column, entries, vectors)
+        return values, vectors, NEUTRAL + rounding + ROUNDING * abs(shift)
 
     @property
     def _is_dense(self) -> bool:
@@ -263,8 +261,12 @@ class StabilityTest:
         entries, rows = self._weighted(point), self._rows(point)
         projected, basis = self._projected(entries, rows)
         values, vectors = np.linalg.eigh(projected)
-        turning = self.equations.turning_unknowns
-        shapes = ((basis @ vectors[:, :count]).T / np.sqrt(self._weights))[:, :turning]
+        turning, root = self.equations.turning_unknowns, np.sqrt(self._weights)[:, None]
+        # Of what has the eigenvalue of the last one the rule takes the shape, too.
+        most = min(count, len(values))
+        most += alike(values[most - 1 :]) - 1 if most else 0
+        shapes = self.sides.in_groups(values[:most], basis @ vectors[:, :most] / root, self._weights)
+        shapes = shapes[:turning, :count].T
         limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
@@ -357,7 +359,7 @@ class StabilityTest:
         # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
         for soft in (SOFT,) if self._n <= FULL else SOFTER:
             softened = entries.copy()
-            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self._softest
+            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self.softest
             softened[diagonal[equations.unknowns :]] -= soft / size
             matrix, ones = ca.DM(self._bordered_pattern, softened), ca.DM.ones(equations.total)
             self._bordered.nfact(matrix)

@@ -33,7 +33,7 @@ DRIVEN = 1e-6
 """A load that does less than this share of its largest work per radian does not drive."""
 
 NOTHING = 1e-9
-"""Share of the work of the loads that is no strain energy."""
+"""Share of the work of the loads that is no strain energy, and of the loads that does no work."""
 
 CORRECTIONS, SOFT, CLOSING = 12, 1e-3, 1e-11
 """Newton steps to a state of a round at most; what keeps their matrix regular, beside stiffness and closings."""
@@ -77,6 +77,12 @@ def _pull(prepared: Prepared, state: State, loading: Loading) -> Array:
     return -point.residual[: prepared.equations.unknowns]
 
 
+def _acting(loading: Loading) -> float:
+    """Largest load: what is next to nothing beside it is what rounding of directions leaves."""
+    parts = (loading.force, loading.pull, loading.moment, *loading.loads)
+    return max(float(np.abs(part).max(initial=0.0)) for part in parts)
+
+
 def _moved(prepared: Prepared, state: State, motion: Array) -> State:
     equations = prepared.equations
     return equations.moved(state, np.concatenate([motion, np.zeros(equations.total - len(motion))]))
@@ -89,7 +95,7 @@ def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) 
     _, sizes, right = np.linalg.svd(np.linalg.qr(motions[:turning], mode="r"))
     straight = motions @ right[np.append(sizes, np.zeros(len(right) - len(sizes))) < NOTHING].T
     motion = straight @ (straight.T @ _pull(prepared, start, loading))
-    if not np.abs(motion).max(initial=0.0) > 0.0:
+    if not np.abs(motion).max(initial=0.0) > NOTHING * _acting(loading):
         return None
     motion /= np.abs(motion).max()
     work = float(motion @ _pull(prepared, start, loading))
@@ -112,6 +118,8 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
         return None
     speed, largest, work, furthest = first, 0.0, 0.0, 0.0
     drive = float(speed @ _pull(prepared, start, loading))
+    if abs(drive) <= NOTHING * _acting(loading):
+        return None
     speed = first = first * (1.0 if drive >= 0.0 else -1.0)
     state = start
     for _ in range(ROUNDS):

@@ -262,6 +262,9 @@ class _Made:
             return
         slopes = found.jacobians(found.begin, np.zeros(found.sizes["z"]), default["u"], default["p"])[4]
         scaled = np.array(slopes) * self.z_unit
+        # Rows and columns of the size of one: what is small by its units alone is none the less there.
+        for axis in (1, 0):
+            scaled = scaled / np.maximum(np.abs(scaled).max(axis=axis, keepdims=True), TINY)
         sizes = np.linalg.svd(scaled, compute_uv=False)
         if sizes[-1] < SINGULAR * sizes[0]:
             accepted = "rhoI of sections, or inertia at nodes, in motion_functions"
@@ -273,5 +276,8 @@ class _Made:
 KEPT = ["gaps", "rates", "norms"]
 """Results of the invariants."""
 
-SINGULAR = 1e-13
+SINGULAR = 1e-12
 """Share of the largest singular value below which the matrix of accelerations and multipliers has no inverse."""
+
+TINY = 1e-300
+"""Keeps zero from being divided by."""

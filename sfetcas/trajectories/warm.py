@@ -222,7 +222,8 @@ def _placed(system: ControlledSystem, q: Array, near: Array, numbers: Array) -> 
     open_ = ca.Function("open", s, [own.gaps(held, ca.MX.zeros(n.y), given, s[1])[:closings]])
     moved = ca.Function("moved", [*s, y], [own.moving(held, y, given, s[1])])
     # Closings are linear in displacements.
-    back = -np.linalg.pinv(np.array(constant(own.model.positions.W).full()).reshape(closings, n.y))
+    # Of closings that depend on each other rounding leaves 1e-16.
+    back = -np.linalg.pinv(np.array(constant(own.model.positions.W).full()).reshape(closings, n.y), rcond=1e-10)
     ys, xs = [], []
     for one, angles, values in zip(q, near, numbers, strict=True):
         found = back @ np.array(open_(one.T, angles, values)).ravel() if n.y else np.zeros(0)

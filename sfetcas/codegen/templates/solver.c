@@ -269,8 +269,8 @@ static void sf_nudged(sf_run *run, sf_here *here, sf_here *there) {
   int i, sweep;
   sf_at(run, here);
   while (sf_factor(run, here->entries, firm) != 0 && firm < SF_FIRMEST) firm *= SF_FIRMER;
-  /* Any shape that no symmetry makes orthogonal to the one that is looked for. */
-  for (i = 0; i < SF_TOTAL; ++i) m->x[i] = i < SF_UNKNOWNS ? 1.0 / (1.0 + i) : 0.0;
+  /* From a shape that a rule of the scene gives: what comes of it lies to the same side. */
+  for (i = 0; i < SF_TOTAL; ++i) m->x[i] = sf_seed[i];
   for (sweep = 0; sweep < SF_SWEEPS; ++sweep) {
     for (i = 0; i < SF_TOTAL; ++i) m->y[i] = sf_mass[i] * m->x[i];
     sf_backward(run, m->y, m->x);
