@@ -269,7 +269,7 @@ class _Run:
 
     def _add_branch(self, level: _Level, event: Event, number: int, side: int) -> None:
         """Follow the branch at a bifurcation to one side, unless a stretch that was followed leads along there."""
-        first = switched(level.curve, event, shapes_at(level.curve, event)[:, 0], side)
+        first = switched(level.curve, event, shapes_at(level.curve, event), side)
         if first is None:
             level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
             return
@@ -287,7 +287,7 @@ class _Run:
 
     def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
         """The branch at a bifurcation to one side; None where none is found."""
-        first = switched(curve, event, shapes_at(curve, event)[:, shape - 1], side)
+        first = switched(curve, event, shapes_at(curve, event), side, shape)
         if first is None or not self._in_range(first):
             return None
         return without(trace(curve, first, self.span, points, self.knots), [event.standing])

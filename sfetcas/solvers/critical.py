@@ -17,13 +17,16 @@ from ..mathematics.arrays import Array
 from .arclength import Curve, Standing, Tangent
 from .sides import Sides
 
-__all__ = ["Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
+__all__ = ["FIRM", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
 SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
 
 ZERO = 1e-10
 """Share of a function's values at the two points below which there is nothing but rounding."""
+
+BLUR = 1e-9
+"""What rounding leaves of an eigenvalue: nearer to a bifurcation Newton's method wanders along its shape."""
 
 APART = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
@@ -39,6 +42,9 @@ FIRM = 1e6
 
 NEAR = 0.02
 """An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
+
+LIKED = 1e-3
+"""Shapes that vanish together and differ by less in their mean axis of rotation are alike in it."""
 
 BESIDE = 1e-3
 """Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
@@ -87,7 +93,12 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     found: list[Event] = []
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
-        standing = sought(curve, a, b, value)
+        # Of two that vanish together rounding leaves the same root twice, by a search to the last digit.
+        same = next((e for e in found if abs(value(e.standing)) <= APART * abs(value(b) - value(a))), None)
+        if same is not None:
+            found[found.index(same)] = replace(same, multiplicity=same.multiplicity + 1)
+            continue
+        standing = sought(curve, a, b, value, BLUR)
         if standing is None:
             continue
         standing = _settled(curve, a, b, standing)
@@ -142,8 +153,10 @@ def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], f
     return value
 
 
-def sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float]) -> Standing | None:
-    """The point between two others at which a function of the points vanishes."""
+def sought(
+    curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float], blur: float = 0.0
+) -> Standing | None:
+    """The point between two others at which a function of the points, known to a blur, vanishes."""
     at, arc = curve.between(a, b), b.arc - a.arc
     found: dict[float, Standing] = {0.0: a, arc: b}
 
@@ -162,22 +175,24 @@ def sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], f
         found[length] = standing
         return value(standing)
 
-    place = root(function, 0.0, value(a), b.arc - a.arc, value(b))
+    place = root(function, 0.0, value(a), b.arc - a.arc, value(b), blur)
     return found.get(place)
 
 
-def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: float) -> float:
+def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: float, blur: float = 0.0) -> float:
     """A place between a and b where a function changes its sign; the better end where it does not.
 
-    Inverse quadratic interpolation where it can be trusted, halving otherwise.  Where the function is not a
-    number, what is known so far decides.
+    Inverse quadratic interpolation where it can be trusted; a straight line through the last two places on one side,
+    where that shortens the step, as at the kink that the lower of two eigenvalues has where both vanish; halving
+    otherwise.  Where the function is not a number, what is known so far decides; within its ``blur`` of zero there is
+    no more to know.
 
     Source: Chandrupatla 1997, A new hybrid quadratic/bisection algorithm.
     """
     if a == b or fa * fb >= 0.0 or not np.isfinite(fa * fb):
         return a if abs(fa) < abs(fb) else b
     # b is the latest place, a the other end of the bracket.
-    least_value = ZERO * min(abs(fa), abs(fb))
+    least_value = max(ZERO * min(abs(fa), abs(fb)), blur)
     tolerance, share = SHARP * abs(b - a), min(max(fa / (fa - fb), 0.05), 0.95)
     for _ in range(60):
         x = a + share * (b - a)
@@ -191,7 +206,8 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
         least = tolerance / max(abs(b - a), 1e-300)
         if abs(fa) <= least_value or least > 0.5:
             break
-        share = 0.5
+        line = fa / (fc - fa) * (a - c) / (b - a) if fc * fa > 0.0 and fc != fa else 1.0
+        share = line if 0.0 < line * abs(b - a) < 0.5 * abs(a - c) else 0.5
         xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
         if 1.0 - np.sqrt(1.0 - xi) < phi < np.sqrt(xi):
             share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
@@ -233,18 +249,25 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 def shapes_at(curve: Curve, event: Event) -> Array:
     """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest size 1.
 
-    Of several, the first is the one with most rotation about z, then about y: so that meshes agree.
+    Of several, the first is the one with most rotation about z, then about y, and of those that are alike in this the
+    one that :mod:`~sfetcas.solvers.sides` takes: so that meshes agree.
     """
     _, values, shapes = curve.prepared.around_zero(event.standing.point)
     chosen = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]]
+    sides, weight = Sides(curve.equations), curve.prepared.weight
     if chosen.shape[1] > 1:
+        root = np.sqrt(weight)[:, None]
+        chosen = np.linalg.qr(root * chosen)[0] / root
         number = curve.equations.number
         liking = np.zeros(len(chosen))
         for axis in range(number.shape[1]):
             liking[number[number[:, axis] >= 0, axis]] = float(axis)
-        weight = curve.prepared.weight
-        chosen = chosen @ np.linalg.eigh(chosen.T @ ((weight * liking)[:, None] * chosen))[1][:, ::-1]
-    sides, weight = Sides(curve.equations), curve.prepared.weight
+        likings, turn = np.linalg.eigh(chosen.T @ ((weight * liking)[:, None] * chosen))
+        likings, chosen = likings[::-1], chosen @ turn[:, ::-1]
+        bounds = [0, *(np.flatnonzero(likings[:-1] - likings[1:] > LIKED) + 1), len(likings)]
+        chosen = np.column_stack(
+            [sides.ordered(chosen[:, a:b], weight) for a, b in zip(bounds, bounds[1:], strict=False)]
+        )
     sizes = np.sqrt((weight[:, None] * chosen**2).sum(axis=0))
     faced = [sides.taken(shape[:, None], weight) for shape in (chosen / sizes).T]
     return np.column_stack([shape / np.abs(shape).max() for shape in faced])
