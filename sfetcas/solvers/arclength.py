@@ -113,10 +113,16 @@ class Curve:
         Change of the factor that counts as much as a radian.
     piece : tuple of float
         Factors between which no history has a knot.
+
+    Attributes
+    ----------
+    searched : int
+        Points at which critical ones were looked for so far.
     """
 
     def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
         self.prepared, self.unit, self.piece = prepared, unit, piece
+        self.searched = 0
         equations = prepared.equations
         self.equations, self.model = equations, prepared.model
         turning = equations.turning_unknowns

@@ -16,6 +16,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from .arclength import Curve, Standing, Tangent
 from .sides import Sides
+from .stability import NEUTRAL
 
 __all__ = ["FIRM", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
@@ -27,6 +28,12 @@ ZERO = 1e-10
 
 BLUR = 1e-9
 """What rounding leaves of an eigenvalue: nearer to a bifurcation Newton's method wanders along its shape."""
+
+BLURRED = 100.0
+"""Times what it should be, the blur is no reason to go on where the place is known to the share that tells roots apart.
+
+That is what counts as neutral.
+"""
 
 APART = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
@@ -94,7 +101,8 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
         # Of two that vanish together rounding leaves the same root twice, by a search to the last digit.
-        same = next((e for e in found if abs(value(e.standing)) <= APART * abs(value(b) - value(a))), None)
+        together = max(APART * abs(value(b) - value(a)), NEUTRAL)
+        same = next((e for e in found if abs(value(e.standing)) <= together), None)
         if same is not None:
             found[found.index(same)] = replace(same, multiplicity=same.multiplicity + 1)
             continue
@@ -133,18 +141,19 @@ def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standin
 
 
 def _per_way(tangent: Tangent, way: float) -> Tangent:
-    return Tangent(tangent.z / way, tangent.factor / way)
+    return replace(tangent, z=tangent.z / way, factor=tangent.factor / way)
 
 
 def _mean(curve: Curve, a: Standing, b: Standing) -> Tangent:
-    return curve.normed(Tangent(a.tangent.z + b.tangent.z, a.tangent.factor + b.tangent.factor))
+    mean = replace(a.tangent, z=a.tangent.z + b.tangent.z, factor=a.tangent.factor + b.tangent.factor)
+    return curve.normed(mean)
 
 
 def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], float]:
     """The eigenvalue with so many below it; those that vanish all along the curve do not count."""
 
     def value(standing: Standing) -> float:
-        first, values, _ = curve.prepared.around_zero(standing.point)
+        first, values, _ = curve.prepared.around_zero(standing.point, sharp=False)
         rest = np.sort(values[np.argsort(np.abs(values))[neutral:]])
         if first <= rank < first + len(rest):
             return float(rest[rank - first])
@@ -169,6 +178,7 @@ def sought(
         return curve.corrected(*curve.predicted(found[near], (length - near) / share), a.tangent, a.arc + length)
 
     def function(length: float) -> float:
+        curve.searched += 1
         standing = beside(length) or at(length)
         if standing is None:
             return np.nan
@@ -204,7 +214,8 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
         else:
             c, fc, b, fb, a, fa = b, fb, a, fa, x, fx
         least = tolerance / max(abs(b - a), 1e-300)
-        if abs(fa) <= least_value or least > 0.5:
+        known = blur and abs(fa) <= BLURRED * blur and least > SHARP / APART
+        if abs(fa) <= least_value or least > 0.5 or known:
             break
         line = fa / (fc - fa) * (a - c) / (b - a) if fc * fa > 0.0 and fc != fa else 1.0
         share = line if 0.0 < line * abs(b - a) < 0.5 * abs(a - c) else 0.5
@@ -253,8 +264,16 @@ def shapes_at(curve: Curve, event: Event) -> Array:
     one that :mod:`~sfetcas.solvers.sides` takes: so that meshes agree.
     """
     _, values, shapes = curve.prepared.around_zero(event.standing.point)
-    chosen = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]]
     sides, weight = Sides(curve.equations), curve.prepared.weight
+    neutral, count = event.standing.tangent.neutral, event.multiplicity
+    if neutral is None:
+        chosen = shapes[:, np.argsort(np.abs(values))[:count]]
+    else:
+        # What is neutral all along the curve vanishes there, too.
+        still, root = neutral.weighted[: len(weight)], np.sqrt(weight)[:, None]
+        chosen = shapes[:, np.argsort(np.abs(values))[: count + still.shape[1]]]
+        chosen = chosen - still / root**2 @ (still.T @ chosen)
+        chosen = np.linalg.svd(root * chosen, full_matrices=False)[0][:, :count] / root
     if chosen.shape[1] > 1:
         root = np.sqrt(weight)[:, None]
         chosen = np.linalg.qr(root * chosen)[0] / root

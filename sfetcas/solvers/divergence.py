@@ -78,11 +78,11 @@ class TangentTest:
         zero = int((np.abs(values) <= limit).sum())
         return Inertia(int(((values.real < 0.0) & (np.abs(values) > limit)).sum()), zero)
 
-    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+    def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Real parts of all eigenvalues, rising; zero, as none is before them; shapes, those of the smallest first.
 
-        The shapes are columns in the order of the real parts; they are singular vectors: where eigenvalues vanish
-        these span what the tangent leaves open, while eigenvectors may coincide.
+        All are sharp.  The shapes are columns in the order of the real parts; they are singular vectors: where
+        eigenvalues vanish these span what the tangent leaves open, while eigenvectors may coincide.
         """
         tangent = self._tangent(point)[0]
         values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)

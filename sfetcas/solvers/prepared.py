@@ -144,9 +144,9 @@ class Prepared:
         """
         return self._test.inertia(point, doubtful=doubtful) if self.model.conservative else self._tangent.inertia(point)
 
-    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+    def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Eigenvalues around zero as :class:`~sfetcas.solvers.stability.StabilityTest`; real ones without potential."""
-        return self._tester.around_zero(point)
+        return self._tester.around_zero(point, sharp=sharp)
 
     def singular(self, point: Point, count: int) -> bool:
         """Whether so many eigenvalues vanish where their real parts do: always where there is an energy."""

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mathematics.linear import InertiaSolver, SparseSolver, pattern
+from ..mathematics.linear import InertiaSolver, Product, SparseSolver, pattern
 from ..mechanics.equations import Equations, Point
 from .sides import Sides, alike
 
@@ -297,10 +297,11 @@ class StabilityTest:
         below = int((values < -limit).sum())
         return Inertia(below, int((values <= limit).sum()) - below)
 
-    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+    def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
 
-        Few unknowns: all eigenvalues.  Many: the few that are nearest to zero.
+        Few unknowns: all eigenvalues.  Many: the few that are nearest to zero; unless they are to be ``sharp``, each
+        to a millionth of itself or to rounding.
         """
         point = self.equations.symmetric(point)
         entries, turning = self._weighted(point), self.equations.turning_unknowns
@@ -309,7 +310,7 @@ class StabilityTest:
             projected, basis = self._projected(entries, self._rows(point))
             values, vectors = np.linalg.eigh(projected)
             return 0, values, (basis @ vectors / root)[:turning]
-        values, vectors = self._inverse_iterated(point, entries)
+        values, vectors = self._inverse_iterated(point, entries, sharp=sharp)
         before = self._below(point, entries, float(values[0] - 1e-6 * np.abs(values).max()))
         return before, values, (vectors / root)[:turning]
 
@@ -355,7 +356,7 @@ class StabilityTest:
             return None
         if low == high:
             return Inertia(low, 0)
-        values = self._inverse_iterated(point, entries)[0]
+        values = self._inverse_iterated(point, entries, sharp=False)[0]
         values = values[np.abs(values) < APART]
         if len(values) != high - low:
             return None
@@ -428,13 +429,9 @@ class StabilityTest:
         return InertiaSolver("inertia", self._pattern)
 
     @functools.cached_property
-    def _starts(self) -> Array:
-        return np.searchsorted(self._h_column, np.arange(self._n))
-
-    def _times(self, entries: Array, block: Array) -> Array:
+    def _times(self) -> Product:
         """The weighted matrix times a block of vectors."""
-        # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
-        return np.asarray(np.add.reduceat(entries[:, None] * block[self._h_row], self._starts, axis=0))
+        return Product(self._pattern)
 
     def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
         """Smallest eigenvalues above the shift by inverse iteration of a small subspace.
@@ -481,7 +478,7 @@ class StabilityTest:
                 continue
         raise SolveError(Status.FAILED, "the tangent stays singular however it is shifted")
 
-    def _inverse_iterated(self, point: Point, entries: Array) -> tuple[Array, Array]:
+    def _inverse_iterated(self, point: Point, entries: Array, *, sharp: bool) -> tuple[Array, Array]:
         """The eigenvalues nearest to zero, half of a block, and their vectors."""
         equations, n = self.equations, self._n
         root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
@@ -498,7 +495,8 @@ class StabilityTest:
             values, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
             nearest = np.sort(np.argsort(np.abs(values))[:NEAREST])
-            if np.abs(values[nearest] - last).max() <= 1e-10 * np.abs(values[nearest]).max():
+            size = np.abs(values[nearest])
+            if (np.abs(values[nearest] - last) <= (1e-10 * size.max() if sharp else 1e-6 * size + 1e-10)).all():
                 break
             last = values[nearest]
         return values[nearest], block[:, nearest]

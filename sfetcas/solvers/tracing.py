@@ -50,6 +50,12 @@ FIRST = 0.1
 MOST_AT_ONCE = 6
 """So many eigenvalues at most change their signs at once: more do so where a mesh is too coarse for what it carries."""
 
+SEARCHED = 200
+"""Points at which critical ones may be looked for, or as many as a curve may have if these are more.
+
+A bifurcation takes five to fifteen; where more are needed rounding makes one after the other of them.
+"""
+
 EXPECTED = 3
 """Newton iterations of a step that is as long as it should be."""
 
@@ -182,7 +188,10 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
     points: list[Standing] = [start]
     events: list[Event] = []
     now, before, length = start, None, FIRST
+    budget = curve.searched + max(SEARCHED, more)
     for _ in range(more):
+        if curve.searched > budget:
+            return Traced(points, events, "lost")
         length = min(length, _longest(curve, now, stride))
         step = _step(curve, now, before, length, span)
         if step is None:
@@ -191,9 +200,10 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
         closed = not left and len(points) >= LOOP and _closes(curve, start, now, there)
         ends = _to_start(curve, start, now, there) if closed else [there]
         for end in ends:
-            met = events_between(curve, points[-1], end)
+            # A point that is met by chance may be the limit point itself.
+            met = [event for event in events_between(curve, points[-1], end) if event.standing is not points[-1]]
             events += met
-            points += [*(event.standing for event in met), end]
+            points += [event.standing for event in met if event.standing is not end] + [end]
         if left or closed:
             return Traced(points, events, "range" if left else "closed")
         length = used * _growth(curve, now, there)
