@@ -300,8 +300,8 @@ class StabilityTest:
     def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
 
-        Few unknowns: all eigenvalues.  Many: the few that are nearest to zero; unless they are to be ``sharp``, each
-        to a millionth of itself or to rounding.
+        Few unknowns: all eigenvalues.  Many: the few nearest to zero, ``sharp`` for their shapes, with -1 for a number
+        that is not counted; or each to a millionth of itself or to rounding, and those before them counted.
         """
         point = self.equations.symmetric(point)
         entries, turning = self._weighted(point), self.equations.turning_unknowns
@@ -311,7 +311,11 @@ class StabilityTest:
             values, vectors = np.linalg.eigh(projected)
             return 0, values, (basis @ vectors / root)[:turning]
         values, vectors = self._inverse_iterated(point, entries, sharp=sharp)
-        before = self._below(point, entries, float(values[0] - 1e-6 * np.abs(values).max()))
+        size, before = float(np.abs(values).max()), -1
+        if not sharp:
+            # Beside what is neutral a count by factors is worthless, and none but those found are nearer to zero.
+            apart = size >= APART and values[0] > -APART
+            before = self._below(point, entries, -APART if apart else float(values[0] - 1e-6 * size))
         return before, values, (vectors / root)[:turning]
 
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
