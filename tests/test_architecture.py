@@ -84,6 +84,7 @@ ORDER = [
     "solvers",
     "solvers.sharing",
     "solvers.newton",
+    "solvers.neutral",
     "solvers.doctor",
     "solvers.guess",
     "solvers.sides",

@@ -14,6 +14,7 @@ from sfetcas import Scene, SceneError, SolveError, Status, check, dump, load, so
 from sfetcas.cli import main
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
+from sfetcas.paths import paths
 from sfetcas.pictures.charts import chart
 from sfetcas.solvers.arclength import Curve, Tangent
 from sfetcas.solvers.critical import events_between, root
@@ -804,3 +805,32 @@ def test_no_point_of_a_path_is_outside_its_range(monkeypatch):
     assert all(0.0 <= factor <= 30.0 for factor in path.main.factors)
     assert [point.kind for point in path.points].count("bifurcation") == 1
     assert "the branch leaves the range at once" in path.notes[0]
+
+
+def test_meshes_that_never_correspond_are_told(monkeypatch):
+    """Each mesh is made to cross the factor asked for once more than the one before."""
+    levels, real = [], paths.at_factors
+
+    def more(curve, points, factors):
+        levels.append(curve.model.mesh.elements)
+        return len(levels) * real(curve, points, factors)
+
+    monkeypatch.setattr(paths, "at_factors", more)
+    monkeypatch.setattr(paths, "AFFORDED", 0)
+    path = solve(made(column(range=[0, 2], steps=[1.0], accuracy=1e-6)))
+    assert (path.status, path.error_estimate) == (Status.SHORT, None)
+    told = f"meshes of {levels[0]} and {levels[1]} elements do not agree: they have 1 and 2 crossings"
+    assert len(levels) == 2
+    assert any(note.startswith(told) for note in path.notes)
+
+
+def test_root_at_the_kink_of_the_lower_of_two_eigenvalues_is_found_in_few_steps():
+    """Two that vanish together with different slopes: the lower one has no slope there."""
+    asked = []
+
+    def lower(x):
+        asked.append(x)
+        return min(0.3 - x, 3.0 * (0.3 - x)) + 0.01 * (0.3 - x) ** 2
+
+    assert root(lower, 0.0, lower(0.0), 1.0, lower(1.0)) == pytest.approx(0.3, abs=1e-9)
+    assert len(asked) < 15

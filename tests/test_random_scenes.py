@@ -11,6 +11,7 @@ from scenes import turned_about
 from sfetcas import Scene, SceneError, SolveError, Status, solve
 from sfetcas.benchmarks.random_checks import VARIANTS, compared, defects, variant, wrong
 from sfetcas.benchmarks.random_scenes import random_scene, reordered, transformed
+from sfetcas.solvers.prepared import Prepared
 
 SEEDS = range(2009, 2027)
 """Even ones are in the plane, odd ones in space; the benchmark has others."""
@@ -347,3 +348,17 @@ def test_a_strut_held_at_its_exact_length_is_stretched():
     """Its weight is little beside the load elsewhere: large multipliers carried it on next to no sag."""
     with pytest.raises(SolveError, match="fully stretched between held points"):
         solve(random_scene(2037))
+
+
+def test_loads_that_no_unknown_carries_are_not_followed_in_ever_shorter_steps(monkeypatch):
+    """A motion asks for more than the closings have: each of 500 attempts left the same share out of balance."""
+    count, correct = [0], Prepared.correct
+
+    def counted(*args, **limits):
+        count[0] += 1
+        return correct(*args, **limits)
+
+    monkeypatch.setattr(Prepared, "correct", counted)
+    with pytest.raises(SolveError, match="asks for more than there is in closing of m0"):
+        solve(random_scene(41))
+    assert count[0] < 50

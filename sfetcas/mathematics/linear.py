@@ -14,7 +14,7 @@ from .arrays import Array
 from .keeping import kept
 from .kernels import Batch
 
-__all__ = ["InertiaSolver", "SparseMap", "SparseSolver", "blurred", "pattern", "smallest"]
+__all__ = ["InertiaSolver", "Product", "SparseMap", "SparseSolver", "blurred", "pattern", "smallest"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
@@ -151,16 +151,11 @@ class SparseSolver:
         return best, last
 
     def _times(self, x: Array) -> Array:
-        order = self._by_rows
-        return np.asarray(np.add.reduceat(self._matrix[order, None] * x[self._column[order]], self._starts, axis=0))
+        return self._product(self._matrix, x)
 
     @functools.cached_property
-    def _by_rows(self) -> Array:
-        return np.argsort(self._row, kind="stable")
-
-    @functools.cached_property
-    def _starts(self) -> Array:
-        return np.searchsorted(self._row[self._by_rows], np.arange(self.n))
+    def _product(self) -> Product:
+        return Product(pattern(self.n, self._row, self._column))
 
     @functools.cached_property
     def _diagonal(self) -> Array:
@@ -177,6 +172,25 @@ class SparseSolver:
     @functools.cached_property
     def _rows_last(self) -> _Factors:
         return _Factors("csparse", self.n, self._row, self._column, self._rows)
+
+
+class Product:
+    """Products of sparse matrices of one pattern with blocks of vectors."""
+
+    def __init__(self, sparsity: ca.Sparsity) -> None:
+        self._sparsity = sparsity
+
+    def __call__(self, entries: Array, x: Array) -> Array:
+        """The matrix with these entries, column by column, times x (n, k)."""
+        batch = self._batch(x.shape[1])
+        batch.set(0, entries)
+        batch.set(1, x.T)
+        return batch()[0].reshape(x.T.shape).T.copy()
+
+    @kept(4)
+    def _batch(self, columns: int) -> Batch:
+        entries, x = ca.MX.sym("entries", self._sparsity.nnz()), ca.MX.sym("x", self._sparsity.size1(), columns)
+        return Batch(ca.Function("product", [entries, x], [ca.mtimes(ca.MX(self._sparsity, entries), x)]), 1)
 
 
 class _Factors:

@@ -139,6 +139,24 @@ class Equations:
         return np.unique(np.concatenate([np.zeros(0, np.intp), *touched]))
 
     @functools.cached_property
+    def worked_displacements(self) -> Index:
+        """The same and those that have entries in the energy: of pressure, which works on what it moves."""
+        if self.model.has_potential or not self.model.conservative:
+            return self.elastic_displacements
+        pressed = self._work.row[(self._work.row >= self.turning_unknowns) & (self._work.column >= 0)]
+        return np.union1d(self.elastic_displacements, pressed)
+
+    @functools.cached_property
+    def _transposed(self) -> Index:
+        return np.lexsort((self.column, self.row))
+
+    def symmetric(self, point: Point) -> Point:
+        """The point with the symmetric part of the Newton matrix, where pressure leaves a mesh's share that is not."""
+        if self.model.has_potential:
+            return point
+        return replace(point, entries=0.5 * (point.entries + point.entries[self._transposed]))
+
+    @functools.cached_property
     def mass(self) -> Array:
         """Length that belongs to each turning unknown, for norms that do not depend on the mesh."""
         model = self.model
@@ -212,8 +230,11 @@ class Equations:
         add(np.arange(total), np.arange(total))
         row, column = np.concatenate(rows), np.concatenate(columns)
         valid = (row >= 0) & (column >= 0)
-        places, inverse = np.unique(column[valid] * total + row[valid], return_inverse=True)
-        self._valid, self._to_entry = np.flatnonzero(valid), inverse
+        keys = column[valid] * total + row[valid]
+        # What follows has entries on one side of the diagonal alone; of pressure the symmetric part is taken.
+        mirrored = () if model.has_potential or not model.conservative else (row[valid] * total + column[valid],)
+        places, inverse = np.unique(np.concatenate([keys, *mirrored]), return_inverse=True)
+        self._valid, self._to_entry = np.flatnonzero(valid), inverse[: len(keys)]
         self._size = len(valid)
         self._zeros = np.zeros(total)
         self._used = np.flatnonzero(local.ravel() >= 0)

@@ -203,7 +203,9 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
     on_element = forces.sum(axis=1)
     pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
     on_places = np.zeros((len(segments.places), element.axes))
-    for part in segments.parts:
+    alone, starts = segments.single
+    np.add.at(on_places, starts, on_element[alone])
+    for part in segments.longer:
         here = part.elements
         if not forces[here].any():
             continue

@@ -65,6 +65,19 @@ class Segments:
         """Number of the first element of each segment."""
         return np.array([part.elements.start for part in self.parts], dtype=np.intp)
 
+    @functools.cached_property
+    def single(self) -> tuple[Index, Index]:
+        """Elements that are segments by themselves, and the numbers of the places that these start at."""
+        alone = [part for part in self.parts if part.elements.stop - part.elements.start == 1]
+        pairs = [(part.elements.start, self.place(part.start)) for part in alone]
+        found = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        return found[:, 0], found[:, 1]
+
+    @functools.cached_property
+    def longer(self) -> tuple[Segment, ...]:
+        """All other segments."""
+        return tuple(part for part in self.parts if part.elements.stop - part.elements.start != 1)
+
     def place(self, name: str) -> int:
         """Number of a place."""
         return self._number[name]

@@ -50,6 +50,9 @@ PATIENCE = 5
 FEW_ELEMENTS = 16
 """A first mesh of so many elements costs less than to look whether fewer would do."""
 
+AFFORDED = 20_000
+"""Points times unknowns of a mesh after which one that did not halve the error is the last; once it was about 3 s."""
+
 MOST_ELEMENTS = 3000
 """A mesh that the library chooses does not grow beyond this."""
 
@@ -171,6 +174,11 @@ class _Level:
     stretches: list[_Stretch]
     notes: tuple[str, ...]
 
+    @property
+    def effort(self) -> int:
+        """Points times unknowns, to which the time that it took is about proportional."""
+        return sum(len(part.traced.points) for part in self.stretches) * self.curve.equations.unknowns
+
 
 class _Run:
     """One path with its branches, on finer and finer meshes."""
@@ -199,15 +207,17 @@ class _Run:
             errors = self._errors(coarse, self._level(self._halved(mesh)))
             return self._answer(coarse, errors, begin)
         # The error falls by 4^p a halving; less is taken for granted.
-        gain = max(1.0, 4.0**mesh.order / MARGIN)
+        gain, stalled = max(1.0, 4.0**mesh.order / MARGIN), 0
         for count in range(LEVELS):
             fine = self._level(self._halved(coarse.curve.model.mesh))
             errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
             largest = max(errors.values(), default=0.0)
-            hopeless = count >= PATIENCE and largest > 0.5 * last
+            stalled = stalled + 1 if not largest <= 0.5 * last or not np.isfinite(largest) else 0
+            hopeless = stalled and (count >= PATIENCE or stalled * fine.effort > AFFORDED)
             if largest <= self.accuracy or hopeless or 2 * fine.curve.model.mesh.elements > MOST_ELEMENTS:
                 break
             coarse, last = self._next(fine, gain * largest, gain), largest
+        fine.notes += _disagreement(coarse, fine) if not np.isfinite(largest) else ()
         return self._answer(fine, errors, begin)
 
     def _next(self, fine: _Level, error: float, gain: float) -> _Level:
@@ -270,7 +280,7 @@ class _Run:
 
     def _add_branch(self, level: _Level, event: Event, number: int, side: int) -> None:
         """Follow the branch at a bifurcation to one side, unless a stretch that was followed leads along there."""
-        first = switched(level.curve, event, shapes_at(level.curve, event)[:, 0], side)
+        first = switched(level.curve, event, shapes_at(level.curve, event), side)
         if first is None:
             level.notes += (f"no branch was found at bifurcation {number} to the side {side}",)
             return
@@ -288,7 +298,7 @@ class _Run:
 
     def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
         """The branch at a bifurcation to one side; None where none is found."""
-        first = switched(curve, event, shapes_at(curve, event)[:, shape - 1], side)
+        first = switched(curve, event, shapes_at(curve, event), side, shape)
         if first is None or not self._in_range(first):
             return None
         return without(trace(curve, first, self.span, points, self.knots), [event.standing])
@@ -417,6 +427,21 @@ class _Run:
             error_estimate=finite,
             notes=notes,
         )
+
+
+def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
+    """What two meshes do not agree on, a note."""
+    sizes = " and ".join(str(level.curve.model.mesh.elements) for level in (coarse, fine))
+    counts = [len(level.stretches) - 1 for level in (coarse, fine)]
+    found = [f"{counts[0]} and {counts[1]} branches"] if counts[0] != counts[1] else []
+    for i, parts in enumerate(zip(coarse.stretches, fine.stretches, strict=False)):
+        where = f" of branch {i}" if i else ""
+        for kind, name in (("limit", "limit points"), ("bifurcation", "bifurcations")):
+            a, b = (len(part.of_kind(kind)) for part in parts)
+            found += [f"{a} and {b} {name}{where}"] if a != b else []
+        a, b = (len(part.crossings) for part in parts)
+        found += [f"{a} and {b} crossings of the factors asked for{where}"] if a != b else []
+    return (f"meshes of {sizes} elements do not agree: they have {', '.join(found)}",) if found else ()
 
 
 def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:

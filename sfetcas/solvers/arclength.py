@@ -21,12 +21,13 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from .deflation import turned_between
+from .neutral import Neutral
 from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, redundant, relative_residual, rounded, with_sharing
 from .prepared import Prepared
 from .sharing import shared
-from .stability import LIGHT, Inertia
+from .stability import LIGHT, NEUTRAL, Inertia
 
-__all__ = ["Curve", "Standing", "Tangent"]
+__all__ = ["PASSING", "Curve", "Standing", "Tangent"]
 
 TOLERANCE = 1e-12
 """Relative residual that counts as converged; one more iteration is made while it gains."""
@@ -52,19 +53,20 @@ SHORT = 0.01
 HELD = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
 
-NEUTRAL_FIRM = 1e3
-"""Times the weight of the proximal term along neutral directions: rounding of 1e-14 then leads 1e-7 rad along them."""
-
 HISTORY = 1e-5
 """Share of the unit of the factor over which loads with histories are differenced: second order, so 1e-10."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """Direction of the curve, of length one: rates of the unknowns and multipliers, and of the factor."""
+    """Direction of the curve, of length one: rates of the unknowns and multipliers, and of the factor.
+
+    Where motions are neutral all along the curve, it goes along none of them.
+    """
 
     z: Array
     factor: float
+    neutral: Neutral | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +113,16 @@ class Curve:
         Change of the factor that counts as much as a radian.
     piece : tuple of float
         Factors between which no history has a knot.
+
+    Attributes
+    ----------
+    searched : int
+        Points at which critical ones were looked for so far.
     """
 
     def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
-        self.prepared, self.unit, self.piece, self.firm = prepared, unit, piece, 1.0
+        self.prepared, self.unit, self.piece = prepared, unit, piece
+        self.searched = 0
         equations = prepared.equations
         self.equations, self.model = equations, prepared.model
         turning = equations.turning_unknowns
@@ -133,11 +141,21 @@ class Curve:
         there.piece = piece
         return there
 
-    def firmer(self) -> Curve:
-        """The same curve where a direction is neutral all along it: rounding must not lead far astray there."""
-        there = copy.copy(self)
-        there.firm = NEUTRAL_FIRM
-        return there
+    def held_still(self, standing: Standing) -> Standing:
+        """A point where motions are neutral as one of a curve that goes along none of them."""
+        values, shapes = self.prepared.around_zero(standing.point)[1:]
+        chosen = shapes[:, np.argsort(np.abs(values))[: standing.inertia.zero]]
+        along = replace(standing.tangent, neutral=self.neutral(standing.point, chosen))
+        return replace(standing, tangent=self.tangent(standing.state, standing.factor, standing.point, along)[0])
+
+    def neutral(self, point: Point, shapes: Array, firm: float = 1.0) -> Neutral:
+        """Motions from their shapes (turning unknowns, n), neutral or held as if they were.
+
+        With a ``firm`` proximal term those are not taken to others that are open as well.
+        """
+        weight = self.prepared.weight
+        weighted = Neutral.right(shapes, weight, self.equations.total)
+        return Neutral.answered(weighted, self.solved(point, weighted, firm), weight)[0]
 
     # -- lengths --------------------------------------------------------------------------------
 
@@ -148,7 +166,7 @@ class Curve:
     def normed(self, direction: Tangent) -> Tangent:
         """The direction with length one."""
         length = np.sqrt(self.inner(direction, direction))
-        return Tangent(direction.z / length, direction.factor / length)
+        return replace(direction, z=direction.z / length, factor=direction.factor / length)
 
     def way(self, a: Standing, b: Standing) -> float:
         """How far the second point lies ahead of the first, along the tangent there."""
@@ -208,29 +226,35 @@ class Curve:
     def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
         """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
         entries = point.entries.copy()
-        entries[self._diagonal[0]] += max(firm, self.firm) * self._proximal
+        entries[self._diagonal[0]] += firm * self._proximal
         entries[self._diagonal[1]] -= DUAL
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
     def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> tuple[Tangent, bool]:
         """Direction of the curve at a state, to the side of another, and whether an eigenvalue may vanish there."""
+        rights = [-self.slope(state, factor, point), self._probe]
+        rights += [] if along.neutral is None else [*along.neutral.weighted.T]
         try:
-            both = self.solved(point, np.column_stack([-self.slope(state, factor, point), self._probe]))
+            both = self.solved(point, np.column_stack(rights))
         except np.linalg.LinAlgError:
             return along, True
         if not np.all(np.isfinite(both)):
             return along, True
-        rate, answer = both[: len(self.weight), 0], both[: self._turning, 1]
+        rate, answer, neutral = both[: len(self.weight), 0], both[: self._turning, 1], None
+        if along.neutral is not None:
+            neutral, values = Neutral.answered(along.neutral.weighted, both[:, 2:], self.prepared.weight)
+            neutral = neutral if np.abs(values).max() <= NEUTRAL else None
+            rate = rate if neutral is None else neutral.without(rate)
         loose = loose_rows(self.equations, point) if redundant(self.equations, point) else np.zeros(0)
         if loose.size:
             # What is shared is linear in the multipliers and loads, so that their rates are shared alike.
             first = self.equations.unknowns
             way = shared(self.equations, replace(state, lam=rate[first:]), self.rate(factor), loose)
             rate[first:] = way.lam
-        found = self.normed(Tangent(rate, 1.0))
+        found = self.normed(Tangent(rate, 1.0, neutral))
         doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
-        return found if self.inner(found, along) >= 0.0 else Tangent(-found.z, -found.factor), doubtful
+        return found if self.inner(found, along) >= 0.0 else replace(found, z=-found.z, factor=-found.factor), doubtful
 
     @functools.cached_property
     def _probe(self) -> Array:
@@ -271,18 +295,23 @@ class Curve:
         With a ``firm`` proximal term directions that the equations leave open stay as they are; a ``sharp`` one is
         iterated to rounding.
         """
-        equations, n = self.equations, self._turning
+        equations, n, neutral = self.equations, self._turning, across.neutral
+        firm = firm if neutral is None else max(firm, FIRMER)
         row = self.weight * across.z
         loading = self.loading(factor)
         state = self.held(state, loading)
-        point = equations.at(state, loading)
+        point = _balanced(equations.at(state, loading), neutral)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
         for count in range(ITERATIONS):
             if count and (residual <= ROUNDING if sharp else self._passes(point, residual)):
                 break
             try:
-                right = np.column_stack([-point.residual, -self.slope(state, factor, point)])
-                both = self.solved(point, right, firm)
+                rights = [-point.residual, -self.slope(state, factor, point)]
+                rights += [] if neutral is None else [*neutral.weighted.T]
+                both = self.solved(point, np.column_stack(rights), firm)
+                if neutral is not None:
+                    neutral = neutral.moved(both[:, 2:])
+                    both = neutral.without(both[:, :2])
             except np.linalg.LinAlgError:
                 return None
             base, rate = both[:, 0], both[:, 1]
@@ -299,7 +328,7 @@ class Curve:
             last = length
             loading = self.loading(factor + change)
             trial = self.held(equations.moved(state, step), loading)
-            there = equations.at(trial, loading)
+            there = _balanced(equations.at(trial, loading), neutral)
             gained = relative_residual(equations, there)
             still = count and gained > 0.25 * residual
             if still and (residual <= TOLERANCE or rounded(equations, state, point)):
@@ -311,6 +340,7 @@ class Curve:
         if not good and not rounded(equations, state, point):
             return None
         loading = self.loading(factor)
+        point = point if neutral is None else equations.at(state, loading)
         state, point = with_sharing(equations, state, loading, point, max(residual, TOLERANCE))
         tangent, doubtful = self.tangent(state, factor, point, across)
         return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
@@ -325,7 +355,12 @@ class Curve:
 
         ``most``: largest turn of a node (rad) from there.
         """
-        found = self.prepared.correct(near.state, self.loading(factor), firm=self.firm, most=most)
+        if near.tangent.neutral is not None:
+            across = Tangent(np.zeros(self.equations.total), 1.0, near.tangent.neutral)
+            still = self.corrected(near.state, factor, across, near.arc)
+            apart = np.inf if still is None else self.prepared.distance(still.state, near.state)
+            return None if still is None or apart > most else replace(still, tangent=near.tangent)
+        found = self.prepared.correct(near.state, self.loading(factor), most=most)
         if not found.converged or self.prepared.distance(found.state, near.state) > most:
             return None
         return self.standing(found.state, factor, near.tangent, arc=near.arc)
@@ -353,6 +388,11 @@ class Curve:
         if arc == 0.0:
             return None
         return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
+
+
+def _balanced(point: Point, neutral: Neutral | None) -> Point:
+    """The equations at a state but for what is out of balance along neutral motions."""
+    return point if neutral is None else replace(point, residual=neutral.balanced(point.residual))
 
 
 def _kind(rate: Loading) -> tuple[float, bool]:

@@ -38,6 +38,10 @@ HALF_TURN, LINEAR = np.pi, 1e-3
 """A step turns a node by at most half a turn, rad, beyond which Newton's method may end whole turns away as well as it
 ends here, unless its corrections, rad, show that the answer is linear; where turns are counted also then."""
 
+UNBALANCED, STILL = 1e-4, 1e-3
+"""Part of the way of a first step that need not be shorter where the second of its corrections is this share of the
+first, and equilibrium is missed all the same: no unknown carries the loads."""
+
 NARROW = 0.02
 """The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
@@ -125,6 +129,9 @@ def follow(
             step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
             continue
         if not good:
+            if done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far:
+                # No step moves the state any more, and something is out of balance, in a short step as in a long one.
+                break
             if step > max(SHORTEST * done, TINY):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
                 continue

@@ -16,14 +16,24 @@ import numpy as np
 from ..mathematics.arrays import Array
 from .arclength import Curve, Standing, Tangent
 from .sides import Sides
+from .stability import NEUTRAL
 
-__all__ = ["Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
+__all__ = ["FIRM", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
 SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
 
 ZERO = 1e-10
 """Share of a function's values at the two points below which there is nothing but rounding."""
+
+BLUR = 1e-9
+"""What rounding leaves of an eigenvalue: nearer to a bifurcation Newton's method wanders along its shape."""
+
+BLURRED = 100.0
+"""Times what it should be, the blur is no reason to go on where the place is known to the share that tells roots apart.
+
+That is what counts as neutral.
+"""
 
 APART = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
@@ -39,6 +49,9 @@ FIRM = 1e6
 
 NEAR = 0.02
 """An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
+
+LIKED = 1e-3
+"""Shapes that vanish together and differ by less in their mean axis of rotation are alike in it."""
 
 BESIDE = 1e-3
 """Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
@@ -87,7 +100,13 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     found: list[Event] = []
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
-        standing = sought(curve, a, b, value)
+        # Of two that vanish together rounding leaves the same root twice, by a search to the last digit.
+        together = max(APART * abs(value(b) - value(a)), NEUTRAL)
+        same = next((e for e in found if abs(value(e.standing)) <= together), None)
+        if same is not None:
+            found[found.index(same)] = replace(same, multiplicity=same.multiplicity + 1)
+            continue
+        standing = sought(curve, a, b, value, BLUR)
         if standing is None:
             continue
         standing = _settled(curve, a, b, standing)
@@ -122,18 +141,19 @@ def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standin
 
 
 def _per_way(tangent: Tangent, way: float) -> Tangent:
-    return Tangent(tangent.z / way, tangent.factor / way)
+    return replace(tangent, z=tangent.z / way, factor=tangent.factor / way)
 
 
 def _mean(curve: Curve, a: Standing, b: Standing) -> Tangent:
-    return curve.normed(Tangent(a.tangent.z + b.tangent.z, a.tangent.factor + b.tangent.factor))
+    mean = replace(a.tangent, z=a.tangent.z + b.tangent.z, factor=a.tangent.factor + b.tangent.factor)
+    return curve.normed(mean)
 
 
 def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], float]:
     """The eigenvalue with so many below it; those that vanish all along the curve do not count."""
 
     def value(standing: Standing) -> float:
-        first, values, _ = curve.prepared.around_zero(standing.point)
+        first, values, _ = curve.prepared.around_zero(standing.point, sharp=False)
         rest = np.sort(values[np.argsort(np.abs(values))[neutral:]])
         if first <= rank < first + len(rest):
             return float(rest[rank - first])
@@ -142,8 +162,10 @@ def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], f
     return value
 
 
-def sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float]) -> Standing | None:
-    """The point between two others at which a function of the points vanishes."""
+def sought(
+    curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float], blur: float = 0.0
+) -> Standing | None:
+    """The point between two others at which a function of the points, known to a blur, vanishes."""
     at, arc = curve.between(a, b), b.arc - a.arc
     found: dict[float, Standing] = {0.0: a, arc: b}
 
@@ -156,28 +178,31 @@ def sought(curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], f
         return curve.corrected(*curve.predicted(found[near], (length - near) / share), a.tangent, a.arc + length)
 
     def function(length: float) -> float:
+        curve.searched += 1
         standing = beside(length) or at(length)
         if standing is None:
             return np.nan
         found[length] = standing
         return value(standing)
 
-    place = root(function, 0.0, value(a), b.arc - a.arc, value(b))
+    place = root(function, 0.0, value(a), b.arc - a.arc, value(b), blur)
     return found.get(place)
 
 
-def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: float) -> float:
+def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: float, blur: float = 0.0) -> float:
     """A place between a and b where a function changes its sign; the better end where it does not.
 
-    Inverse quadratic interpolation where it can be trusted, halving otherwise.  Where the function is not a
-    number, what is known so far decides.
+    Inverse quadratic interpolation where it can be trusted; a straight line through the last two places on one side,
+    where that shortens the step, as at the kink that the lower of two eigenvalues has where both vanish; halving
+    otherwise.  Where the function is not a number, what is known so far decides; within its ``blur`` of zero there is
+    no more to know.
 
     Source: Chandrupatla 1997, A new hybrid quadratic/bisection algorithm.
     """
     if a == b or fa * fb >= 0.0 or not np.isfinite(fa * fb):
         return a if abs(fa) < abs(fb) else b
     # b is the latest place, a the other end of the bracket.
-    least_value = ZERO * min(abs(fa), abs(fb))
+    least_value = max(ZERO * min(abs(fa), abs(fb)), blur)
     tolerance, share = SHARP * abs(b - a), min(max(fa / (fa - fb), 0.05), 0.95)
     for _ in range(60):
         x = a + share * (b - a)
@@ -189,9 +214,11 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
         else:
             c, fc, b, fb, a, fa = b, fb, a, fa, x, fx
         least = tolerance / max(abs(b - a), 1e-300)
-        if abs(fa) <= least_value or least > 0.5:
+        known = blur and abs(fa) <= BLURRED * blur and least > SHARP / APART
+        if abs(fa) <= least_value or least > 0.5 or known:
             break
-        share = 0.5
+        line = fa / (fc - fa) * (a - c) / (b - a) if fc * fa > 0.0 and fc != fa else 1.0
+        share = line if 0.0 < line * abs(b - a) < 0.5 * abs(a - c) else 0.5
         xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
         if 1.0 - np.sqrt(1.0 - xi) < phi < np.sqrt(xi):
             share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
@@ -236,7 +263,16 @@ def shapes_at(curve: Curve, event: Event) -> Array:
     Of several, the first is what :mod:`~sfetcas.solvers.sides` takes of their space, the next of what that leaves.
     """
     _, values, shapes = curve.prepared.around_zero(event.standing.point)
-    chosen, weight = shapes[:, np.argsort(np.abs(values))[: event.multiplicity]], curve.prepared.weight
-    chosen = np.linalg.qr(np.sqrt(weight)[:, None] * chosen)[0] / np.sqrt(weight)[:, None]
-    chosen = Sides(curve.equations).ordered(chosen, weight)
+    weight = curve.prepared.weight
+    neutral, count = event.standing.tangent.neutral, event.multiplicity
+    if neutral is None:
+        chosen = shapes[:, np.argsort(np.abs(values))[:count]]
+    else:
+        # What is neutral all along the curve vanishes there, too.
+        still, root = neutral.weighted[: len(weight)], np.sqrt(weight)[:, None]
+        chosen = shapes[:, np.argsort(np.abs(values))[: count + still.shape[1]]]
+        chosen = chosen - still / root**2 @ (still.T @ chosen)
+        chosen = np.linalg.svd(root * chosen, full_matrices=False)[0][:, :count] / root
+    root = np.sqrt(weight)[:, None]
+    chosen = Sides(curve.equations).ordered(np.linalg.qr(root * chosen)[0] / root, weight)
     return np.asarray(chosen / np.abs(chosen).max(axis=0))

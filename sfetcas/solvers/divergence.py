@@ -7,9 +7,7 @@ them equal: then the determinant keeps its sign, while the number of eigenvalues
 two.  A complex pair whose real part changes its sign leaves the tangent regular.
 
 What these numbers say of stability is one thing only: at a zero another equilibrium is adjacent (static divergence).
-Flutter does not show in them.  Where the loads have a potential all the same, as even pressure on a closed
-ring, the tangent is symmetric but for what the discretisation leaves; its symmetric part is taken, whose eigenvalues
-are those of the energy to the second order of the rest.
+Flutter does not show in them.
 
 Source: Bolotin 1963, Nonconservative problems of the theory of elastic stability; Leipholz 1987.
 """
@@ -20,7 +18,6 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point
-from .sides import Sides, alike
 from .stability import LIGHT, NEUTRAL, RANK, ROUNDING, Inertia, Stability
 
 __all__ = ["TangentTest"]
@@ -37,17 +34,13 @@ class TangentTest:
     equations : Equations
     softest : float
         What weights are of masses, see :class:`~sfetcas.solvers.stability.StabilityTest`.
-    symmetric : bool
-        Whether the loads have a potential all the same.
     """
 
-    def __init__(self, equations: Equations, softest: float, symmetric: bool) -> None:
-        self._equations, self._symmetric = equations, symmetric
+    def __init__(self, equations: Equations, softest: float) -> None:
+        self._equations, self._softest = equations, softest
         n = equations.unknowns
-        self._softest = softest
         masses = np.concatenate([equations.mass, np.full(equations.displacement_unknowns, LIGHT)])
         self._root = np.sqrt(softest * masses)
-        self._sides = Sides(equations)
         self._in_h = np.flatnonzero((equations.row < n) & (equations.column < n))
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
@@ -61,8 +54,6 @@ class TangentTest:
         h[equations.row[self._in_h], equations.column[self._in_h]] = point.entries[self._in_h]
         rows[equations.row[self._in_a] - n, equations.column[self._in_a]] = point.entries[self._in_a]
         h /= np.outer(self._root, self._root)
-        if self._symmetric:
-            h = 0.5 * (h + h.T)
         largest, free = float(np.abs(h).max(initial=0.0)), n
         if len(rows):
             _, sizes, right = np.linalg.svd(rows / self._root, full_matrices=False)
@@ -75,7 +66,7 @@ class TangentTest:
 
     def _eigenvalues(self, tangent: Array) -> Array:
         """Eigenvalues by rising real part."""
-        values = np.linalg.eigvalsh(tangent) if self._symmetric else np.linalg.eigvals(tangent)
+        values = np.linalg.eigvals(tangent)
         return np.asarray(values[np.argsort(values.real)])
 
     def inertia(self, point: Point) -> Inertia:
@@ -85,18 +76,15 @@ class TangentTest:
         zero = int((np.abs(values) <= limit).sum())
         return Inertia(int(((values.real < 0.0) & (np.abs(values) > limit)).sum()), zero)
 
-    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+    def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Real parts of all eigenvalues, rising; zero, as none is before them; shapes, those of the smallest first.
 
-        The shapes are columns in the order of the real parts; they are singular vectors: where eigenvalues vanish
-        these span what the tangent leaves open, while eigenvectors may coincide.
+        All are sharp.  The shapes are columns in the order of the real parts; they are singular vectors: where
+        eigenvalues vanish these span what the tangent leaves open, while eigenvectors may coincide.
         """
         tangent = self._tangent(point)[0]
-        if self._symmetric:
-            values, vectors = np.linalg.eigh(tangent)
-        else:
-            values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
-            vectors[:, np.argsort(np.abs(values))] = np.linalg.svd(tangent)[2][::-1].T
+        values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
+        vectors[:, np.argsort(np.abs(values))] = np.linalg.svd(tangent)[2][::-1].T
         return 0, values, (vectors / self._root[:, None])[: self._equations.turning_unknowns]
 
     def singular(self, point: Point, count: int) -> bool:
@@ -117,24 +105,7 @@ class TangentTest:
         values = self._eigenvalues(tangent)
         return int(((values.real < -limit) & (np.abs(values.imag) <= limit)).sum())
 
-    def _size(self, shape: Array) -> float:
-        """Integral of the square of a shape."""
-        nothing = np.full(self._equations.displacement_unknowns, LIGHT)
-        return float((np.concatenate([self._equations.mass, nothing]) * np.abs(shape) ** 2).sum())
-
     def test(self, point: Point) -> Stability:
-        """Inertia, smallest eigenvalue and escape shape where the loads have a potential; "not defined" elsewhere."""
-        equations = self._equations
-        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
-        if not self._symmetric:
-            return Stability("not defined", 0, np.nan, np.zeros(turning), nothing)
-        tangent, limit, free = self._tangent(point)
-        if not free:
-            return Stability(True, 0, np.inf, np.zeros(turning), nothing)
-        values, vectors = np.linalg.eigh(tangent)
-        shape = self._sides.taken(vectors[:, : alike(values)] / self._root[:, None], self._root**2)
-        quotient = float(values[0]) / self._size(shape)
-        shape = shape / np.abs(shape[:turning]).max()
-        negative = int((values < -limit).sum())
-        stable: bool | str = False if negative else bool(values[0] > limit) or "neutral"
-        return Stability(stable, negative, quotient, shape[:turning], shape[turning:])
+        """Without an energy there is nothing to tell."""
+        turning = np.zeros(self._equations.turning_unknowns)
+        return Stability("not defined", 0, np.nan, turning, np.zeros(self._equations.displacement_unknowns))

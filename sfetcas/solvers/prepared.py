@@ -127,11 +127,11 @@ class Prepared:
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:
-        return TangentTest(self.equations, self._test.softest, self.model.conservative)
+        return TangentTest(self.equations, self._test.softest)
 
     @property
     def _tester(self) -> StabilityTest | TangentTest:
-        return self._test if self.model.has_potential else self._tangent
+        return self._test if self.model.conservative else self._tangent
 
     def stability(self, found: Corrected) -> Stability:
         """The stability test at a state; without a potential no energy tells stable from unstable."""
@@ -142,13 +142,11 @@ class Prepared:
 
         Without a potential of those of the tangent, see :class:`~sfetcas.solvers.divergence.TangentTest`.
         """
-        return (
-            self._test.inertia(point, doubtful=doubtful) if self.model.has_potential else self._tangent.inertia(point)
-        )
+        return self._test.inertia(point, doubtful=doubtful) if self.model.conservative else self._tangent.inertia(point)
 
-    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+    def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Eigenvalues around zero as :class:`~sfetcas.solvers.stability.StabilityTest`; real ones without potential."""
-        return self._tester.around_zero(point)
+        return self._tester.around_zero(point, sharp=sharp)
 
     def singular(self, point: Point, count: int) -> bool:
         """Whether so many eigenvalues vanish where their real parts do: always where there is an energy."""
@@ -158,11 +156,9 @@ class Prepared:
         """Number of negative eigenvalues at a state; none is counted where :attr:`leaves` is false."""
         if not self.leaves:
             return 0
-        return (
-            self._test.negative(found.point)
-            if self.model.has_potential
-            else self._tangent.inertia(found.point).negative
-        )
+        if self.model.conservative:
+            return self._test.negative(found.point)
+        return self._tangent.inertia(found.point).negative
 
     def diverged(self, found: Corrected) -> int | None:
         """Real eigenvalues of the tangent below zero, loads without potential; None where it is too large for them."""

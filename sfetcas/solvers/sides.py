@@ -25,6 +25,9 @@ __all__ = ["Sides", "alike"]
 DECAYS = (2.0, 0.7, 4.0)
 """How fast fields die away along a member, one after the other."""
 
+TINY = 1e-9
+"""Share of members without elements, which have no part in integrals: they count where there is no other."""
+
 LEAST = 1e-3
 """Share of a field that shapes have at least: symmetry leaves none of it, and rounding 1e-10."""
 
@@ -50,15 +53,19 @@ class Sides:
         found = []
         for axis in (2, 1, 0) if model.space else (2,):
             for decay in DECAYS:
-                vectors = np.zeros((len(model.rotations.kind), 3))
-                # The node of several members is turned by the first of them.
-                for place, name in reversed(list(enumerate(sorted(model.rotations.ends)))):
+                vectors, shares = np.zeros((len(model.rotations.kind), 3)), np.zeros(len(model.rotations.kind))
+                for place, name in enumerate(sorted(model.rotations.ends)):
                     ends = list(model.rotations.ends[name])
                     chain = model.chain(name) if name in model.members else np.array(ends)
                     along = model.along(name) if name in model.members else np.linspace(0.0, 1.0, len(ends))
                     frame = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0]
                     way = frame[:, axis] if model.space else np.array([0.0, 0.0, 1.0])
-                    vectors[chain] = np.exp(-decay * along)[:, None] * way / (1.0 + place)
+                    # At the node of several members the mean by what of each has its share in an integral: of a field
+                    # that jumps there, too, all meshes then have the same integrals.
+                    share = np.gradient(along) * lines[name].length * (1.0 if name in model.members else TINY)
+                    vectors[chain] += (share * np.exp(-decay * along))[:, None] * way / (1.0 + place)
+                    shares[chain] += share
+                vectors /= np.where(shares > 0.0, shares, 1.0)[:, None]
                 values = vectors if model.space else vectors[:, 2:3]
                 if len(about):
                     values = values.copy()

@@ -7,6 +7,10 @@ eigenvalues of ``H - sigma M`` less those of the Schur complement ``A (H - sigma
 
 The weight of a rotation is its length times the smallest stiffness of all members over the square of its
 member's length: the eigenvalues are pure numbers, of the size of one for what the softest member does.
+
+Under pressure, which follows and has a potential all the same, as even pressure on a closed ring, the Newton matrix is
+symmetric but for what the mesh leaves; its symmetric part is taken, whose eigenvalues are those of the energy to the
+second order of the rest.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
-from ..mathematics.linear import InertiaSolver, blurred, pattern
+from ..mathematics.linear import InertiaSolver, Product, SparseSolver, blurred, pattern
 from ..mechanics.equations import Equations, Point
 from .sides import Sides, alike
 
@@ -85,7 +89,7 @@ class StabilityTest:
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
         # Displacements that springs and bodies act upon count as rotations do; all others follow from the closings.
-        self._chosen = np.concatenate([np.arange(equations.turning_unknowns), equations.elastic_displacements])
+        self._chosen = np.concatenate([np.arange(equations.turning_unknowns), equations.worked_displacements])
         self._n = n = len(self._chosen)
         place = np.full(equations.total, -1, dtype=np.intp)
         place[self._chosen] = np.arange(n)
@@ -108,12 +112,12 @@ class StabilityTest:
     @functools.cached_property
     def _weights(self) -> Array:
         """The weight of all that counts: displacements have next to none."""
-        count = len(self.equations.elastic_displacements)
+        count = len(self.equations.worked_displacements)
         return np.concatenate([self.weight, np.full(count, LIGHT * self.softest)])
 
     @functools.cached_property
     def _masses(self) -> Array:
-        return np.concatenate([self.equations.mass, np.full(len(self.equations.elastic_displacements), LIGHT)])
+        return np.concatenate([self.equations.mass, np.full(len(self.equations.worked_displacements), LIGHT)])
 
     @functools.cached_property
     def softest(self) -> float:
@@ -143,7 +147,7 @@ class StabilityTest:
 
     def test(self, point: Point) -> Stability:
         """Inertia, smallest eigenvalue and escape shape at an equilibrium."""
-        equations = self.equations
+        equations, point = self.equations, self.equations.symmetric(point)
         turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
         if self._n == 0:
             return Stability(True, 0, np.inf, np.zeros(0), nothing)
@@ -163,7 +167,7 @@ class StabilityTest:
         turned = shape[:turning] if np.abs(shape[:turning]).max(initial=0.0) > 0.0 else shape
         shape = shape / np.abs(turned).max()
         travel = nothing.copy()
-        travel[equations.elastic_displacements - turning] = shape[turning:]
+        travel[equations.worked_displacements - turning] = shape[turning:]
         return Stability(stable, negative, quotient, shape[:turning], travel, limit)
 
     @functools.cached_property
@@ -175,6 +179,7 @@ class StabilityTest:
         """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
         if self._n == 0:
             return 0
+        point = self.equations.symmetric(point)
         entries = self._weighted(point)
         limit = self._limit(entries)
         if self._is_graded(limit):
@@ -191,6 +196,7 @@ class StabilityTest:
         """
         if self._n == 0:
             return 0.0
+        point = self.equations.symmetric(point)
         entries = self._weighted(point)
         limit = self._limit(entries)
         if self._is_graded(limit):
@@ -254,10 +260,11 @@ class StabilityTest:
     @property
     def _is_dense(self) -> bool:
         # Displacements without stiffness of their own make the sparse factorisation without pivots break down.
-        return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.elastic_displacements) else DENSE)
+        return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.worked_displacements) else DENSE)
 
     def spectrum(self, point: Point, count: int) -> tuple[Array, Array]:
         """All eigenvalues, zero where they are neutral, and the lowest shapes (count or fewer, turning unknowns)."""
+        point = self.equations.symmetric(point)
         entries, rows = self._weighted(point), self._rows(point)
         projected, basis = self._projected(entries, rows)
         values, vectors = np.linalg.eigh(projected)
@@ -274,12 +281,17 @@ class StabilityTest:
         """Numbers of negative and of vanishing eigenvalues alone; many unknowns: of these only where it is doubtful."""
         if self._n == 0:
             return Inertia(0, 0)
+        point = self.equations.symmetric(point)
         entries = self._weighted(point)
         limit = self._limit(entries)
         if self._is_graded(limit):
             values, _, limits = self._mode_by_mode(point, entries)
             below = int((values < -limits).sum())
             return Inertia(below, int((values <= limits).sum()) - below)
+        if self._is_bordered and self._n > DENSE:
+            found = self._counted_apart(point, entries, limit)
+            if found is not None:
+                return found
         if not self._is_dense:
             below = self._below(point, entries, -limit)
             return Inertia(below, 0) if not doubtful else Inertia(below, self._below(point, entries, limit) - below)
@@ -287,19 +299,25 @@ class StabilityTest:
         below = int((values < -limit).sum())
         return Inertia(below, int((values <= limit).sum()) - below)
 
-    def around_zero(self, point: Point) -> tuple[int, Array, Array]:
+    def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
 
-        Few unknowns: all eigenvalues.  Many: the few that are nearest to zero.
+        Few unknowns: all eigenvalues.  Many: the few nearest to zero, ``sharp`` for their shapes, with -1 for a number
+        that is not counted; or each to a millionth of itself or to rounding, and those before them counted.
         """
+        point = self.equations.symmetric(point)
         entries, turning = self._weighted(point), self.equations.turning_unknowns
         root = np.sqrt(self._weights)[:, None]
         if self._is_dense:
             projected, basis = self._projected(entries, self._rows(point))
             values, vectors = np.linalg.eigh(projected)
             return 0, values, (basis @ vectors / root)[:turning]
-        values, vectors = self._inverse_iterated(point, entries)
-        before = self._below(point, entries, float(values[0] - 1e-6 * np.abs(values).max()))
+        values, vectors = self._inverse_iterated(point, entries, sharp=sharp)
+        size, before = float(np.abs(values).max()), -1
+        if not sharp:
+            # Beside what is neutral a count by factors is worthless, and none but those found are nearer to zero.
+            apart = size >= APART and values[0] > -APART
+            before = self._below(point, entries, -APART if apart else float(values[0] - 1e-6 * size))
         return before, values, (vectors / root)[:turning]
 
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
@@ -330,9 +348,29 @@ class StabilityTest:
             values[0] = -limit
         return values, vectors, negative
 
+    @property
+    def _is_bordered(self) -> bool:
+        return self.equations.rows > MANY_ROWS or bool(len(self.equations.worked_displacements))
+
+    def _counted_apart(self, point: Point, entries: Array, limit: float) -> Inertia | None:
+        """The inertia by counts well away from zero, and by eigenvalues what lies between; None where these differ.
+
+        At zero itself a neutral direction takes all digits from the factors of the bordered matrix.
+        """
+        low, high = (self._from_factors(point, shift, (SOFT,)) for shift in (-APART, APART))
+        if low is None or high is None or limit > 0.1 * APART or high - low > NEAREST:
+            return None
+        if low == high:
+            return Inertia(low, 0)
+        values = self._inverse_iterated(point, entries, sharp=False)[0]
+        values = values[np.abs(values) < APART]
+        if len(values) != high - low:
+            return None
+        return Inertia(low + int((values < -limit).sum()), int((np.abs(values) <= limit).sum()))
+
     def _below(self, point: Point, entries: Array, shift: float) -> int:
         """Number of eigenvalues on the null space of the rows below the shift."""
-        if self.equations.rows > MANY_ROWS or len(self.equations.elastic_displacements):
+        if self._is_bordered:
             return self._below_bordered(point, shift)
         rows = self._rows(point)
         shifted = entries.copy()
@@ -351,22 +389,30 @@ class StabilityTest:
         Each row of the closings adds a negative eigenvalue.  The softness moves an eigenvalue by its share of the
         stiffness; rounding by its inverse: both stay below a millionth.
         """
+        # Without pivots the factors break down where displacements hang between two slides, or between many rigid
+        # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
+        found = self._from_factors(point, shift, (SOFT,) if self._n <= FULL else SOFTER)
+        return self._below_dense(point, shift) if found is None else found
+
+    def _from_factors(self, point: Point, shift: float, softness: tuple[float, ...]) -> int | None:
+        """The same with the first of several softnesses whose factors solve anything; None where none does."""
         equations = self.equations
         entries, diagonal = point.entries.copy(), equations.diagonal
         entries[diagonal[self._chosen]] -= shift * self._weights
         size = float(np.abs(entries[diagonal[: equations.turning_unknowns]]).max(initial=1.0))
-        # Without pivots the factors break down where displacements hang between two slides, or between many rigid
-        # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
-        for soft in (SOFT,) if self._n <= FULL else SOFTER:
+        for soft in softness:
             softened = entries.copy()
             softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self.softest
             softened[diagonal[equations.unknowns :]] -= soft / size
             matrix, ones = ca.DM(self._bordered_pattern, softened), ca.DM.ones(equations.total)
-            self._bordered.nfact(matrix)
-            gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
+            try:
+                self._bordered.nfact(matrix)
+                gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
+            except np.linalg.LinAlgError:
+                continue
             if np.abs(gap).max() < BROKEN:
                 return self._bordered.neig(matrix) - equations.rows
-        return self._below_dense(point, shift)
+        return None
 
     def _below_dense(self, point: Point, shift: float) -> int:
         values = np.linalg.eigvalsh(self._projected(self._weighted(point), self._rows(point))[0])
@@ -389,13 +435,9 @@ class StabilityTest:
         return InertiaSolver("inertia", self._pattern)
 
     @functools.cached_property
-    def _starts(self) -> Array:
-        return np.searchsorted(self._h_column, np.arange(self._n))
-
-    def _times(self, entries: Array, block: Array) -> Array:
+    def _times(self) -> Product:
         """The weighted matrix times a block of vectors."""
-        # Symmetric and sorted by columns: a column's sum over its rows is a row of the product.
-        return np.asarray(np.add.reduceat(entries[:, None] * block[self._h_row], self._starts, axis=0))
+        return Product(self._pattern)
 
     def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
         """Smallest eigenvalues above the shift by inverse iteration of a small subspace.
@@ -421,6 +463,13 @@ class StabilityTest:
                 shift = new[0] - 0.1 * (new[-1] - new[0]) - 1e-3 * abs(new[0])
         return smallest, block
 
+    @functools.cached_property
+    def _solver(self) -> SparseSolver:
+        equations = self.equations
+        if equations.model.has_potential:
+            return equations.solver
+        return SparseSolver(equations.total, equations.row, equations.column, equations.rows)
+
     def _solved(self, point: Point, shift: float, loads: Array) -> Array:
         """Solution of the shifted Newton matrix, whose redundant rows a negative diagonal keeps from being singular."""
         equations = self.equations
@@ -428,14 +477,14 @@ class StabilityTest:
             shifted = point.entries.copy()
             shifted[equations.diagonal[self._chosen]] -= shift * self._weights
             shifted[equations.diagonal[equations.unknowns :]] -= soft
-            equations.solver.factor(shifted)
+            self._solver.factor(shifted)
             try:
-                return np.asarray(equations.solver.solve(loads))
+                return np.asarray(self._solver.solve(loads))
             except np.linalg.LinAlgError:
                 continue
         raise SolveError(Status.FAILED, "the tangent stays singular however it is shifted")
 
-    def _inverse_iterated(self, point: Point, entries: Array) -> tuple[Array, Array]:
+    def _inverse_iterated(self, point: Point, entries: Array, *, sharp: bool) -> tuple[Array, Array]:
         """The eigenvalues nearest to zero, half of a block, and their vectors."""
         equations, n = self.equations, self._n
         root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
@@ -444,15 +493,16 @@ class StabilityTest:
         shifted = point.entries.copy()
         shifted[equations.diagonal[self._chosen]] += BESIDE * self._weights
         shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
-        equations.solver.factor(shifted)
+        self._solver.factor(shifted)
         for _ in range(60):
             loads[self._chosen] = root * block
-            block = np.linalg.qr(root * equations.solver.solve(loads)[self._chosen])[0]
+            block = np.linalg.qr(root * self._solver.solve(loads)[self._chosen])[0]
             product = self._times(entries, block)
             values, turn = np.linalg.eigh(block.T @ product)
             block = block @ turn
             nearest = np.sort(np.argsort(np.abs(values))[:NEAREST])
-            if np.abs(values[nearest] - last).max() <= 1e-10 * np.abs(values[nearest]).max():
+            size = np.abs(values[nearest])
+            if (np.abs(values[nearest] - last) <= (1e-10 * size.max() if sharp else 1e-6 * size + 1e-10)).all():
                 break
             last = values[nearest]
         return values[nearest], block[:, nearest]
@@ -466,6 +516,9 @@ LOWEST = 1e30
 
 BESIDE = 1.3e-4
 """Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
+
+APART = 1e-4
+"""This far from zero eigenvalues are counted by factors where displacements take part: these blur a hundredth of it."""
 
 NEAREST = 4
 """Eigenvalues that are looked at around zero where there are many: in space two may vanish at once."""
@@ -505,7 +558,7 @@ def _left_null_space(equations: Equations) -> Array:
     """Combinations of the rows in which no displacement appears, (rows, combinations)."""
     w = np.zeros((equations.rows, equations.displacement_unknowns))
     w[: len(equations.model.positions.rows)] = equations.model.positions.W.full()
-    w = np.delete(w, equations.elastic_displacements - equations.turning_unknowns, axis=1)
+    w = np.delete(w, equations.worked_displacements - equations.turning_unknowns, axis=1)
     if not w.shape[1]:
         return np.eye(equations.rows)
     left, sizes, _ = np.linalg.svd(w)

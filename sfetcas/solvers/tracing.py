@@ -14,8 +14,9 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
-from .arclength import Curve, Standing, Tangent
-from .critical import Event, events_between
+from .arclength import PASSING, Curve, Standing, Tangent
+from .critical import FIRM, Event, events_between
+from .newton import relative_residual
 
 __all__ = ["Traced", "passes", "switched", "trace", "without"]
 
@@ -48,6 +49,12 @@ FIRST = 0.1
 
 MOST_AT_ONCE = 6
 """So many eigenvalues at most change their signs at once: more do so where a mesh is too coarse for what it carries."""
+
+SEARCHED = 200
+"""Points at which critical ones may be looked for, or as many as a curve may have if these are more.
+
+A bifurcation takes five to fifteen; where more are needed rounding makes one after the other of them.
+"""
 
 EXPECTED = 3
 """Newton iterations of a step that is as long as it should be."""
@@ -90,8 +97,9 @@ def trace(
 
     At the knots of histories the curve has a corner: it is followed from one to the next.
     """
-    traced, usual = Traced([start], [], "range"), start.inertia.zero
-    curve = curve.firmer() if usual else curve
+    usual = start.inertia.zero
+    start = curve.held_still(start) if usual and start.tangent.neutral is None else start
+    traced = Traced([start], [], "range")
     stops = [span[0], *knots, span[1]]
     while traced.end == "range":
         now = traced.points[-1]
@@ -101,7 +109,7 @@ def trace(
             break
         here = curve.within(ahead[0]) if curve.model.scene.histories else curve
         if here is not curve:
-            along = Tangent(np.zeros_like(now.tangent.z), now.tangent.factor)
+            along = replace(now.tangent, z=np.zeros_like(now.tangent.z))
             now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
         stride = (span[1] - span[0]) / SHARE
         part = _piece(here, now, ahead[0], stride, count - len(traced.points) + len(traced.events))
@@ -180,7 +188,10 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
     points: list[Standing] = [start]
     events: list[Event] = []
     now, before, length = start, None, FIRST
+    budget = curve.searched + max(SEARCHED, more)
     for _ in range(more):
+        if curve.searched > budget:
+            return Traced(points, events, "lost")
         length = min(length, _longest(curve, now, stride))
         step = _step(curve, now, before, length, span)
         if step is None:
@@ -189,9 +200,10 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
         closed = not left and len(points) >= LOOP and _closes(curve, start, now, there)
         ends = _to_start(curve, start, now, there) if closed else [there]
         for end in ends:
-            met = events_between(curve, points[-1], end)
+            # A point that is met by chance may be the limit point itself.
+            met = [event for event in events_between(curve, points[-1], end) if event.standing is not points[-1]]
             events += met
-            points += [*(event.standing for event in met), end]
+            points += [event.standing for event in met if event.standing is not end] + [end]
         if left or closed:
             return Traced(points, events, "range" if left else "closed")
         length = used * _growth(curve, now, there)
@@ -274,31 +286,33 @@ def _growth(curve: Curve, now: Standing, there: Standing) -> float:
     return float(np.clip(min(by_angle, by_effort), 0.3, 2.0))
 
 
-def switched(curve: Curve, event: Event, shape: Array, side: int) -> Standing | None:
+def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int = 1) -> Standing | None:
     """The first point on the branch that crosses at a bifurcation, looking away from it.
 
-    The branch is looked for across the shape at growing distances: there the shape's share is given and the
-    factor is found, while on the curve that was followed there is no such point.
+    The branch is looked for across the shape with the number at growing distances: there the shape's share is given
+    and the factor is found, while on the curve that was followed there is no such point.  Where other shapes vanish
+    with it these are held at first: if all is in balance then, each combination leads to a branch like this one, and
+    it goes along none of the others.
     """
     here = event.standing
-    across = _full_shape(curve, here, shape)
-    across = Tangent(side * across.z, side * across.factor)
+    across = _full_shape(curve, here, shapes[:, number - 1])
+    across = replace(across, z=side * across.z, factor=side * across.factor)
+    others = np.delete(shapes, number - 1, axis=1)
+    held = replace(across, neutral=curve.neutral(here.point, others, FIRM)) if others.size else across
     for length in (0.01, 0.02, 0.04, 0.08, 0.16, 0.3):
         state, factor = curve.predicted(replace(here, tangent=across), length)
-        found = curve.corrected(state, factor, across, length)
-        if found is not None and curve.inner(found.tangent, across) > 0.3:
-            return replace(found, arc=length)
+        for tangent in (held, across) if others.size else (across,):
+            found = curve.corrected(state, factor, tangent, length)
+            if found is None or curve.inner(found.tangent, across) <= 0.3:
+                continue
+            if tangent is across or relative_residual(curve.equations, found.point) <= PASSING:
+                return replace(found, arc=length)
     return None
 
 
 def _full_shape(curve: Curve, here: Standing, shape: Array) -> Tangent:
     """A direction along the shape with the displacements and multipliers that belong to it, across the curve."""
-    equations, n = curve.equations, curve.equations.turning_unknowns
-    right = np.zeros(equations.total)
-    right[:n] = curve.prepared.weight * shape
-    z = curve.solved(here.point, right)
-    z *= np.sign(z[:n] @ (curve.prepared.weight * shape)) or 1.0
-    along = curve.normed(Tangent(z, 0.0))
+    along = curve.normed(Tangent(curve.neutral(here.point, shape[:, None], FIRM).motions[:, 0], 0.0))
     share = curve.inner(along, here.tangent)
     mixed = Tangent(along.z - share * here.tangent.z, along.factor - share * here.tangent.factor)
     return curve.normed(mixed)
