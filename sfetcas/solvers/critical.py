@@ -50,9 +50,6 @@ FIRM = 1e6
 NEAR = 0.02
 """An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
 
-LIKED = 1e-3
-"""Shapes that vanish together and differ by less in their mean axis of rotation are alike in it."""
-
 BESIDE = 1e-3
 """Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
 
