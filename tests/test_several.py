@@ -1,5 +1,6 @@
 """The search for several equilibria: counts from theory, certificates, distinctness, and what is said of it."""
 
+import functools
 import itertools
 import json
 import math
@@ -292,16 +293,21 @@ FRAME = {
 """Displacements of the loaded point by force, along the path of a collocated boundary value problem."""
 
 
+@functools.cache
+def frame_steps(force):
+    return solve(right_angled_frame(force)).steps
+
+
 @pytest.mark.parametrize("force", FRAME)
 def test_equilibria_of_a_frame_beyond_limit_points(force):
-    found = [step.along("beam", [0.2])["position"][0, :2] for step in solve(right_angled_frame(force)).steps]
+    found = [step.along("beam", [0.2])["position"][0, :2] for step in frame_steps(force)]
     for u, v in FRAME[force]:
         # Twice the default accuracy, 1e-4 of the scene's size of 170: the reference is exact, the estimate is not.
         assert min(np.linalg.norm(place - (24.0 + u, 120.0 + v)) for place in found) < 0.04
 
 
 def test_whole_turns_of_what_nothing_holds_are_no_further_equilibria():
-    steps = solve(right_angled_frame(-0.5)).steps
+    steps = frame_steps(-0.5)
     x = np.linspace(0.05, 0.95, 10)
     places = [np.vstack([step.along(name, x)["position"] for name in ("column", "beam")]) for step in steps]
     # Half a percent of the size: neighbours on a path are at least that far apart at this load.

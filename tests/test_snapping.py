@@ -95,6 +95,7 @@ CASES = {
 """Scene, what it is made of, and the factor at which all states are asked for."""
 
 SLOW = (
+    "straight strips, hinged",
     "hinged arch near its limit",
     "hinged arch pulled up",
     "hinged arch, force inclined",
@@ -121,9 +122,8 @@ def test_all_finds_each_state_that_paths_pass(name):
         assert min(np.abs(shape(crossing) - other).max() for other in several) < near
 
 
-@pytest.mark.parametrize("force", [18.0, 30.0])
-def test_all_finds_the_state_that_has_snapped_through(force):
-    steps = solve(arch(steps=[force], equilibria="all")).steps
+def test_all_finds_the_state_that_has_snapped_through():
+    steps = solve(arch(steps=[18.0], equilibria="all")).steps
     stable = sorted(step.position("crown")[1] for step in steps if step.certificate.stable is True)
     assert len(stable) == 2
     # By symmetry the crown stays in the middle; the snapped arch hangs below its feet.
