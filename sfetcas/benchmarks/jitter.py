@@ -176,13 +176,14 @@ def _equilibrium(told: _Told, name: str, step: Equilibrium, how: Jittered, size:
         # energy says whether it is the same one, and places stay near as long as rounding alone moves along it.
         near = ROUGH if proof.stable == "neutral" else error + 1e-6
         told.add(f"{name} members.{member}", places, near * size)
-    energies = np.array([step.energy["elastic"], step.energy["loads"]]) / (how.length * how.force)
-    told.add(
-        f"{name} energy", energies, (error + 1e-6) * float(np.abs(energies).sum()) + 1e-12 * how.force * how.length
-    )
     held = [node for node, entry in step.model.scene.nodes.items() if entry.support != "free"]
     forces = {node: how.back(step.reaction(node)[0], 0, 1) for node in held}
     acts = max((float(np.abs(force).max()) for force in forces.values()), default=0.0)
+    # Forces work on the places that are changed.
+    energies = np.array([step.energy["elastic"], step.energy["loads"]]) / (how.length * how.force)
+    told.add(
+        f"{name} energy", energies, (error + 1e-6) * float(np.abs(energies).sum()) + 10.0 ** (MOST + 1.0) * acts * size
+    )
     for node, force in forces.items():
         told.add(f"{name} reactions.{node}", force, ROUGH * acts + 1e-6)
 
