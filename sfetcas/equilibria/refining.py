@@ -139,6 +139,9 @@ class Refining(Piloting):
         return held if held.converged else near
 
     def _refined(self, pilot: Found, factor: float) -> Equilibrium:
+        if not pilot.kept:
+            # What nothing holds on a coarse mesh no finer one holds.
+            _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
         if self._prescribed:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh
