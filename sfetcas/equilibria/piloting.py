@@ -12,6 +12,7 @@ from ..description.records import counted
 from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
+from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
@@ -21,6 +22,7 @@ from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .settings import Settings
 from .single import cold
+from .solution import refuse_large
 
 __all__ = ["BEYOND", "KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting", "multipliers"]
 
@@ -92,7 +94,7 @@ class Piloting(Meshing):
             if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
                 raise
             # What falls on and on does so on a finer mesh too; one that is too coarse is left by other ways.
-            if error.status is Status.ITERATIONS:
+            if error.status in (Status.ITERATIONS, Status.BENT):
                 raise
             try:
                 finer = self._prepared(pilot.model.mesh.refined().refined())
@@ -117,10 +119,14 @@ class Piloting(Meshing):
         loading = pilot.model.loading(factor)
         if not pilot.model.minimisable:
             return self._only_grown(pilot, factor, last)
+        grows = self.settings.branch and not self.started
+        # Where small members bend beyond sense on the way of the loads, nothing else is tried.
+        small = any(member.type == "small" for member in self.scene.members.values())
+        reached = self._grown(pilot, factor, last) if grows and small else None
         alone, failure = self._direct(pilot, loading)
-        if self.started or not self.settings.branch:
+        if not grows:
             return self._accepted(pilot, alone, failure, loading)
-        reached = self._grown(pilot, factor, last)
+        reached = reached or self._grown(pilot, factor, last)
         if reached is None:
             zero = self._unloaded(pilot)
             straight = alone is None or pilot.distance(alone.corrected.state, zero) < STRAIGHT
@@ -270,7 +276,12 @@ class Piloting(Meshing):
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
         allowed = self.allowed and self.allowed(pilot)
-        result = follow(pilot, way, state, leave=leave, allowed=allowed)
+        small = any(member.type == "small" for member in self.scene.members.values())
+
+        def refuse(there: State, loading: Loading) -> None:
+            refuse_large(Fields(pilot.equations, there, loading))
+
+        result = follow(pilot, way, state, leave=leave, allowed=allowed, refuse=refuse if small else None)
         passed = not result.reached and leave and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.

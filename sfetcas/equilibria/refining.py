@@ -26,7 +26,7 @@ from .meshing import Found
 from .mirrors import has_twin
 from .piloting import BEYOND, KEPT, Piloting, multipliers
 from .single import finished, unjudged
-from .solution import Equilibrium
+from .solution import Equilibrium, refuse_large
 
 __all__ = ["LEVELS", "Refining"]
 
@@ -142,6 +142,7 @@ class Refining(Piloting):
         if not pilot.kept:
             # What nothing holds on a coarse mesh no finer one holds.
             _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
+        refuse_large(Fields(pilot.prepared.equations, pilot.corrected.state, pilot.prepared.model.loading(factor)))
         if self._prescribed:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh

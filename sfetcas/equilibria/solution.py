@@ -21,7 +21,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.stability import Stability
 
-__all__ = ["Certificate", "Equilibrium", "Posture", "Solution", "at_factor", "equilibrium", "heading"]
+__all__ = ["Certificate", "Equilibrium", "Posture", "Solution", "at_factor", "equilibrium", "heading", "refuse_large"]
 
 MOST_PLACES = 400
 """Places listed along a member at most; with more elements only their ends, thinned out."""
@@ -337,8 +337,28 @@ def equilibrium(
 SMALL = 0.1
 """Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""
 
+LARGE = 1.0
+"""The same beyond which nothing of what is told of a small member is true."""
+
 SMALL_PULL = 0.1
 """Axial force over ``12 EI / L^2`` up to which a small member is one: by as much it is too soft or too stiff across."""
+
+
+def refuse_large(fields: Fields) -> None:
+    """Refuse a small member that bends so far that its linear elasticity tells nothing.
+
+    Raises
+    ------
+    SolveError
+        Naming the one that bends most.
+    """
+    found = {name: fields.bent(name) for name, m in fields.model.scene.members.items() if m.type == "small"}
+    worst = max(found, key=lambda name: found[name], default="")
+    if found.get(worst, 0.0) > LARGE:
+        detail = (
+            f"{worst!r} by {found[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}, and to be accurate a"
+        )
+        raise SolveError(Status.BENT, f"{detail} few percent; make it flexible")
 
 
 def _not_small(fields: Fields) -> tuple[str, ...]:

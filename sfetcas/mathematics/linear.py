@@ -5,7 +5,9 @@ Small systems go to LAPACK, larger ones to the solvers that come with CasADi; th
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import io
 
 import casadi as ca
 import numpy as np
@@ -174,6 +176,11 @@ class SparseSolver:
         return _Factors("csparse", self.n, self._row, self._column, self._rows)
 
 
+def _unsaid() -> contextlib.redirect_stderr[io.StringIO]:
+    """Where factors break down: an error or what is left says so, users have no use for CasADi's warning before it."""
+    return contextlib.redirect_stderr(io.StringIO())
+
+
 class Product:
     """Products of sparse matrices of one pattern with blocks of vectors."""
 
@@ -224,7 +231,8 @@ class _Factors:
         # What fails without a word leaves no numbers.
         batch.results[0][...] = np.nan
         try:
-            x[self._order] = batch()[0].reshape(b.T.shape).T
+            with _unsaid():
+                x[self._order] = batch()[0].reshape(b.T.shape).T
         except RuntimeError:
             raise np.linalg.LinAlgError("singular matrix") from None
         return x
@@ -314,7 +322,8 @@ class InertiaSolver:
     def nfact(self, matrix: ca.DM) -> None:
         """Factorise a matrix."""
         try:
-            self._solver.nfact(matrix)
+            with _unsaid():
+                self._solver.nfact(matrix)
         except RuntimeError:
             raise np.linalg.LinAlgError("no factors without pivots") from None
 
@@ -325,6 +334,7 @@ class InertiaSolver:
     def solve(self, matrix: ca.DM, b: ca.DM) -> ca.DM:
         """Solution for the matrix factorised last."""
         try:
-            return self._solver.solve(matrix, b)
+            with _unsaid():
+                return self._solver.solve(matrix, b)
         except RuntimeError:
             raise np.linalg.LinAlgError("no factors without pivots") from None

@@ -95,12 +95,13 @@ def follow(
     *,
     leave: bool = True,
     allowed: Callable[[State, Loading, State, Loading], bool] | None = None,
+    refuse: Callable[[State, Loading], None] | None = None,
 ) -> Followed:
     """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
     With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A step
     that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
-    the way ends.
+    the way ends.  ``refuse`` is shown each state, and raises where there is no sense in going on.
     """
     # In space a whole turn of what is held or driven looks like none: no step may turn it by more than a radian.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
@@ -156,6 +157,8 @@ def follow(
             left.append(trial)
             step = 0.1
         now, done = there, trial
+        if refuse is not None:
+            refuse(now.state, way(done))
         step *= 4.0 if there.second < 0.05 else 2.0
     return Followed(now.state, done >= 1.0, tuple(left))
 
