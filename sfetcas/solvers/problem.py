@@ -520,7 +520,9 @@ class EquilibriumProblem:
         weight, index = self._reduction.weight, self._reduction.index
         q = (held + (weight * x[index]).sum(axis=1)).reshape(len(model.rotations.kind), -1)
         if model.space:
-            q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+            # A quaternion that is zero has no direction: what is not finite is no solution.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                q = q / np.linalg.norm(q, axis=-1, keepdims=True)
         rows = self.rows_of_equations
         wound = model.winding.angles(q, self._wound if near is None else near.wound)
         return State(q, x[self._reduction.unknowns :].copy(), lam[rows], wound)
