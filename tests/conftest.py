@@ -15,7 +15,7 @@ def pytest_addoption(parser):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """What takes seconds, with shorter tests of its kind beside it, runs with --long or where it is asked for by name."""
+    """What takes seconds, with shorter tests of its kind beside it, runs with --long or where it is named."""
     named = {line for line in LONG.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")}
     if any("::" in argument for argument in config.args):
         return
