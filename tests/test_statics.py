@@ -656,3 +656,21 @@ def test_a_name_where_the_scene_has_none_is_refused_in_a_whole_sentence():
     step = solve(made(cantilever())).last
     with pytest.raises(SceneError, match="found spring 'x'; the scene has no spring"):
         step.spring("x")
+
+
+@pytest.mark.parametrize("stiffness", [0.3315, 0.05, 0.7])
+def test_what_next_to_nothing_resists_turns_to_the_nearest_side(stiffness):
+    """A bar on a weak spring goes where the force draws it, not whole turns on, where the spring would hold it too."""
+    force = np.array([8.7818, 12.8141])
+    table = {
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
+        "members": {"b": {"nodes": ["A", "B"], "type": "rigid"}},
+        "springs": {"k": {"type": "rotational", "node": "A", "stiffness": stiffness}},
+        "loads": {"f": {"type": "force", "node": "B", "value": force.tolist()}},
+    }
+    low, high = 0.0, 0.5 * np.pi
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        moment = force[1] * np.cos(middle) - force[0] * np.sin(middle) - stiffness * middle
+        low, high = (middle, high) if moment > 0.0 else (low, middle)
+    assert solve(made(table)).last.angle("A") == pytest.approx(low, abs=1e-9)
