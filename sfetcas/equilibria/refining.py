@@ -18,7 +18,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
-from ..solvers.newton import Corrected, changed_by, loose_rows, named_in, relative_residual
+from ..solvers.newton import TINY, Corrected, changed_by, loose_rows, named_in, relative_residual
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
@@ -332,7 +332,8 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
     SceneError
         Names the motion.
     """
-    if stability.stable != "neutral" or not prepared.diagnosis.mobility:
+    # What rounding hides may be held or free: a note says so.
+    if stability.stable != "neutral" or stability.hidden or not prepared.diagnosis.mobility:
         return
     equations, shape = prepared.equations, np.concatenate([stability.shape, stability.travel])
     inside = (equations.row < equations.unknowns) & (equations.column < equations.unknowns)
@@ -368,7 +369,7 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
     acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
-    needed = carried > most * acting.max(initial=0.0) and carried > np.abs(left).max(initial=0.0)
+    needed = carried > most * acting.max(initial=TINY) and carried > np.abs(left).max(initial=0.0)
     if residual <= SOLVED and not needed:
         corrected = replace(corrected, state=state, point=point, residual=residual)
     elif largest > BEYOND or needed:
