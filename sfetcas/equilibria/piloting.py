@@ -85,6 +85,7 @@ class Piloting(Meshing):
         self.leave = scene.analysis.unstable == "leave"
         self.allowed: Callable[[Prepared], Callable[[State, Loading, State, Loading], bool]] | None = None
         self.started = any(node.start is not None for node in scene.nodes.values())
+        self.small = any(member.type == "small" for member in scene.members.values())
 
     def _found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
@@ -121,8 +122,7 @@ class Piloting(Meshing):
             return self._only_grown(pilot, factor, last)
         grows = self.settings.branch and not self.started
         # Where small members bend beyond sense on the way of the loads, nothing else is tried.
-        small = any(member.type == "small" for member in self.scene.members.values())
-        reached = self._grown(pilot, factor, last) if grows and small else None
+        reached = self._grown(pilot, factor, last) if grows and self.small else None
         alone, failure = self._direct(pilot, loading)
         if not grows:
             return self._accepted(pilot, alone, failure, loading)
@@ -276,12 +276,11 @@ class Piloting(Meshing):
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
         allowed = self.allowed and self.allowed(pilot)
-        small = any(member.type == "small" for member in self.scene.members.values())
 
         def refuse(there: State, loading: Loading) -> None:
             refuse_large(Fields(pilot.equations, there, loading))
 
-        result = follow(pilot, way, state, leave=leave, allowed=allowed, refuse=refuse if small else None)
+        result = follow(pilot, way, state, leave=leave, allowed=allowed, refuse=refuse if self.small else None)
         passed = not result.reached and leave and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.

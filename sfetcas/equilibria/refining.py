@@ -142,7 +142,8 @@ class Refining(Piloting):
         if not pilot.kept:
             # What nothing holds on a coarse mesh no finer one holds.
             _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
-        refuse_large(Fields(pilot.prepared.equations, pilot.corrected.state, pilot.prepared.model.loading(factor)))
+        if self.small:
+            refuse_large(Fields(pilot.prepared.equations, pilot.corrected.state, pilot.prepared.model.loading(factor)))
         if self._prescribed:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh

@@ -16,6 +16,7 @@ __all__ = [
     "DUAL",
     "PROXIMAL",
     "ROUNDING",
+    "TINY",
     "TURN",
     "Corrected",
     "changed_by",

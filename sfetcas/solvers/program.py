@@ -27,6 +27,7 @@ from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, StationarityPlaces, summed
+from .newton import TINY
 
 __all__ = ["Program", "data_of", "is_data"]
 
@@ -467,7 +468,3 @@ def data_of(model: Model) -> dict[str, Array]:
 def is_data(name: str) -> bool:
     """Whether a part of what is given is data, and no load."""
     return name in ("stiffness", "tangent") or name.startswith("data_")
-
-
-TINY = 1e-14
-"""Of the units of the model: where nothing acts and nothing is stiff, less than this is nothing."""

@@ -175,6 +175,15 @@ class StabilityTest:
         """Which shape of equal eigenvalues, and which sign of it."""
         return Sides(self.equations)
 
+    def _all(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array | float] | None:
+        """All eigenvalues and what of them cannot be told from zero; None where factors count them instead."""
+        if self._is_graded(limit):
+            values, _, limits = self._mode_by_mode(point, entries)
+            return values, limits
+        if self._is_dense:
+            return np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]), limit
+        return None
+
     def negative(self, point: Point) -> int:
         """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
         if self._n == 0:
@@ -182,12 +191,10 @@ class StabilityTest:
         point = self.equations.symmetric(point)
         entries = self._weighted(point)
         limit = self._limit(entries)
-        if self._is_graded(limit):
-            values, _, limits = self._mode_by_mode(point, entries)
-            return int((values < -limits).sum())
-        if not self._is_dense:
+        known = self._all(point, entries, limit)
+        if known is None:
             return self._below(point, entries, -limit)
-        return int((np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0]) < -limit).sum())
+        return int((known[0] < -known[1]).sum())
 
     def depth(self, point: Point, near: float = 0.0) -> float:
         """How far eigenvalues are below zero, by ``equations.mass``; zero where none is.
@@ -199,12 +206,10 @@ class StabilityTest:
         point = self.equations.symmetric(point)
         entries = self._weighted(point)
         limit = self._limit(entries)
-        if self._is_graded(limit):
-            values, _, limits = self._mode_by_mode(point, entries)
+        known = self._all(point, entries, limit)
+        if known is not None:
+            values, limits = known
             return -float(values[0]) * self.softest if (values < -limits).any() else 0.0
-        if self._is_dense:
-            values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
-            return -float(values[0]) * self.softest if (values < -limit).any() else 0.0
         if not self._below(point, entries, -limit):
             return 0.0
         deep = max(near / self.softest / DEEPER, limit)
@@ -284,20 +289,17 @@ class StabilityTest:
         point = self.equations.symmetric(point)
         entries = self._weighted(point)
         limit = self._limit(entries)
-        if self._is_graded(limit):
-            values, _, limits = self._mode_by_mode(point, entries)
-            below = int((values < -limits).sum())
-            return Inertia(below, int((values <= limits).sum()) - below)
-        if self._is_bordered and self._n > DENSE:
+        if self._is_bordered and self._n > DENSE and not self._is_graded(limit):
             found = self._counted_apart(point, entries, limit)
             if found is not None:
                 return found
-        if not self._is_dense:
+        known = self._all(point, entries, limit)
+        if known is None:
             below = self._below(point, entries, -limit)
             return Inertia(below, 0) if not doubtful else Inertia(below, self._below(point, entries, limit) - below)
-        values = np.linalg.eigvalsh(self._projected(entries, self._rows(point))[0])
-        below = int((values < -limit).sum())
-        return Inertia(below, int((values <= limit).sum()) - below)
+        values, limits = known
+        below = int((values < -limits).sum())
+        return Inertia(below, int((values <= limits).sum()) - below)
 
     def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
         """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
