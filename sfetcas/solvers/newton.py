@@ -212,7 +212,7 @@ def rounded(equations: Equations, state: State, point: Point) -> bool:
 
 
 def redundant(equations: Equations, point: Point) -> bool:
-    """Whether rows depend on each other where this was asked for the first time."""
+    """Whether rows depend on each other, as far as known: asked at the first state, and at each equilibrium."""
     if equations.redundant is None:
         equations.redundant = bool(loose_rows(equations, point).size)
     return equations.redundant
@@ -222,7 +222,9 @@ def with_sharing(
     equations: Equations, state: State, loading: Loading, point: Point, tolerance: float, *, reactions: bool = False
 ) -> tuple[State, Point]:
     """An equilibrium with redundant multipliers as :func:`~sfetcas.solvers.sharing.shared`, as far as it stays one."""
-    loose = loose_rows(equations, point) if redundant(equations, point) else np.zeros(0)
+    loose = loose_rows(equations, point)
+    # The first state asked may have been a bent one, where no closing is redundant.
+    equations.redundant = equations.redundant or bool(loose.size)
     if not loose.size:
         return state, point
     there = shared(equations, state, loading, loose, reactions=reactions)
@@ -304,6 +306,8 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
     find = _smallest if equations.rows > MANY else _all_singular
     squares, left, largest = find(equations, point)
     small = left[:, squares < ROUGHLY * max(largest, usual)]
+    if not small.size:
+        return small
     # Squares are known to rounding of the largest, and sizes to the root of that: what is small is looked at itself.
     changes, count = changed_by(equations, point, small), small.shape[1]
     _, sizes, right = np.linalg.svd(np.pad(changes, ((0, max(0, count - len(changes))), (0, 0))), full_matrices=False)

@@ -245,7 +245,6 @@ class Prepared:
         loose = loose_rows(self.equations, found.point)
         if not loose.size:
             return found
-        # Where Newton's method began the members may have been bent, and no closing redundant.
         self.equations.redundant = True
         least = self.correct(shared(self.equations, found.state, loading, loose), loading)
         return least if least.converged and self.distance(least.state, found.state) < SAME else found
