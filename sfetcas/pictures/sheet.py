@@ -277,10 +277,7 @@ class Sheet:
 
     def finish(self, *, gravity: float = 0.0) -> None:
         """Fit the axes to all that is drawn, and draw it, with so many times the gravity."""
-        for _ in range(4 if self.axes is self.paper else 6):
-            self.figure.draw_without_rendering()
-            self._fit()
-        self.figure.draw_without_rendering()
+        self._fit_drawn()
         if self.axes is not self.paper:
             self._hide_colliding()
         left_out = len(self._labels()) - len(self._placed([]))
@@ -294,6 +291,24 @@ class Sheet:
         self._tell_left_out(len(self._labels()) - len(placed))
         for label, box in placed:
             self._write(box.centre, label.text, label.colour, label.name)
+
+    def _fit_drawn(self) -> None:
+        """Fit the axes until that changes little, and leave them drawn."""
+        self.figure.draw_without_rendering()
+        if self.axes is self.paper:
+            # Where nothing but limits changes nothing need be drawn; other tick labels change the layout once more.
+            for _ in range(2):
+                for _ in range(4):
+                    self._fit()
+                self.figure.draw_without_rendering()
+            return
+        # Ticks in space stand where they were drawn last; what else is laid out they do not change.
+        layout = self.figure.get_layout_engine()
+        self.figure.set_layout_engine("none")
+        for _ in range(6):
+            self._fit()
+            self.figure.draw_without_rendering()
+        self.figure.set_layout_engine(layout)
 
     def _tell_left_out(self, count: int) -> None:
         text = f"{count} values are not written for lack of room; the largest are" if count else ""
@@ -347,6 +362,7 @@ class Sheet:
         ticks = MaxNLocator(nbins=10, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, max(right - left, 1.2 * (high - low)))
         for axis in (self.axes.xaxis, self.axes.yaxis):
             axis.set_major_locator(MultipleLocator(float(ticks[1] - ticks[0])))
+        self.axes.apply_aspect()
 
     def _fit_space(self, content: Array) -> None:
         cell, renderer = self.paper.get_window_extent(), FigureCanvasAgg(self.figure).get_renderer()  # type: ignore[no-untyped-call]
