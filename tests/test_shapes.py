@@ -26,7 +26,7 @@ def derivative(function, x, h=1e-3):
     return sum(terms) / (60.0 * h)
 
 
-def marched(shape, start, quaternion, steps=3000):
+def marched(shape, start, quaternion, steps=1500):
     """End of a member of given curvature by Runge-Kutta of order four: another route to the same law."""
 
     def rate(x, state):
