@@ -7,7 +7,7 @@ import pytest
 from scenes import made, textbook
 
 import sfetcas
-from sfetcas import SceneError, SolveError
+from sfetcas import SceneError, SolveError, Status, solve
 
 HELD = "neither stiffness nor a load holds it, add a support, a spring or a motion"
 ROUND = f"free to move: members crank, coupler, rocker turning with nodes B, C moving; {HELD}"
@@ -263,3 +263,20 @@ def test_moment_that_drives_a_loop_on_and_on_is_given_up_soon(monkeypatch):
     with pytest.raises(SolveError, match="used up its iterations"):
         sfetcas.solve(made(scene))
     assert len(falls) < 10
+
+
+@pytest.mark.parametrize(("angle", "space"), [(0.3, False), (0.3, True), (-2.0, True)])
+def test_a_clamp_that_cannot_turn_is_named_however_the_solver_ends(angle, space):
+    """A bar straight between clamps at its own length has no other shape; in space IPOPT never noticed by itself."""
+    table = {
+        "sections": {"s": {"EI2": 2.0, "EI3": 1.0, "GJ": 1.5}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0.2, 0.1 if space else 0], "support": "clamped"},
+        },
+        "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+        "motions": {"turned": {"node": "A", "rotation": [0, 0, angle] if space else angle}},
+    }
+    with pytest.raises(SolveError, match=r"motions\.turned asks for more than there is") as info:
+        solve(made(table))
+    assert info.value.status is Status.INFEASIBLE

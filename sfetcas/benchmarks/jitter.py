@@ -170,8 +170,10 @@ def _equilibrium(told: _Told, name: str, step: Equilibrium, how: Jittered, size:
     told.words[f"{name} notes"] = said(step.notes)
     if proof.error_of:
         return
+    inside = 0.0
     for member in step.model.scene.members:
-        places = how.back(step.along(member, PLACES)["position"], 1)
+        along = step.along(member, PLACES)
+        places, inside = how.back(along["position"], 1), max(inside, float(np.abs(along["force"]).max()))
         # Each is right to its estimate; rounding leaves less than a millionth.  Of a neutral family any is right: its
         # energy says whether it is the same one, and places stay near as long as rounding alone moves along it.
         near = ROUGH if proof.stable == "neutral" else error + 1e-6
@@ -179,10 +181,13 @@ def _equilibrium(told: _Told, name: str, step: Equilibrium, how: Jittered, size:
     held = [node for node, entry in step.model.scene.nodes.items() if entry.support != "free"]
     forces = {node: how.back(step.reaction(node)[0], 0, 1) for node in held}
     acts = max((float(np.abs(force).max()) for force in forces.values()), default=0.0)
-    # Forces work on the places that are changed.
+    carried = max(acts, inside / how.force)
+    # Forces, those inside members too, work on the places that are changed.
     energies = np.array([step.energy["elastic"], step.energy["loads"]]) / (how.length * how.force)
     told.add(
-        f"{name} energy", energies, (error + 1e-6) * float(np.abs(energies).sum()) + 10.0 ** (MOST + 1.0) * acts * size
+        f"{name} energy",
+        energies,
+        (error + 1e-6) * float(np.abs(energies).sum()) + 10.0 ** (MOST + 1.0) * carried * size,
     )
     for node, force in forces.items():
         told.add(f"{name} reactions.{node}", force, ROUGH * acts + 1e-6)

@@ -12,13 +12,13 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import blurred
 from ..mechanics.accuracy import every_other, roughness
-from ..mechanics.equations import Equations, Point, State
+from ..mechanics.equations import State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
-from ..solvers.newton import TINY, Corrected, changed_by, loose_rows, named_in, relative_residual
+from ..solvers.newton import TINY, Corrected, loose_rows, named_in, relative_residual, stretched
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
@@ -77,15 +77,8 @@ UNBALANCED = 0.01
 CARRIED = 1e-6
 """The same of multipliers that are large: rounding of what hardly acts is far less."""
 
-NEARLY = 1e-3
-"""Share of the largest singular value of the closings below which members may be on their way to being stretched."""
-
 LARGE = 1e3
 """Multipliers over the loads above which that is looked at."""
-
-GROWING = 0.01
-"""Share by which closing them would change rows that nearly vanish, from which on it makes them vanish."""
-
 
 ESCAPED = "along its escape shape"
 """What notes say of unstable states that were left."""
@@ -358,9 +351,9 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     loose = loose_rows(equations, corrected.point)
     largest = multipliers(found)
     if not loose.size:
-        nearly = loose_rows(equations, corrected.point, NEARLY) if largest > LARGE else loose
-        if nearly.size and _grow(equations, corrected.point, nearly):
-            raise _stretched(equations, nearly, corrected)
+        told = stretched(equations, corrected.point) if largest > LARGE else ""
+        if told:
+            raise SolveError(Status.STRETCHED, told, corrected.state)
         return found
     state = shared(equations, corrected.state, loading, loose, reactions=True)
     point = equations.at(state, loading)
@@ -374,25 +367,9 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     if residual <= SOLVED and not needed:
         corrected = replace(corrected, state=state, point=point, residual=residual)
     elif largest > BEYOND or needed:
-        raise _stretched(equations, loose, corrected)
+        raise SolveError(Status.STRETCHED, stretched(equations, corrected.point, loose), corrected.state)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
         note = "reactions are not unique, one set of many is given"
     note += f"; redundant: {named_in(equations, loose)}"
     return replace(found, corrected=corrected, notes=(*found.notes, note))
-
-
-def _grow(equations: Equations, point: Point, nearly: Array) -> bool:
-    """Whether the multipliers of rows that nearly vanish have no end.
-
-    To close what is left of the closings by rows of the size s takes a step (left / s) that changes s itself by as
-    much: beside s only where the rows vanish at the closed state.
-    """
-    sizes = np.linalg.norm(changed_by(equations, point, nearly), axis=0)
-    return bool((np.abs(nearly.T @ point.residual[equations.unknowns :]) > GROWING * sizes**2).any())
-
-
-def _stretched(equations: Equations, loose: Array, corrected: Corrected) -> SolveError:
-    """What is said of members that no finite force holds straight."""
-    detail = "fully stretched between held points, where an inextensible member takes any force: "
-    return SolveError(Status.STRETCHED, detail + named_in(equations, loose), corrected.state)

@@ -471,9 +471,15 @@ def _located(cuts: Array, x: Array) -> tuple[Any, Array]:
 
 
 def _per_place(xi: Array, rows: Any) -> Array:
-    """Rows of a matrix for places that often repeat."""
+    """Rows of a matrix for places that, where they are many, often repeat."""
+    if len(xi) < FEW:
+        return np.asarray(rows(xi))
     places, inverse = np.unique(xi, return_inverse=True)
     return np.asarray(rows(places)[inverse])
+
+
+FEW = 8
+"""Places up to which looking for equal ones costs more than it saves."""
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -10,7 +10,7 @@ from ..mechanics.loading import Loading
 from .arclength import Curve, Standing, Tangent
 from .continuation import follow
 from .deflation import nearest
-from .newton import Corrected, loose_rows, named_in
+from .newton import Corrected, loose_rows, named_in, stretched
 from .prepared import Prepared
 from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
@@ -115,6 +115,4 @@ def check_slack(curve: Curve, traced: Traced) -> None:
     loose = loose_rows(equations, first.point)
     loads = max(float(np.abs(part).max(initial=0.0)) for part in (last.loading.force, last.loading.pull))
     if loose.size and loads > 0.0 and np.abs(last.state.lam).max() > TAUT * loads:
-        detail = "fully stretched between held points, where an inextensible member takes any force: "
-        detail += named_in(equations, loose)
-        raise SolveError(Status.STRETCHED, detail, last.state)
+        raise SolveError(Status.STRETCHED, stretched(equations, last.point, loose), last.state)

@@ -29,6 +29,7 @@ __all__ = [
     "relative_residual",
     "rounded",
     "rows_in",
+    "stretched",
     "with_sharing",
 ]
 
@@ -381,6 +382,29 @@ def named_in(equations: Equations, loose: Array) -> str:
     """Their names."""
     return ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
 
+
+def stretched(equations: Equations, point: Point, loose: Array | None = None) -> str:
+    """What is said of members that no finite force holds straight; empty where rows do not vanish.
+
+    ``loose`` are combinations of rows that are known to.  Else those that nearly vanish are asked whether their
+    multipliers have no end: to close what is left of the closings by rows of the size s takes a step (left / s) that
+    changes s itself by as much, beside s only where the rows vanish at the closed state.
+    """
+    if loose is None:
+        nearly = loose_rows(equations, point, NEARLY)
+        sizes = np.linalg.norm(changed_by(equations, point, nearly), axis=0)
+        growing = np.abs(nearly.T @ point.residual[equations.unknowns :]) > GROWING * sizes**2
+        loose = nearly if growing.any() else nearly[:, :0]
+    return FULLY + named_in(equations, loose) if loose.size else ""
+
+
+FULLY = "fully stretched between held points, where an inextensible member takes any force: "
+
+NEARLY = 1e-3
+"""Share of the largest singular value of the closings below which members may be on their way to being stretched."""
+
+GROWING = 0.01
+"""Share by which closing them would change rows that nearly vanish, from which on it makes them vanish."""
 
 SLACK = 1e-6
 """Singular values of the closings below this share of the largest: no slack to first order."""

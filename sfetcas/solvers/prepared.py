@@ -25,7 +25,7 @@ from .doctor import Diagnosis, contradiction, diagnose, free_motions
 from .downhill import flow
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
-from .newton import Corrected, correct, loose_rows
+from .newton import Corrected, correct, loose_rows, stretched
 from .problem import EquilibriumProblem
 from .program import Program
 from .sharing import shared
@@ -229,10 +229,14 @@ class Prepared:
             detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if result.status is Status.SOLVED:
                 detail = f"IPOPT came to rest after {counted(result.iterations, 'iteration')}"
-            if status is Status.FAILED:
-                detail += f"; Newton's method left a residual of {polished.residual:.1e}"
-            told = contradiction(self.equations, trial, loading) if status is Status.INFEASIBLE else ""
-            detail += f"; {told}" if told else ""
+            # What IPOPT notices of closings that cannot be, or only by members drawn straight, hangs on rounding.
+            told = contradiction(self.equations, state, loading)
+            if told:
+                status, detail = Status.INFEASIBLE, f"{detail}; {told}"
+            elif status is Status.FAILED:
+                told = stretched(self.equations, polished.point)
+                left = f"{detail}; Newton's method left a residual of {polished.residual:.1e}"
+                status, detail = (Status.STRETCHED, told) if told else (status, left)
             raise SolveError(status, detail, trial)
         return self._without_prestress(polished, loading), result.iterations
 
