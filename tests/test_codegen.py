@@ -27,7 +27,7 @@ PROBLEMS = Path(__file__).parent.parent / "problems"
 STATIC = [
     file for file in sorted(PROBLEMS.glob("*.toml")) if load(file).analysis.type == "static" and not load(file).contacts
 ]
-FLAGS = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
+FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
 
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
 
@@ -262,7 +262,7 @@ def test_example_reads_arguments_and_prints(folder):
 @needs_compiler
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs a C++ compiler")
 def test_cpp_takes_it(folder):
-    flags = ["-x", "c++", "-O1", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
+    flags = ["-x", "c++", "-O0", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
     assert "agree" in said(built(folder, "strip", flags=flags, compiler="g++"))
 
 
@@ -273,7 +273,7 @@ def test_clang_takes_it(folder):
 
 @needs_compiler
 def test_sanitizers_are_silent(folder):
-    flags = ["-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    flags = ["-std=c99", "-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     assert "agree" in said(built(folder, "strip", flags=flags))
 
 
@@ -327,7 +327,7 @@ def test_two_exports_in_one_program(folder, tmp_path):
     (tmp_path / "both.c").write_text(text)
     files = [str(tmp_path / "both.c"), str(folder / "strip.c"), str(other / "second.c")]
     out = tmp_path / "both"
-    command = ["gcc", "-std=c99", "-O1", f"-I{folder}", f"-I{other}", "-o", str(out), *files, "-lm"]
+    command = ["gcc", "-std=c99", "-O0", f"-I{folder}", f"-I{other}", "-o", str(out), *files, "-lm"]
     subprocess.run(command, check=True)
     assert said(out).startswith("0 an equilibrium")
 
@@ -693,7 +693,7 @@ def test_programs_that_are_none(name, options, sentence, tmp_path):
 @needs_compiler
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="needs valgrind")
 def test_valgrind_is_silent(folder):
-    program = built(folder, "strip", flags=["-std=c99", "-O1", "-g"])
+    program = built(folder, "strip", flags=["-std=c99", "-O0", "-g"])
     command = ["valgrind", "--error-exitcode=9", "--leak-check=full", "--quiet", str(program)]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr

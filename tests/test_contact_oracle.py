@@ -113,9 +113,9 @@ def test_what_a_chain_does_not_know_is_refused(change):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_random_scenes_start_clear_of_their_obstacles(family):
     """At least one obstacle each, most of them touched; the same seed gives the same scene."""
-    scenes = [contact_scene(family, seed) for seed in range(3)]
+    scenes = [contact_scene(family, seed) for seed in range(2)]
     assert all(scene["contacts"] for scene in scenes)
-    assert scenes == [contact_scene(family, seed) for seed in range(3)]
+    assert scenes == [contact_scene(family, seed) for seed in range(2)]
 
 
 def test_contact_is_judged(capsys):
