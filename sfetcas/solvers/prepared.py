@@ -232,7 +232,7 @@ class Prepared:
             # What IPOPT notices of closings that cannot be, or only by members drawn straight, hangs on rounding.
             told = contradiction(self.equations, state, loading)
             if told:
-                status, detail = Status.INFEASIBLE, f"{detail}; {told}"
+                status, detail = Status.INFEASIBLE, told
             elif status is Status.FAILED:
                 told = stretched(self.equations, polished.point)
                 left = f"{detail}; Newton's method left a residual of {polished.residual:.1e}"
