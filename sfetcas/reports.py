@@ -12,6 +12,7 @@ from .description.records import counted
 from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium
+from .mathematics.arrays import first_of_largest
 from .mechanics.model import Model
 from .paths.path import Branch, FlutterPoint
 from .paths.path import Path as Course
@@ -131,7 +132,7 @@ def _report_largest(motion: Trajectory) -> None:
     kinds += [("largest reaction", "at", tuple(held), forces, "N")] if held else []
     for what, kind, names, values, unit in kinds:
         table = np.array(values)
-        i, k = np.unravel_index(int(table.argmax()), table.shape)
+        i, k = np.unravel_index(first_of_largest(table.ravel()), table.shape)
         if table[i, k] > 0.0:
             print(f"  {what}: {kind} {names[i]}, {table[i, k]:.6g} {unit} at {motion.times[k]:.6g} s")
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..description.obstacles import members_of, obstacle, takes_part
 from ..description.scene import Scene
 from ..errors import SolveError, Status
+from ..mathematics.arrays import first_of_largest
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import SAME, Touch
 from ..mechanics.model import Model
@@ -179,7 +180,8 @@ class Reviser:
         gaps = touched.inside(way.offsets, self.sides, self.limit * self.scene.size, self.noise * self.scene.size)
         if not gaps:
             return self._lifted(held)
-        return self.numbered(self._with(held, min(gaps, key=lambda gap: gap.depth)))
+        deepest = first_of_largest(np.minimum([gap.depth for gap in gaps], 0.0))
+        return self.numbered(self._with(held, gaps[deepest]))
 
     def _loosened(self, held: Held, touch: Touch, loose: Loose) -> list[Touch]:
         """A stretch with an end that cannot lie there: shorter, or longer where the next member is pressed as well."""

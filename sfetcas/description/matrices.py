@@ -16,6 +16,7 @@ from pydantic import BeforeValidator
 
 from ..errors import SceneError
 from ..files import UnreadableError, read_file
+from ..mathematics.arrays import first_of_largest
 from .records import enumerated, say
 
 __all__ = [
@@ -211,7 +212,7 @@ def _check_symmetric(matrix: Floats, nodes: int, key: str) -> None:
         raise SceneError(message, (key,))
     gap = np.abs(matrix - matrix.T)
     if gap.max() > SAME * np.abs(matrix).max():
-        i, j = np.unravel_index(int(gap.argmax()), gap.shape)
+        i, j = np.unravel_index(first_of_largest(gap.ravel()), gap.shape)
         found = f"entry {i + 1}, {j + 1} is {matrix[i, j]:g} and entry {j + 1}, {i + 1} is {matrix[j, i]:g}"
         raise SceneError(f"is not symmetric: {found}", (key,))
 
@@ -284,7 +285,7 @@ def check_inertia(matrix: ArrayLike, rest: Floats) -> None:
     turning = block[:3, 3:]
     one_sided = np.abs(turning + turning.T)
     if one_sided.max() > 1e-6 * max(mass, float(np.abs(turning).max())):
-        i, j = np.unravel_index(int(one_sided.argmax()), (3, 3))
+        i, j = np.unravel_index(first_of_largest(one_sided.ravel()), (3, 3))
         message = f"has no centre of mass: turning about {AXES[j]} has momentum along {AXES[i]} that no centre gives"
         raise SceneError(message, ("mass",))
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from ..errors import SceneError
+from ..mathematics.arrays import first_of_largest
 from ..mathematics.curves import (
     FORWARD,
     POINTS,
@@ -362,7 +363,7 @@ def _quaternion(turn: Floats) -> Floats:
             [d - b, c + g, f + h, 1.0 - a - e + i],
         ]
     )
-    return _unit(rows[np.argmax(np.diag(rows))])
+    return _unit(rows[first_of_largest(np.diag(rows))])
 
 
 # One function a shape: length and curve

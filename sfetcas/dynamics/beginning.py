@@ -13,7 +13,7 @@ from ..equilibria import statics, stops
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import rotations_along
 from ..mechanics.model import Model
@@ -192,7 +192,9 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
     rates = rates - rest @ np.linalg.lstsq(root @ rest, root @ rates, rcond=None)[0]
     missed = rows @ rates - wanted
     largest = float(np.abs(wanted).max())
-    worst = int(np.abs(missed).argmax())
+    # Of those that are missed alike the one that asks for most.
+    alike = np.flatnonzero(np.abs(missed) >= (1.0 - 1e-6) * np.abs(missed).max())
+    worst = int(alike[first_of_largest(wanted[alike])])
     share = float(np.abs(missed[worst])) / largest
     joints = float(np.abs(held @ rates).max(initial=0.0)) / largest
     if max(share, joints) > CONTRADICTION:
@@ -224,7 +226,7 @@ TOLD = 1e-9
 
 
 def _open_row(model: Model, gaps: Array) -> str:
-    return f" ({model.row_names[int(np.abs(gaps).argmax())]})"
+    return f" ({model.row_names[first_of_largest(gaps)]})"
 
 
 def _given(system: StageEquations, equations: Equations, state: State) -> tuple[Array, Array, list[tuple[str, ...]]]:

@@ -13,7 +13,7 @@ from ..contact.touches import answers
 from ..description.records import counted, nearest, plain
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
 from ..mechanics.balance import SpringState
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import Fields
@@ -353,7 +353,7 @@ def refuse_large(fields: Fields) -> None:
         Naming the one that bends most.
     """
     found = {name: fields.bent(name) for name, m in fields.model.scene.members.items() if m.type == "small"}
-    worst = max(found, key=lambda name: found[name], default="")
+    worst = [*found, ""][first_of_largest(np.array([*found.values(), 0.0]))]
     if found.get(worst, 0.0) > LARGE:
         detail = (
             f"{worst!r} by {found[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}, and to be accurate a"

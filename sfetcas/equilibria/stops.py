@@ -7,8 +7,13 @@ multiplier is what the stop does.
 
 from __future__ import annotations
 
+from typing import TypeVar
+
+import numpy as np
+
 from ..description.scene import Scene
 from ..errors import SceneError, SolveError, Status
+from ..mathematics.arrays import first_of_largest
 from .solution import Equilibrium, Solution, at_factor
 from .statics import Settings, solve
 
@@ -16,6 +21,8 @@ __all__ = ["solve_stopped"]
 
 Stops = tuple[tuple[str, str], ...]
 """Springs that stand at a stop: name, and low or high."""
+
+T = TypeVar("T")
 
 
 def solve_stopped(scene: Scene, settings: Settings) -> Solution:
@@ -65,7 +72,7 @@ def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
     scene, held = answer.model.scene, dict(stops)
     pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops}
     if pulls and max(pulls.values()) > 0.0:
-        worst = max(pulls, key=lambda name: pulls[name])
+        worst = _first_of_most(pulls)
         return tuple(stop for stop in stops if stop[0] != worst)
     passed: dict[tuple[str, str], float] = {}
     for name, spring in scene.springs.items():
@@ -73,8 +80,13 @@ def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
             travel, (low, high) = answer.spring(name).travel, spring.stop
             passed[name, "low"], passed[name, "high"] = low - travel, travel - high
     if passed and max(passed.values()) > 0.0:
-        return (*stops, max(passed, key=lambda stop: passed[stop]))
+        return (*stops, _first_of_most(passed))
     return stops
+
+
+def _first_of_most(found: dict[T, float]) -> T:
+    """The name of the largest number above zero; of those that a symmetry makes the same the first in the scene."""
+    return list(found)[first_of_largest(np.maximum(list(found.values()), 0.0))]
 
 
 def _pull(effort: float, side: str) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.sections import breaks as kinks
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried
 
 __all__ = ["SAME", "Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
@@ -162,9 +162,9 @@ def _divided(breaks: Array, elements: int) -> Array:
     lengths = np.diff(breaks)
     counts = np.maximum(1, np.floor(lengths * elements + 0.5).astype(int))
     while counts.sum() > elements and (counts > 1).any():
-        counts[np.argmin(np.where(counts > 1, lengths / counts, np.inf))] -= 1
+        counts[first_of_largest(np.where(counts > 1, counts / lengths, 0.0))] -= 1
     while counts.sum() < elements:
-        counts[np.argmax(lengths / counts)] += 1
+        counts[first_of_largest(lengths / counts)] += 1
     stretches = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks, breaks[1:], counts, strict=False)]
     return np.concatenate([*stretches, [1.0]])
 
