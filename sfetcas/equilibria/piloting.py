@@ -62,6 +62,12 @@ CRITICAL = (
     f"that come no closer; {SHARED}"
 )
 
+SMALL_SHARES = 0.01, 0.03, 0.1
+"""Of the loads, one after the other until one puts what has no place of its own somewhere: from there they grow.
+
+Beside the stiffness of beams the smallest is the least well conditioned.
+"""
+
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
@@ -137,7 +143,9 @@ class Piloting(Meshing):
         if alone is not None:
             reached.iterations = alone.iterations
             apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
-            if apart and not reached.notes and alone.stability.negative == 0:
+            # What falls from its start guess is nearest to no minimum.
+            held = pilot.diagnosis.mobility == 0
+            if held and apart and not reached.notes and alone.stability.negative == 0:
                 reached.notes += (
                     "the loads growing from zero lead here, not to the minimum nearest to the start guess",
                 )
@@ -179,7 +187,7 @@ class Piloting(Meshing):
         if self.scene.histories or not pilot.countable:
             return None
         zero = pilot.equations.start(pilot.model.loading(0.0, 0.0))
-        for share, notes in ((0.01, ()), (1.0, (CARRIED,))):
+        for share, notes in ((SMALL_SHARES[0], ()), (1.0, (CARRIED,))):
             begin = share * factor
             there = pilot.downhill(zero, pilot.model.loading(begin))
             if there is None:
@@ -260,8 +268,11 @@ class Piloting(Meshing):
 
     def _grown_from_bent(self, pilot: Prepared, factor: float) -> Found | None:
         """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
-        begin = 0.01 * factor
-        bent, _ = self._direct(pilot, pilot.model.loading(begin))
+        for share in SMALL_SHARES:
+            begin = share * factor
+            bent, _ = self._direct(pilot, pilot.model.loading(begin))
+            if bent is not None:
+                break
         if bent is None:
             return None
         state = bent.corrected.state

@@ -133,6 +133,9 @@ class Refining(Piloting):
 
     def _refined(self, pilot: Found, factor: float) -> Equilibrium:
         if not pilot.kept:
+            if multipliers(pilot) > BEYOND:
+                # What no finite force holds straight may look balanced, by rounding, and free along the rest.
+                _with_unique_reactions(pilot, pilot.prepared.model.loading(factor))
             # What nothing holds on a coarse mesh no finer one holds.
             _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
         if self.small:

@@ -129,14 +129,16 @@ def follow(
                 break
             step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
             continue
-        if not good:
+        unstable = _unstable(prepared, there) if good and leave else 0
+        if not good or unstable is None:
             if done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far:
                 # No step moves the state any more, and something is out of balance, in a short step as in a long one.
                 break
             if step > max(SHORTEST * done, TINY):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
                 continue
-            if not leave:
+            # What is no equilibrium has no escape shape, whatever a first step balances to rounding.
+            if not leave or not now.converged:
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
             snapped = _left(prepared, now, way(trial))
@@ -146,7 +148,7 @@ def follow(
             left.append(done)
             done, step = trial, 0.1
             continue
-        if leave and prepared.negative(there) > 0:
+        if unstable > 0:
             if trial - done > NARROW * done:
                 step = 0.5 * (trial - done)
                 continue
@@ -161,6 +163,14 @@ def follow(
             refuse(now.state, way(done))
         step *= 4.0 if there.second < 0.05 else 2.0
     return Followed(now.state, done >= 1.0, tuple(left))
+
+
+def _unstable(prepared: Prepared, found: Corrected) -> int | None:
+    """Negative eigenvalues; None where forces without bound meet closings that no unknown changes, by rounding."""
+    try:
+        return prepared.negative(found)
+    except SolveError:
+        return None
 
 
 def _left(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:

@@ -275,7 +275,11 @@ class Prepared:
 
         Its tangent has no eigenvalue with a real part below zero.
         """
-        there, steps = flow(self.equations, state, loading, self._tester.depth)
+        try:
+            there, steps = flow(self.equations, state, loading, self._tester.depth)
+        except SolveError:
+            # Nothing rests where forces without bound act.
+            return None
         self._spent += steps
         found = None if there is None else self.correct(there, loading)
         return found if found is not None and found.converged else None
