@@ -199,7 +199,7 @@ def said(notes: Sequence[str]) -> tuple[str, ...]:
     A joint of several members is called by the first of them in the file: of redundant rows no names are compared.
     """
     kept = [NUMBER.sub("#", note.partition("redundant:")[0]) for note in notes]
-    return tuple(sorted({" ".join(sorted(set(re.split(r"[\s,;:]+", note)))) for note in kept}))
+    return tuple(sorted({" ".join(sorted(set(re.split(r"[\s,;:()]+", note)))) for note in kept}))
 
 
 def differences(scene: Scene, change: Jittered, answer: Answer | str | None = None) -> list[str]:

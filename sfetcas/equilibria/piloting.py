@@ -145,7 +145,8 @@ class Piloting(Meshing):
             apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
             # What falls from its start guess is nearest to no minimum.
             held = pilot.diagnosis.mobility == 0
-            if held and apart and not reached.notes and alone.stability.negative == 0:
+            told = held and multipliers(alone) <= BEYOND and not reached.notes
+            if told and apart and alone.stability.negative == 0:
                 reached.notes += (
                     "the loads growing from zero lead here, not to the minimum nearest to the start guess",
                 )

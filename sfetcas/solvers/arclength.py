@@ -22,7 +22,7 @@ from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from .deflation import turned_between
 from .neutral import Neutral
-from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, redundant, relative_residual, rounded, with_sharing
+from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, met, redundant, relative_residual, rounded, with_sharing
 from .prepared import Prepared
 from .sharing import shared
 from .stability import LIGHT, NEUTRAL, Inertia
@@ -300,7 +300,7 @@ class Curve:
         row = self.weight * across.z
         loading = self.loading(factor)
         state = self.held(state, loading)
-        point = _balanced(equations.at(state, loading), neutral)
+        point = _balanced(met(equations, equations.at(state, loading)), neutral)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
         for count in range(ITERATIONS):
             if count and (residual <= ROUNDING if sharp else self._passes(point, residual)):
@@ -328,7 +328,7 @@ class Curve:
             last = length
             loading = self.loading(factor + change)
             trial = self.held(equations.moved(state, step), loading)
-            there = _balanced(equations.at(trial, loading), neutral)
+            there = _balanced(met(equations, equations.at(trial, loading)), neutral)
             gained = relative_residual(equations, there)
             still = count and gained > 0.25 * residual
             if still and (residual <= TOLERANCE or rounded(equations, state, point)):
@@ -340,7 +340,7 @@ class Curve:
         if not good and not rounded(equations, state, point):
             return None
         loading = self.loading(factor)
-        point = point if neutral is None else equations.at(state, loading)
+        point = equations.at(state, loading) if equations.redundant or neutral is not None else point
         state, point = with_sharing(equations, state, loading, point, max(residual, TOLERANCE))
         tangent, doubtful = self.tangent(state, factor, point, across)
         return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)

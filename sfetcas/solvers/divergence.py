@@ -18,7 +18,8 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point
-from .stability import LIGHT, NEUTRAL, RANK, ROUNDING, Inertia, Stability
+from .newton import independent
+from .stability import LIGHT, NEUTRAL, ROUNDING, Inertia, Stability
 
 __all__ = ["TangentTest"]
 
@@ -56,8 +57,8 @@ class TangentTest:
         h /= np.outer(self._root, self._root)
         largest, free = float(np.abs(h).max(initial=0.0)), n
         if len(rows):
-            _, sizes, right = np.linalg.svd(rows / self._root, full_matrices=False)
-            across = right[sizes > RANK * sizes.max(initial=0.0)]
+            rows = independent(equations, point, np.eye(len(rows))).T @ rows / self._root
+            across = np.linalg.qr(rows.T)[0].T
             free -= len(across)
             before, after = across @ h, h @ across.T
             inner = before @ across.T + (largest + 1.0) * np.eye(len(across))

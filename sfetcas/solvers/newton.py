@@ -22,7 +22,9 @@ __all__ = [
     "changed_by",
     "correct",
     "descend",
+    "independent",
     "loose_rows",
+    "met",
     "named_in",
     "newton_step",
     "redundant",
@@ -130,7 +132,7 @@ def correct(
     """
 
     def dragged(state: State) -> Point:
-        point = equations.at(state, loading)
+        point = met(equations, equations.at(state, loading))
         return point if drag is None else drag(state, point)
 
     state = equations.holding(state, loading)
@@ -183,12 +185,13 @@ def correct(
         # Rounding may leave a little more where multipliers are shared.
         tolerance = min(FLOOR, 4.0 * residual)
     second = 0.0 if second == np.inf else second
-    if drag is not None:
+    converged = residual <= tolerance
+    if drag is not None or equations.redundant:
         point = equations.at(state, loading)
-    elif residual <= tolerance:
+    if drag is None and converged:
         state, point = with_sharing(equations, state, loading, point, tolerance)
         residual = relative_residual(equations, point)
-    return Corrected(state, point, residual <= tolerance, count, first, second, residual)
+    return Corrected(state, point, converged, count, first, second, residual)
 
 
 FLOOR = 1e-9
@@ -230,7 +233,27 @@ def with_sharing(
         return state, point
     there = shared(equations, state, loading, loose, reactions=reactions)
     found = equations.at(there, loading)
-    return (there, found) if relative_residual(equations, found) <= tolerance else (state, point)
+    return (there, found) if relative_residual(equations, met(equations, found)) <= tolerance else (state, point)
+
+
+def met(equations: Equations, point: Point) -> Point:
+    """The point without the gaps of redundant closings that no unknown closes, where they are as good as closed.
+
+    Places in a scene have so many digits: the third of three parallel links fits to these, and moves with the others.
+    """
+    if not redundant(equations, point):
+        return point
+    loose = loose_rows(equations, point)
+    gaps = loose @ (loose.T @ point.residual[equations.unknowns :])
+    if not loose.size or not np.linalg.norm(gaps) <= MET:
+        return point
+    residual = point.residual.copy()
+    residual[equations.unknowns :] -= gaps
+    return replace(point, residual=residual)
+
+
+MET = 1e-9
+"""Gaps of redundant closings below this, in lengths of the scene or rad, are closed."""
 
 
 def _balanced(equations: Equations, point: Point) -> bool:
@@ -313,6 +336,13 @@ def loose_rows(equations: Equations, point: Point, slack: float | None = None) -
     changes, count = changed_by(equations, point, small), small.shape[1]
     _, sizes, right = np.linalg.svd(np.pad(changes, ((0, max(0, count - len(changes))), (0, 0))), full_matrices=False)
     return np.asarray(small @ right[sizes < slack * np.sqrt(max(largest, usual))].T)
+
+
+def independent(equations: Equations, point: Point, among: Array) -> Array:
+    """Of a space of combinations of rows, orthonormal columns (rows, n), what has no part in loose ones: (rows, m)."""
+    inside = among.T @ loose_rows(equations, point)
+    across = np.linalg.qr(inside, mode="complete")[0][:, inside.shape[1] :]
+    return np.asarray(among @ across)
 
 
 def changed_by(equations: Equations, point: Point, ways: Array) -> Array:

@@ -25,9 +25,10 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import InertiaSolver, Product, SparseSolver, blurred, pattern
 from ..mechanics.equations import Equations, Point
+from .newton import independent
 from .sides import Sides, alike
 
-__all__ = ["LIGHT", "NEUTRAL", "RANK", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
+__all__ = ["LIGHT", "NEUTRAL", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
 
 NEUTRAL = 1e-7
 """Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
@@ -135,11 +136,11 @@ class StabilityTest:
         return softest / model.scales.moment * model.scales.length
 
     def _rows(self, point: Point) -> Array:
-        """The closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
+        """The independent closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
         equations = self.equations
         rows = np.zeros((equations.rows, self._n))
         rows[equations.row[self._in_a] - equations.unknowns, self._a_column] = point.entries[self._in_a]
-        return (self._combine.T @ rows) / np.sqrt(self._weights)
+        return (independent(equations, point, self._combine).T @ rows) / np.sqrt(self._weights)
 
     def _weighted(self, point: Point) -> Array:
         root = np.sqrt(self._weights)
@@ -328,8 +329,7 @@ class StabilityTest:
         h[self._h_row, self._h_column] = entries
         if not len(rows):
             return h, np.eye(self._n)
-        _, sizes, right = np.linalg.svd(rows)
-        basis = right[int((sizes > RANK * sizes.max(initial=0.0)).sum()) :].T
+        basis = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
         return basis.T @ h @ basis, basis
 
     def _dense(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array, int]:
@@ -383,7 +383,7 @@ class StabilityTest:
             return self._ldl.neig(matrix)
         schur = rows @ self._ldl.solve(matrix, ca.DM(rows.T)).full()
         values = np.linalg.eigvalsh(0.5 * (schur + schur.T))
-        return self._ldl.neig(matrix) - int((values < -REDUNDANT * np.abs(values).max()).sum())
+        return self._ldl.neig(matrix) - int((values < 0.0).sum())
 
     def _below_bordered(self, point: Point, shift: float) -> int:
         """The same from the whole Newton matrix, with closings and displacements very slightly soft.
@@ -546,14 +546,8 @@ FULL = 600
 BROKEN = 1e-2
 """Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
 
-REDUNDANT = 1e-13
-"""Eigenvalues of the closings' complement below this, relative to the largest, come of redundant ones: rounding.
-
-A neutral direction shifted by 1e-7 leaves 1e-8 there, while the largest may be 1e3 and more.
-"""
-
 RANK = 1e-10
-"""Singular values below this, relative to the largest, are zero."""
+"""Directions of slides whose singular values are below this, relative to the largest, are one."""
 
 
 def _left_null_space(equations: Equations) -> Array:
