@@ -29,7 +29,35 @@ def pressed(space=False, supports=("clamped", "clamped"), force=60.0, **more):
     )
 
 
+def bar_on_springs():
+    """A bar on equal springs along three axes at both ends: frequencies of shapes in which nothing turns are equal."""
+    return made(
+        {
+            "dimension": "space",
+            "nodes": {
+                "A": {"position": [0, 0, 0], "mass": 1.0, "inertia": [1, 1, 1]},
+                "B": {"position": [1, 0, 0], "mass": 1.0},
+            },
+            "members": {"m": {"nodes": ["A", "B"], "type": "rigid"}},
+            "springs": {
+                f"{node}{i}": {
+                    "type": "translational",
+                    "node": node,
+                    "stiffness": 2.0,
+                    "direction": np.eye(3)[i].tolist(),
+                }
+                for node in "AB"
+                for i in range(3)
+            },
+            "analysis": {"type": "modes", "modes": 4},
+        }
+    )
+
+
 SCENES = {
+    "bar on equal springs": bar_on_springs(),
+    "mechanism that falls far": random_scene(229),
+    "motion that asks for what there is not": random_scene(258),
     "symmetric column": pressed(),
     "round column in space": pressed(space=True),
     "plane, random": random_scene(2010),

@@ -4,7 +4,8 @@ An eigenvector has no sign, and of eigenvalues that are the same no single vecto
 space of shapes comes nearest to fields that the scene names: rotations about the ``b3`` of the sections at the first
 ends of members (about z in the plane), which die away along each member from its first node, and count less the later
 a member's name stands in the alphabet.  No symmetry of a structure keeps such a field.  Where next to nothing of the
-shapes is in it, fields that die away more slowly are asked, then those about ``b2`` and ``b1``.
+shapes is in it, fields that die away more slowly are asked, then those about ``b2`` and ``b1``.  Of shapes in which
+nothing turns the displacements of nodes along the same directions are asked.
 
 Neither the order of a scene file, nor axes or units, nor rounding change what is taken.
 """
@@ -16,7 +17,7 @@ import functools
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, first_of_largest
+from ..mathematics.arrays import Array, Index, first_of_largest
 from ..mechanics.equations import Equations
 from ..mechanics.rotations import Turn
 
@@ -31,6 +32,9 @@ TINY = 1e-9
 LEAST = 1e-3
 """Share of a field that shapes have at least: symmetry leaves none of it, and rounding 1e-10."""
 
+TURNING = 1e-6
+"""Rotations, rad, beside displacements in lengths of the scene, below which nothing turns."""
+
 FADING = 0.125
 """Share of a field beside the one before it where all are one."""
 
@@ -39,10 +43,18 @@ ALIKE = 1e-6
 
 
 class Sides:
-    """The rule for one model."""
+    """The rule for one model.
 
-    def __init__(self, equations: Equations) -> None:
+    Parameters
+    ----------
+    equations : Equations
+    travels : ndarray, optional
+        Numbers of the displacements that stand after the turning unknowns in shapes, without it all of them.
+    """
+
+    def __init__(self, equations: Equations, travels: Index | None = None) -> None:
         self._equations = equations
+        self._travels = slice(equations.turning_unknowns, equations.unknowns) if travels is None else travels
 
     @functools.cached_property
     def fields(self) -> tuple[Array, ...]:
@@ -74,6 +86,23 @@ class Sides:
                 used = equations.number >= 0
                 field[equations.number[used]] = values[used]
                 found.append(field)
+        return tuple(found)
+
+    @functools.cached_property
+    def displacing(self) -> tuple[Array, ...]:
+        """The same of displacements, (unknowns,): nodes move along the sections of the first member at each."""
+        equations, model = self._equations, self._equations.model
+        axes, lines = model.element.axes, model.scene.center_lines
+        found = []
+        for axis in (2, 1, 0) if model.space else (1, 0):
+            ways = np.zeros((len(model.segments.places), axes))
+            for place, name in reversed(list(enumerate(sorted(lines)))):
+                frame = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0]
+                for node in model.scene.members[name].nodes:
+                    ways[model.segments.place(node)] = frame[:axes, axis] / (1.0 + place)
+            field = np.zeros(equations.unknowns)
+            field[equations.turning_unknowns :] = model.positions.Y.T @ ways.ravel()
+            found.append(field)
         return tuple(found)
 
     def taken(self, shapes: Array, metric: Array) -> Array:
@@ -116,12 +145,18 @@ class Sides:
     def _share(self, shapes: Array, metric: Array) -> Array:
         """What the rule takes of each shape, of length one."""
         turning = self._equations.turning_unknowns
-        size = np.sqrt(float((metric @ np.abs(shapes) ** 2).max()))
+        travels = shapes[turning:]
+        largest = float(np.linalg.norm(travels, axis=0).max(initial=0.0))
+        size = max(np.sqrt(float((metric @ np.abs(shapes) ** 2).max())), TURNING * largest)
         for field in self.fields:
             weighted = metric[:turning] * field
             parts = weighted @ shapes[:turning]
             if np.linalg.norm(parts) > LEAST * size * np.sqrt(float(weighted @ field)):
                 # A complex shape is turned until its part in the field is real.
+                return np.asarray(parts.conj() / np.linalg.norm(parts))
+        for field in self.displacing if len(travels) else ():
+            parts = field[self._travels] @ travels
+            if np.linalg.norm(parts) > LEAST * largest * np.linalg.norm(field):
                 return np.asarray(parts.conj() / np.linalg.norm(parts))
         share, shape = np.eye(shapes.shape[1])[0], shapes[:, 0]
         return share * np.sign(shape[first_of_largest(shape, 0.5)].real or 1.0) if len(shape) else share

@@ -174,7 +174,7 @@ class StabilityTest:
     @functools.cached_property
     def sides(self) -> Sides:
         """Which shape of equal eigenvalues, and which sign of it."""
-        return Sides(self.equations)
+        return Sides(self.equations, self.equations.worked_displacements)
 
     def _all(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array | float] | None:
         """All eigenvalues and what of them cannot be told from zero; None where factors count them instead."""
