@@ -48,6 +48,9 @@ NARROW = 0.02
 BLOCKED = 1e-3
 """Part of the way of a step that is short enough to end the way where it is not allowed."""
 
+CREPT, CREEPS = 1e-3, 3
+"""What lands this near, rad, has left nothing; so many times it happens by chance, and else the way leads nowhere."""
+
 MOST = 400
 """Steps tried before giving up."""
 
@@ -109,6 +112,7 @@ def follow(
     longest = 1.0 / max(turn, 1.0) if prepared.model.space else 1.0
     done, step = 0.0, 0.5
     left: list[float] = []
+    crept = 0
     now = prepared.correct(state, way(0.0))
 
     def free(there: State, at: float) -> bool:
@@ -143,6 +147,9 @@ def follow(
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
             snapped = _left(prepared, now, way(trial))
             if snapped is None or not free(snapped.state, trial):
+                break
+            crept += prepared.distance(snapped.state, now.state) < CREPT
+            if crept > CREEPS:
                 break
             now = snapped
             left.append(done)
