@@ -4,6 +4,7 @@ import copy
 import json
 import re
 import zipfile
+from contextlib import nullcontext
 from itertools import pairwise
 
 import numpy as np
@@ -375,6 +376,32 @@ def test_a_small_member_that_bends_far_is_told(dimension, force, told):
     table["motions"] = {"m": {"node": "A", "rotation": 2.0 if dimension == "plane" else [0, 0, 2.0]}}
     table["loads"]["f"]["value"] = [0.0, 0.01]
     assert sfetcas.solve(made(table)).last.notes == ()
+
+
+@pytest.mark.parametrize("obstacle", [False, True])
+def test_a_path_ends_where_a_small_member_bends_too_far(obstacle):
+    """What lies beyond is not told as if it were true: in statics it is refused."""
+    table = {
+        "sections": {"one": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"arm": {"nodes": ["A", "B"], "section": "one", "type": "small"}},
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, 1]}},
+        "analysis": {"type": "path", "range": [0, 60], "steps": [1.0, 50.0]},
+    }
+    if obstacle:
+        table["nodes"]["C"] = {"position": [1.5, 0]}
+        table["members"]["tail"] = {"nodes": ["B", "C"], "section": "one"}
+        table["contacts"] = {"floor": {"type": "plane", "point": [0, -1], "normal": [0, 1], "member": "tail"}}
+    path = sfetcas.solve(made(table))
+    assert path.status is sfetcas.Status.CUT
+    assert [step.factor for step in path.branches[0].steps] == [1.0]
+    assert re.search("beyond factor .* a small member bends beyond linear elasticity .'arm' by", path.branches[0].end)
+    last = path.branches[0].points[-1].factor
+    # A step of the path is a thirtieth of its range at most.
+    for factor, refused in ((0.99 * last, False), (last + 60.0 / 30.0, True)):
+        static = made({**table, "analysis": {"type": "static", "steps": [factor]}})
+        with pytest.raises(sfetcas.SolveError, match="small member bends") if refused else nullcontext():
+            sfetcas.solve(static)
 
 
 @pytest.mark.parametrize("load", ["force", "spread", "inside", "gravity"])

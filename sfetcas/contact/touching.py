@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..description.scene import Scene
-from ..errors import SolveError
+from ..errors import SolveError, Status
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.prepared import Prepared
 from .contact_stability import ContactStability, can_leave
@@ -146,6 +146,11 @@ class Toucher:
         a state that ceases to be stable is left as soon as that is seen, if that is wanted.
 
         ``snapped``, an attribute, is then the parts of the way at which a state was left, or ceased to be.
+
+        Raises
+        ------
+        SolveError
+            A small member bends beyond what it is for on the way.
         """
         self.snapped = []
         most = self.settler.solves + MOST_ON_WAY
@@ -202,6 +207,9 @@ class Toucher:
             elif sudden:
                 self.snapped.append(trial)
             assert there is not None
+            told = there.touched.fields.too_large()
+            if told:
+                raise SolveError(Status.BENT, told)
             jumped = falls or trial in self.snapped or now is None
             rate = np.inf if jumped else turned / (trial - done)
             since = None if jumped or now is None else (done, now)

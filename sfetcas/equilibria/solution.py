@@ -13,7 +13,7 @@ from ..contact.touches import answers
 from ..description.records import counted, nearest, plain
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, first_of_largest
+from ..mathematics.arrays import Array
 from ..mechanics.balance import SpringState
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.fields import Fields
@@ -337,9 +337,6 @@ def equilibrium(
 SMALL = 0.1
 """Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""
 
-LARGE = 1.0
-"""The same beyond which nothing of what is told of a small member is true."""
-
 SMALL_PULL = 0.1
 """Axial force over ``12 EI / L^2`` up to which a small member is one: by as much it is too soft or too stiff across."""
 
@@ -352,13 +349,9 @@ def refuse_large(fields: Fields) -> None:
     SolveError
         Naming the one that bends most.
     """
-    found = {name: fields.bent(name) for name, m in fields.model.scene.members.items() if m.type == "small"}
-    worst = [*found, ""][first_of_largest(np.array([*found.values(), 0.0]))]
-    if found.get(worst, 0.0) > LARGE:
-        detail = (
-            f"{worst!r} by {found[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}, and to be accurate a"
-        )
-        raise SolveError(Status.BENT, f"{detail} few percent; make it flexible")
+    told = fields.too_large()
+    if told:
+        raise SolveError(Status.BENT, told)
 
 
 def _not_small(fields: Fields) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ from .scanning import Scan, scan
 from .settings import Settings
 from .several import Search, long_elements, same, search
 from .single import finished, solve_model, unjudged
-from .solution import Equilibrium, Solution, at_factor
+from .solution import Equilibrium, Solution, at_factor, refuse_large
 
 __all__ = ["Settings", "pilot_of", "solve", "solve_model"]
 
@@ -229,7 +229,9 @@ class _Run(Refining):
         self.allowed = contact.unstopped
         try:
             found = self._grown_from_zero(pilot, factor)
-        except SolveError:
+        except SolveError as error:
+            if error.status is Status.BENT:
+                raise
             found = None
         finally:
             self.allowed = None
@@ -283,6 +285,7 @@ class _Run(Refining):
     def _pressed(self, found: Pressed, factor: float) -> Equilibrium:
         held = found.held
         refuse_unbalanced(held.touched.fields)
+        refuse_large(held.touched.fields)
         answer = finished(
             held.prepared,
             held.corrected,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..description.obstacles import obstacle
 from ..mathematics import curves, interpolation, quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
@@ -24,6 +24,9 @@ from .loading import Loading
 from .mesh import Touch
 
 __all__ = ["Fields", "rotations_along", "transferred"]
+
+LARGE = 1.0
+"""Displacement over size, or rotation in rad, beyond which nothing of what is told of a small member is true."""
 
 
 MEMBERS = 64
@@ -406,6 +409,15 @@ class Fields:
         spins = 2.0 * quaternion.multiply(turned, quaternion.conjugate(mean))[:, 1:]
         size = np.linalg.norm(rest - rest[0], axis=1).max()
         return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
+
+    def too_large(self) -> str:
+        """What is said of the small member that bends most where its linear elasticity tells nothing; else empty."""
+        small = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
+        worst = [*small, ""][first_of_largest(np.array([*small.values(), 0.0]))]
+        if not small.get(worst, 0.0) > LARGE:
+            return ""
+        found = f"{worst!r} by {small[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}"
+        return f"{found}, and to be accurate a few percent; make it flexible"
 
     def pulled(self, member: str) -> float:
         """Axial force of a small member with two ends over what displaces these across by its length, ``12 EI / L^2``.

@@ -26,7 +26,7 @@ from ..mechanics.accuracy import largest_difference
 from ..mechanics.mesh import Mesh
 from .contact_curve import Stood
 from .contact_trace import Trace, Tracer
-from .path import NO_POTENTIAL, Branch, Path, PathPoint
+from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
 
 __all__ = ["follow_in_contact"]
 
@@ -113,6 +113,8 @@ class _Run(Meshing):
         if begun is None:
             raise SolveError(Status.FAILED, "no equilibrium in contact to start the path from at factor 0 or beside it")
         trace = tracer.traced(begun[0], self.analysis.points)
+        if trace.told and len(trace.points) == 1:
+            raise SolveError(Status.BENT, trace.told, begun[0].standing.state)
         if len(trace.points) == 1:
             raise SolveError(Status.FAILED, trace.notes[-1], begun[0].standing.state)
         trace.notes[:0] = begun[1]
@@ -163,12 +165,13 @@ class _Run(Meshing):
         def entries(kind: str) -> tuple[Equilibrium, ...]:
             return tuple(self._entry(run, p, errors.get((kind, j))) for j, p in enumerate(level.of_kind(kind)))
 
-        branch = Branch(tuple(points), entries("step"), entries("limit"), (), self._end(trace))
+        end = ending(trace.end, trace.points[-1].factor, len(trace.points) - len(trace.limits), trace.told)
+        branch = Branch(tuple(points), entries("step"), entries("limit"), (), end)
         notes = (*trace.notes, BIFURCATIONS, *self._unexplained(trace, points))
         status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
         return Path(
             scene=self.scene,
-            status=Status.CUT if trace.end == "lost" else status,
+            status=Status.CUT if trace.end in ("lost", "bent") else status,
             prepared=prepared,
             branches=(branch,),
             unit=level.tracer.curve.unit,
@@ -214,12 +217,3 @@ class _Run(Meshing):
                 ways = f"from {a.negative} to {b.negative}"
                 notes.append(f"between factors {a.factor:.6g} and {b.factor:.6g} the ways out change {ways}")
         return notes
-
-    @staticmethod
-    def _end(trace: Trace) -> str:
-        factor = trace.points[-1].factor
-        return {
-            "range": f"the factor leaves the range at {factor:g}",
-            "points": f"{len(trace.points) - len(trace.limits)} points",
-            "lost": f"it could not be followed beyond factor {factor:.6g}",
-        }[trace.end]

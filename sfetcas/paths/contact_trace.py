@@ -71,7 +71,9 @@ class Trace:
     notes : list of str
         What happened on the way.
     end : str
-        Why it ends: ``range``, ``points`` or ``lost``.
+        Why it ends: ``range``, ``points``, ``lost``, or ``bent`` beyond what small members are for.
+    told : str
+        Of ``bent``, which member and how far.
     corners : set of int
         Numbers of points after which something touches otherwise.
     """
@@ -80,6 +82,7 @@ class Trace:
     limits: set[int] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
     end: str = "points"
+    told: str = ""
     corners: set[int] = field(default_factory=set)
 
 
@@ -158,6 +161,10 @@ class Tracer:
                 if trace.end == "lost":
                     return trace
                 continue
+            trace.told = self.curve.plain(there.held.prepared).too_large(there.standing.state, there.standing.loading)
+            if trace.told:
+                trace.end = "bent"
+                return trace
             end = there.factor if there.factor in self.stops else None
             self._take(trace, now, there)
             if end is not None and end in self.span:

@@ -17,7 +17,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 
-__all__ = ["FLUTTER", "NO_POTENTIAL", "Branch", "FlutterPoint", "Path", "PathPoint"]
+__all__ = ["FLUTTER", "NO_POTENTIAL", "Branch", "FlutterPoint", "Path", "PathPoint", "ending"]
 
 NO_POTENTIAL = (
     "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
@@ -253,3 +253,14 @@ class Path:
             **moving,
             "end": branch.end,
         }
+
+
+def ending(end: str, factor: float, count: int, told: str) -> str:
+    """Why a stretch with so many points ends at a factor, in words."""
+    return {
+        "range": f"the factor leaves the range at {factor:g}",
+        "points": f"{count} points",
+        "closed": "it closes on itself",
+        "lost": f"it could not be followed beyond factor {factor:.6g}",
+        "bent": f"beyond factor {factor:.6g} a small member bends beyond linear elasticity ({told})",
+    }[end]

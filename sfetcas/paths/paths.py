@@ -30,7 +30,7 @@ from ..solvers.newton import Corrected, relative_residual, with_sharing
 from ..solvers.prepared import SOLVED, Prepared
 from ..solvers.tracing import Traced, passes, switched, trace, without
 from .contact_path import follow_in_contact
-from .path import NO_POTENTIAL, Branch, Path, PathPoint
+from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
 from .vibrations import shaken, with_modes
 
 __all__ = ["follow_path", "switch"]
@@ -266,6 +266,8 @@ class _Run:
         curve, start, notes = begin_path(self._prepared(mesh), self.span)
         main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
+        if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
+            raise SolveError(Status.BENT, main.traced.told, start.state)
         if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
@@ -360,7 +362,7 @@ class _Run:
             own = {(kind, j): error for (k, kind, j), error in errors.items() if k == i}
             branches.append(self.answered(curve, stretch, own))
         status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
-        if level.stretches[0].traced.end == "lost":
+        if level.stretches[0].traced.end in ("lost", "bent"):
             status = Status.CUT
         final = level.stretches[-1].traced.points[-1]
         steps = [entry for branch in branches for entry in branch.steps]
@@ -396,19 +398,10 @@ class _Run:
             steps=entries("step", crossings, [()] * len(crossings)),
             limit_points=entries("limit", [e.standing for e in limits], [_said(e, energy) for e in limits]),
             bifurcations=entries("bifurcation", [e.standing for e in bends], [_said(e, energy) for e in bends]),
-            end=self._end(traced),
+            end=ending(traced.end, traced.points[-1].factor, len(traced.points) - len(traced.events), traced.told),
             bifurcation=stretch.bifurcation,
             side=stretch.side,
         )
-
-    def _end(self, traced: Traced) -> str:
-        count, factor = len(traced.points) - len(traced.events), traced.points[-1].factor
-        return {
-            "range": f"the factor leaves the range at {factor:g}",
-            "points": f"{count} points",
-            "closed": "it closes on itself",
-            "lost": f"it could not be followed beyond factor {factor:.6g}",
-        }[traced.end]
 
     def _entry(self, curve: Curve, at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
         prepared = curve.prepared

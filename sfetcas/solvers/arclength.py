@@ -19,6 +19,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Point, State
+from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from .deflation import turned_between
 from .neutral import Neutral
@@ -134,6 +135,11 @@ class Curve:
         self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
         self._driven = any(np.any(group.turn) for group in self.model.groups.values())
         self._linear = set(self.model.groups) == {None}
+        self._small = any(member.type == "small" for member in prepared.model.scene.members.values())
+
+    def too_large(self, state: State, loading: Loading) -> str:
+        """What is said of a small member that bends beyond what it is for; empty where none does."""
+        return Fields(self.equations, state, loading).too_large() if self._small else ""
 
     def within(self, piece: tuple[float, float]) -> Curve:
         """The same curve between two factors."""

@@ -82,12 +82,16 @@ class Traced:
         In their order, limit and bifurcation points among them.
     events : list of Event
     end : str
-        Why it ends: ``range``, ``points``, ``closed`` (the last point is the first one again) or ``lost``.
+        Why it ends: ``range``, ``points``, ``closed`` (the last point is the first one again), ``lost``, or ``bent``
+        beyond what small members are for.
+    told : str
+        Of ``bent``, which member and how far.
     """
 
     points: list[Standing]
     events: list[Event]
     end: str
+    told: str = ""
 
 
 def trace(
@@ -117,7 +121,7 @@ def trace(
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
         points = [point for point in part.points[1:] if id(point) not in outside]
-        traced = Traced(traced.points + points, traced.events + events, part.end)
+        traced = Traced(traced.points + points, traced.events + events, part.end, part.told)
     return _with_crossed_folds(traced, usual)
 
 
@@ -144,7 +148,7 @@ def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
         points += [*between, point]
         firm = i
     order = [events[id(point)] for point in points if id(point) in events]
-    return Traced(points, order, traced.end)
+    return Traced(points, order, traced.end, traced.told)
 
 
 def without(traced: Traced, known: Sequence[Standing]) -> Traced:
@@ -155,7 +159,7 @@ def without(traced: Traced, known: Sequence[Standing]) -> Traced:
 
     repeated = {id(event.standing) for event in traced.events if is_known(event)}
     points = [point for point in traced.points if id(point) not in repeated]
-    return Traced(points, [event for event in traced.events if id(event.standing) not in repeated], traced.end)
+    return replace(traced, points=points, events=[e for e in traced.events if id(e.standing) not in repeated])
 
 
 def _meets(a: Standing, b: Standing) -> bool:
@@ -197,6 +201,9 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
         if step is None:
             return Traced(points, events, "lost")
         there, used, left = step
+        told = curve.too_large(there.state, there.loading)
+        if told:
+            return Traced(points, events, "bent", told)
         closed = not left and len(points) >= LOOP and _closes(curve, start, now, there)
         ends = _to_start(curve, start, now, there) if closed else [there]
         for end in ends:
