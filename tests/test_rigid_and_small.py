@@ -404,6 +404,32 @@ def test_a_path_ends_where_a_small_member_bends_too_far(obstacle):
             sfetcas.solve(static)
 
 
+@pytest.mark.parametrize(("force", "told"), [(1.0, "bends"), (30.0, "refused"), (1e-3, "")])
+def test_a_small_member_that_bends_far_in_a_motion_is_told(force, told):
+    table = {
+        "sections": {"one": {"EI3": 1.0, "rhoA": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [1, 0]},
+            "C": {"position": [1.5, 0]},
+        },
+        "members": {
+            "arm": {"nodes": ["A", "B"], "section": "one", "type": "small"},
+            "tail": {"nodes": ["B", "C"], "section": "one"},
+        },
+        "loads": {"f": {"type": "force", "node": "B", "value": [0, force]}},
+        "analysis": {"type": "dynamic", "end": 1.0, "step": 0.05, "output": 0.1},
+    }
+    if told == "refused":
+        with pytest.raises(sfetcas.SolveError, match=r"a small member bends .*at 0\.\d* s: 'arm' by") as failed:
+            sfetcas.solve(made(table))
+        assert 0.0 < failed.value.reached.steps[-1].time < 1.0
+    else:
+        notes = sfetcas.solve(made(table)).notes
+        assert bool(notes) is bool(told)
+        assert all(re.match(r"at .* s the small member 'arm' bends by", note) for note in notes)
+
+
 @pytest.mark.parametrize("load", ["force", "spread", "inside", "gravity"])
 @pytest.mark.parametrize("kind", ["arc", "varying", "arc, space", "varying, space"])
 def test_small_turned_far_is_flexible_turned_far(kind, load):

@@ -15,7 +15,7 @@ from ..description.scene import Scene
 from ..equilibria.meshing import WHERE, Meshing
 from ..equilibria.quantities import Quantity
 from ..equilibria.settings import Settings
-from ..equilibria.solution import Equilibrium
+from ..equilibria.solution import Equilibrium, not_small
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
@@ -118,6 +118,7 @@ class Simulation:
     ) -> None:
         self.given, self.settings, self.measure, self.progress = scene, settings, measure, progress
         self.scene = moving(scene)
+        self.small = [name for name, member in scene.members.items() if member.type == "small"]
         if settings.gauss:
             raise SceneError("integration: found 'gauss', accepted with type 'dynamic': integration at the nodes")
         analysis = scene.analysis
@@ -190,6 +191,7 @@ class Simulation:
         try:
             for sample in integrator.samples(begun, course):
                 run.instants.append(mover.instant(sample))
+                self._refuse_large(run.instants[-1])
                 if watch is not None and watch.passed(run.instants):
                     break
         except KeyboardInterrupt:
@@ -206,6 +208,11 @@ class Simulation:
         run.count, run.gap, run.norm = integrator.count, integrator.gap, integrator.norm
         self.seconds["solve"] += time.perf_counter() - solving
         return run
+
+    def _refuse_large(self, instant: Instant) -> None:
+        told = instant.fields.too_large() if self.small else ""
+        if told:
+            raise SolveError(Status.BENT, f"at {instant.time:.6g} s: {told}")
 
     def begun(self, system: StageEquations) -> tuple[Begun, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it."""
@@ -242,7 +249,8 @@ class Simulation:
         run = self.run(mesh, 0)
         for rounds in range(1, 1 + ROUNDS if analysis.step is None else 1):
             failed = run.failure is not None
-            if run.interrupted or (failed and (self.prescribed or rounds > RESCUES)):
+            bent = run.failure is not None and run.failure.status is Status.BENT
+            if run.interrupted or bent or (failed and (self.prescribed or rounds > RESCUES)):
                 break
             mesh = mesh if self.prescribed else mesh.refined()
             finer = self.run(mesh, rounds, run.count)
@@ -328,7 +336,7 @@ class Simulation:
             error_estimate=error,
             error_of="" if self.quantity is None else self.quantity.text,
             violation={"norms": run.norm, "closings": run.gap},
-            notes=(*run.notes, *self._unlikely(run)),
+            notes=(*run.notes, *self._unlikely(run), *self._not_small(run)),
             failure="" if run.failure is None else run.failure.detail,
         )
         if run.failure is not None:
@@ -336,6 +344,13 @@ class Simulation:
                 run.failure.reached = motion
             raise run.failure
         return motion
+
+    def _not_small(self, run: _Run) -> tuple[str, ...]:
+        """Notes of small members where they bend most beyond linear elasticity."""
+        if not self.small:
+            return ()
+        worst = max(run.instants, key=lambda instant: max(map(instant.fields.bent, self.small)), default=None)
+        return () if worst is None else tuple(f"at {worst.time:.6g} s {note}" for note in not_small(worst.fields))
 
     def _unlikely(self, run: _Run) -> tuple[str, ...]:
         """Notes where a prescribed step, of which nothing estimates the error, is far too short or too long."""

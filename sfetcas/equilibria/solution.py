@@ -21,7 +21,17 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.stability import Stability
 
-__all__ = ["Certificate", "Equilibrium", "Posture", "Solution", "at_factor", "equilibrium", "heading", "refuse_large"]
+__all__ = [
+    "Certificate",
+    "Equilibrium",
+    "Posture",
+    "Solution",
+    "at_factor",
+    "equilibrium",
+    "heading",
+    "not_small",
+    "refuse_large",
+]
 
 MOST_PLACES = 400
 """Places listed along a member at most; with more elements only their ends, thinned out."""
@@ -326,7 +336,7 @@ def equilibrium(
         state=state,
         loading=loading,
         certificate=certificate,
-        notes=(*notes, *_not_small(fields)),
+        notes=(*notes, *not_small(fields)),
         iterations=iterations,
         strain=point.strain,
         potential=point.potential,
@@ -354,7 +364,7 @@ def refuse_large(fields: Fields) -> None:
         raise SolveError(Status.BENT, told)
 
 
-def _not_small(fields: Fields) -> tuple[str, ...]:
+def not_small(fields: Fields) -> tuple[str, ...]:
     """Notes where small members bend or are pulled beyond linear elasticity, which no error estimate sees."""
     small = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
     told = "the error estimate does not tell"
