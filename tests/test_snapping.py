@@ -388,3 +388,32 @@ def test_straight_columns_that_snap_say_so():
     # The way is followed until a stable and an unstable state are 2 % apart.
     assert told[0] == pytest.approx(critical, rel=0.025)
     assert snapped.position("top")[1] < -0.5
+
+
+@pytest.mark.parametrize("turns", [1, 2, 5])
+def test_what_snaps_while_a_lever_turns_round_stays_snapped(turns):
+    """The lever's spring pulls the arch through on each turn and is too soft to push it back when it comes again."""
+    rise = 0.15
+    half = {"section": "s", "shape": {"type": "arc", "angle": -2.0 * np.arctan(rise)}}
+    scene = made(
+        {
+            "sections": {"s": {"EI3": 1.0}},
+            "nodes": {
+                "L": {"position": [-1, 0], "support": "hinge"},
+                "M": {"position": [0, rise]},
+                "R": {"position": [1, 0], "support": "hinge"},
+                "O": {"position": [0, -1.7], "support": "hinge"},
+                "P": {"position": [0, -0.9]},
+            },
+            "members": {
+                "a": {"nodes": ["L", "M"], **half},
+                "b": {"nodes": ["M", "R"], **half},
+                "lever": {"nodes": ["O", "P"], "type": "rigid"},
+            },
+            "springs": {"s": {"type": "translational", "node": "P", "to": "M", "stiffness": 3.0, "length": 0.9 + rise}},
+            "motions": {"round": {"node": "O", "rotation": 2.0 * np.pi * turns}},
+        }
+    )
+    step = solve(scene).last
+    assert step.position("M")[1] < -rise
+    assert sum("jumped" in note for note in step.notes) == 1

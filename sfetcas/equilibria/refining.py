@@ -71,11 +71,8 @@ COARSE = 0.1
 HELD = 2e-9
 """Eigenvalues above this, in those of the softest member, and above rounding hold a mechanism, if barely."""
 
-UNBALANCED = 0.01
-"""Share of what acts that is out of balance without redundant multipliers: these carry it on next to nothing."""
-
 CARRIED = 1e-6
-"""The same of multipliers that are large: rounding of what hardly acts is far less."""
+"""Share of what acts that redundant multipliers carry, on next to nothing: rounding of what hardly acts is far less."""
 
 LARGE = 1e3
 """Multipliers over the loads above which that is looked at."""
@@ -361,12 +358,11 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     state = shared(equations, corrected.state, loading, loose, reactions=True)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
-    most = CARRIED if largest > LARGE else UNBALANCED
     note = SHARED if stretches(equations, state, loading, loose) else SMALLEST
     # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
     acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
-    needed = carried > most * acting.max(initial=TINY) and carried > np.abs(left).max(initial=0.0)
+    needed = carried > CARRIED * acting.max(initial=TINY) and carried > np.abs(left).max(initial=0.0)
     if residual <= SOLVED and not needed:
         corrected = replace(corrected, state=state, point=point, residual=residual)
     elif largest > BEYOND or needed:

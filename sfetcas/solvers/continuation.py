@@ -48,11 +48,17 @@ NARROW = 0.02
 BLOCKED = 1e-3
 """Part of the way of a step that is short enough to end the way where it is not allowed."""
 
+TRAVEL = 0.5
+"""A step moves nothing that is driven by more than this, in lengths of the scene, and turns it by a radian at most."""
+
 CREPT, CREEPS = 1e-3, 3
 """What lands this near, rad, has left nothing; so many times it happens by chance, and else the way leads nowhere."""
 
 MOST = 400
 """Steps tried before giving up."""
+
+AROUND = 20
+"""Steps more for each that driven motions ask for at least: a snap that a radian brings takes so many to find."""
 
 MOST_WITHOUT_POTENTIAL = 6000
 """The same where there is no other way: a follower of 1e4 EI/L^2 swings a cantilever through 4,000 steps."""
@@ -106,10 +112,10 @@ def follow(
     that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
     the way ends.  ``refuse`` is shown each state, and raises where there is no sense in going on.
     """
-    # In space a whole turn of what is held or driven looks like none: no step may turn it by more than a radian.
+    # A whole turn of what is held or driven looks like none, and what it meets on its way may have snapped meanwhile.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
     turn = max(float(np.linalg.norm(whole.turn, axis=1).max(initial=0.0)), whole.driven)
-    longest = 1.0 / max(turn, 1.0) if prepared.model.space else 1.0
+    longest = 1.0 / max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0)
     done, step = 0.0, 0.5
     left: list[float] = []
     crept = 0
@@ -118,7 +124,8 @@ def follow(
     def free(there: State, at: float) -> bool:
         return allowed is None or allowed(now.state, way(done), there, way(at))
 
-    for _ in range(MOST if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL):
+    tries = MOST + int(AROUND / longest) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
+    for _ in range(tries):
         if done >= 1.0:
             return Followed(now.state, True, tuple(left))
         step = min(step, longest)
