@@ -269,7 +269,8 @@ class Piloting(Meshing):
 
     def _grown_from_bent(self, pilot: Prepared, factor: float) -> Found | None:
         """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
-        for share in SMALL_SHARES:
+        # What cannot be minimised is followed to each, in thousands of steps where it falls.
+        for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
             begin = share * factor
             bent, _ = self._direct(pilot, pilot.model.loading(begin))
             if bent is not None:

@@ -244,13 +244,19 @@ def met(equations: Equations, point: Point) -> Point:
     if not redundant(equations, point):
         return point
     loose = loose_rows(equations, point)
-    gaps = loose @ (loose.T @ point.residual[equations.unknowns :])
-    if not loose.size or not np.linalg.norm(gaps) <= MET:
+    left = loose.T @ point.residual[equations.unknowns :]
+    # What turning by less closes is a member nearly straight, and its gap has to be closed.
+    stays = np.abs(left) > CLOSED * np.linalg.norm(changed_by(equations, point, loose), axis=0)
+    gaps = loose[:, stays] @ left[stays]
+    if not 0.0 < np.linalg.norm(gaps) <= MET:
         return point
     residual = point.residual.copy()
     residual[equations.unknowns :] -= gaps
     return replace(point, residual=residual)
 
+
+CLOSED = 1e-3
+"""Turning, rad, by which gaps are closed: what takes more, to first order, no unknown closes."""
 
 MET = 1e-9
 """Gaps of redundant closings below this, in lengths of the scene or rad, are closed."""
