@@ -203,3 +203,16 @@ def test_links_that_fit_do_not_hold_what_falls(shift):
     step = sfetcas.solve(three_parallel_cranks(shift, (0.0, -20.0, 0.0), unstable="stay")).last
     assert step.certificate.stable is False
     assert step.certificate.negative == 1
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-13, 1e-11, 1e-9])
+def test_links_that_fit_fall_together(shift):
+    """They come to rest where 10 N m phi = 20 N 1 m sin(phi), towards +z, as the rule of mirror images is."""
+    step = sfetcas.solve(three_parallel_cranks(shift, (0.0, -20.0, 0.0))).last
+    x, y, _ = step.position("A")
+    phi = np.arctan2(-x, y)
+    assert phi > 1.0
+    # What rounding of the place lets the answer miss by.
+    assert phi == pytest.approx(2.0 * np.sin(phi), abs=1e-6)
+    assert step.certificate.stable is True
+    assert any("jumped" in note for note in step.notes)

@@ -17,14 +17,14 @@ from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
 from ..solvers.newton import loose_rows
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import BEYOND, Prepared
 from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .settings import Settings
 from .single import cold
 from .solution import refuse_large
 
-__all__ = ["BEYOND", "KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting", "multipliers"]
+__all__ = ["KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting"]
 
 KEPT = "the loads growing from zero lead to this unstable equilibrium, and no way from it to a stable one was found"
 
@@ -67,9 +67,6 @@ SMALL_SHARES = 0.01, 0.03, 0.1
 
 Beside the stiffness of beams the smallest is the least well conditioned.
 """
-
-BEYOND = 1e4
-"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
 STRAIGHT = 1e-6
 """Rotations below this, rad, are rounding of members that loads along them leave straight: others bend or diverge."""
@@ -145,7 +142,7 @@ class Piloting(Meshing):
             apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
             # What falls from its start guess is nearest to no minimum.
             held = pilot.diagnosis.mobility == 0
-            told = held and multipliers(alone) <= BEYOND and not reached.notes
+            told = held and pilot.multipliers(alone.corrected) <= BEYOND and not reached.notes
             if told and apart and alone.stability.negative == 0:
                 reached.notes += (
                     "the loads growing from zero lead here, not to the minimum nearest to the start guess",
@@ -229,7 +226,7 @@ class Piloting(Meshing):
             if self._stays(pilot, zero, factor):
                 found = self._through(pilot, 0.0, factor, zero)
                 # What cannot bend leaves for a whole turn within one element, which only its mesh lets pass.
-                return None if found is None or multipliers(found) > BEYOND else found
+                return None if found is None or pilot.multipliers(found.corrected) > BEYOND else found
             return None if self.scene.histories else self._grown_from_bent(pilot, factor)
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
@@ -308,12 +305,6 @@ class Piloting(Meshing):
         elif passed:
             notes += (PASSED,)
         return Found(pilot, corrected, stability, notes, left=result.left)
-
-
-def multipliers(found: Found) -> float:
-    """The largest multiplier over the loads, or over the unit of force."""
-    loads = found.prepared.load_size(found.corrected)
-    return float(np.abs(found.corrected.state.lam).max(initial=0.0)) / max(1.0, loads)
 
 
 def _with_change_point(found: Found) -> Found:

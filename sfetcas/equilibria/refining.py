@@ -19,12 +19,12 @@ from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
 from ..solvers.newton import TINY, Corrected, loose_rows, named_in, relative_residual, stretched
-from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.prepared import BEYOND, SOLVED, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
 from .meshing import Found
 from .mirrors import has_twin
-from .piloting import BEYOND, KEPT, Piloting, multipliers
+from .piloting import KEPT, Piloting
 from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
 
@@ -130,7 +130,7 @@ class Refining(Piloting):
 
     def _refined(self, pilot: Found, factor: float) -> Equilibrium:
         if not pilot.kept:
-            if multipliers(pilot) > BEYOND:
+            if pilot.prepared.multipliers(pilot.corrected) > BEYOND:
                 # What no finite force holds straight may look balanced, by rounding, and free along the rest.
                 _with_unique_reactions(pilot, pilot.prepared.model.loading(factor))
             # What nothing holds on a coarse mesh no finer one holds.
@@ -349,7 +349,7 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     """
     equations, corrected = found.prepared.equations, found.corrected
     loose = loose_rows(equations, corrected.point)
-    largest = multipliers(found)
+    largest = found.prepared.multipliers(found.corrected)
     if not loose.size:
         told = stretched(equations, corrected.point) if largest > LARGE else ""
         if told:

@@ -31,7 +31,7 @@ from .program import Program
 from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
 
-__all__ = ["SOLVED", "Prepared"]
+__all__ = ["BEYOND", "SOLVED", "Prepared"]
 
 MOST_COUNTED = 600
 """Up to this many unknowns the eigenvalues of a tangent, all of them, take less than a second."""
@@ -44,6 +44,9 @@ STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
 
 ITERATIONS = 250
 """Of IPOPT at most: what needs more lies in such a valley too, or there is no equilibrium at all."""
+
+BEYOND = 1e4
+"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
 SAME = 1e-3
 """Two states nearer than this, rad, are the same but for what a prestress bends."""
@@ -202,7 +205,7 @@ class Prepared:
             raise SolveError(Status.FAILED, detail, state)
         if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
             # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
-            found = self.correct(state, loading, iterations=50)
+            found = self.downhill(state, loading) or self.correct(state, loading, iterations=50)
             if not found.converged:
                 detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
                 told = contradiction(self.equations, state, loading)
@@ -250,8 +253,16 @@ class Prepared:
         if not loose.size:
             return found
         self.equations.redundant = True
-        least = self.correct(shared(self.equations, found.state, loading, loose), loading)
+        without = shared(self.equations, found.state, loading, loose)
+        if self.multipliers(found) > BEYOND:
+            # Where only multipliers without bound hold it, it is in balance further down.
+            return self.downhill(without, loading) or found
+        least = self.correct(without, loading)
         return least if least.converged and self.distance(least.state, found.state) < SAME else found
+
+    def multipliers(self, found: Corrected) -> float:
+        """The largest multiplier over the loads, or over the unit of force."""
+        return float(np.abs(found.state.lam).max(initial=0.0)) / max(1.0, self.load_size(found))
 
     @functools.cached_property
     def _globalised(self) -> Globalised:
