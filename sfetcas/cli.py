@@ -35,7 +35,7 @@ from .outputs import outputs_of, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
 from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
-from .stopping import INTERRUPTED, SENTENCE, heard
+from .stopping import INTERRUPTED, SENTENCE, arrived, asked, heard
 from .sweeps.sweeping import sweep
 from .sweeps.texts import cases_in_words, usual_quantities
 from .tradeoff.tables import as_markdown
@@ -70,8 +70,23 @@ def _noted(message: Warning | str, *_: object, **__: object) -> None:
 def _ended(options: argparse.Namespace) -> int:
     """Run a command; the exit code is returned."""
     try:
-        with np.errstate(over="raise"):
-            return int(options.command(options))
+        return _judged(lambda: int(options.command(options)))
+    except KeyboardInterrupt:
+        arrived()
+        print(SENTENCE, file=sys.stderr)
+        return INTERRUPTED
+
+
+def _judged(command: Callable[[], int]) -> int:
+    """The exit code of a command, also where it fails, which is told."""
+    try:
+        try:
+            with np.errstate(over="raise"):
+                return command()
+        finally:
+            # What failed may be what somebody made of an interrupt.
+            if asked() and sys.exc_info()[0] is not None:
+                raise KeyboardInterrupt
     except SceneError as error:
         print(f"sfetcas: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -84,9 +99,6 @@ def _ended(options: argparse.Namespace) -> int:
     except MemoryError:
         print("sfetcas: no solution: the scene needs more memory than there is", file=sys.stderr)
         return NO_SOLUTION
-    except KeyboardInterrupt:
-        print(SENTENCE, file=sys.stderr)
-        return INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return SOLVED

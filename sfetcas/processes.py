@@ -7,6 +7,8 @@ import signal
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
 
+from .stopping import noted
+
 __all__ = ["begin_apart", "postponed"]
 
 SIGNALS = {signal.SIGINT, signal.SIGTERM}
@@ -15,6 +17,19 @@ SIGNALS = {signal.SIGINT, signal.SIGTERM}
 @contextlib.contextmanager
 def postponed() -> Iterator[None]:
     """Within this signals wait: a process is started whole, or not at all."""
+    signals: list[int] = []
+    try:
+        # Other threads take them, too, so that it is not enough to block them in this one.
+        with noted(forward=False) as signals, _blocked():
+            yield
+    finally:
+        if signals:
+            signal.raise_signal(signals[0])
+
+
+@contextlib.contextmanager
+def _blocked() -> Iterator[None]:
+    """For what is started meanwhile, until :func:`begin_apart`."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

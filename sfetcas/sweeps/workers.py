@@ -55,13 +55,14 @@ class _Lane:
 
     def submit(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> Future[T]:
         """Have a piece of work done."""
-        try:
-            future = self._pool.submit(function, *args, **kwargs)
-        except BrokenExecutor:
-            self._pool.shutdown()
-            self._pool, self._blamed = self._make(), False
-            future = self._pool.submit(function, *args, **kwargs)
-        self._flying.append(future)
+        with postponed():
+            try:
+                future = self._pool.submit(function, *args, **kwargs)
+            except BrokenExecutor:
+                self._pool.shutdown()
+                self._pool, self._blamed = self._make(), False
+                future = self._pool.submit(function, *args, **kwargs)
+            self._flying.append(future)
         future.add_done_callback(self._done)
         return future
 
