@@ -31,7 +31,7 @@ from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
-from .outputs import outputs_of, outputs_of_sweep, outputs_of_trade
+from .outputs import Output, outputs_of, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
 from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
@@ -53,6 +53,10 @@ REPORT = "a mistake of sfetcas, not of the scene; please report it with the line
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code is returned."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            # Whoever closed it wants to see nothing.
+            setattr(sys, name, io.StringIO())
     options = _parser().parse_args(arguments)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -82,7 +86,9 @@ def _judged(command: Callable[[], int]) -> int:
     try:
         try:
             with np.errstate(over="raise"):
-                return command()
+                code = command()
+            sys.stdout.flush()
+            return code
         finally:
             # What failed may be what somebody made of an interrupt.
             if asked() and sys.exc_info()[0] is not None:
@@ -100,12 +106,23 @@ def _judged(command: Callable[[], int]) -> int:
         print("sfetcas: no solution: the scene needs more memory than there is", file=sys.stderr)
         return NO_SOLUTION
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return SOLVED
     except Exception:
+        try:
+            # What was printed before and could not be written is still there.
+            sys.stdout.flush()
+        except OSError as error:
+            print(f"sfetcas: what is printed cannot be written: {error.strerror}", file=sys.stderr)
+            _print_no_more()
+            return BAD_INPUT
         traceback.print_exc()
         print(f"sfetcas: internal error: {REPORT}", file=sys.stderr)
         return INTERNAL
+
+
+def _print_no_more() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -240,9 +257,7 @@ def _run(options: argparse.Namespace) -> int:
 
     def told(solution: Answer) -> None:
         solved = time.perf_counter() - begin
-        for output in outputs:
-            output.write(solution)
-        report(solution, solved)
+        _give(solution, lambda: report(solution, solved), outputs)
 
     try:
         solution, checks = _answered(options.file, scene, settings)
@@ -252,6 +267,15 @@ def _run(options: argparse.Namespace) -> int:
         raise
     told(solution)
     return _verdict(solution, checks)
+
+
+def _give(answer: object, tell: Callable[[], object], outputs: Sequence[Output]) -> None:
+    """Print an answer and write its files; what fails of one does not cost the other."""
+    try:
+        tell()
+    finally:
+        for output in outputs:
+            output.write(answer)
 
 
 def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Answer, list[Check]]:
@@ -413,9 +437,7 @@ def _trade(options: argparse.Namespace) -> int:
         for command in options.peer:
             progress(f"peer, {command}")
             found = with_peer(found, command, options.file, options.budget)
-    for output in outputs:
-        output.write(found)
-    print(as_markdown(found, every=False), end="")
+    _give(found, lambda: print(as_markdown(found, every=False), end=""), outputs)
     return SOLVED
 
 
@@ -435,9 +457,7 @@ def _sweep(options: argparse.Namespace) -> int:
             options.file,
             lambda: sweep(scene, cases, quantities, workers=options.workers, settings=settings, progress=progress),
         )
-    for output in outputs:
-        output.write(found)
-    report_sweep(found)
+    _give(found, lambda: report_sweep(found), outputs)
     if found.interrupted:
         print("sfetcas: interrupted: what was solved before is kept", file=sys.stderr)
         return INTERRUPTED

@@ -52,7 +52,8 @@ def leave_at_once() -> None:
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    os.write(2, f"{SENTENCE}\n".encode())
+    with contextlib.suppress(OSError):
+        os.write(2, f"{SENTENCE}\n".encode())
     os._exit(128 + number)
 
 

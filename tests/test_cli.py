@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from moving import FALLING
 
-from sfetcas import Scene, cli
+from sfetcas import Scene, cli, outputs
 from sfetcas.cli import main
 from sfetcas.description.records import counted
 
@@ -207,6 +208,33 @@ def test_output_that_cannot_be_written_is_exit_2_and_leaves_the_old_one(scene, t
     assert main(["run", str(unsolvable), "--json", str(out)]) == 2
     assert out.read_text() == "old"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["answer.json", "scene.toml"]
+
+
+def test_output_that_cannot_be_written_costs_no_report(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(outputs, "_json", lambda *_: lambda answer, path: path.joinpath("absent").read_text())
+    assert main(["run", str(scene()), "--json", str(tmp_path / "answer.json")]) == 2
+    caught = capsys.readouterr()
+    assert "node B: position" in caught.out
+    assert caught.err.count("could not be written") == caught.err.count("\n") == 1
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a disk that is full")
+@pytest.mark.parametrize("command", ["info", "run"])
+def test_a_report_that_cannot_be_written_is_told_and_costs_no_file(scene, tmp_path, capsys, monkeypatch, command):
+    out = tmp_path / "answer.json"
+    with open("/dev/full", "w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main([command, str(scene()), *(["--json", str(out)] if command == "run" else [])]) == 2
+    message = "sfetcas: what is printed cannot be written: No space left on device\n"
+    assert capsys.readouterr().err == message
+    assert out.exists() == (command == "run")
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_closed_streams_are_no_mistake(tmp_path, monkeypatch, stream):
+    (tmp_path / "falls.json").write_text(json.dumps({**FALLING, "analysis": {"type": "dynamic", "end": 0.02}}))
+    monkeypatch.setattr(sys, stream, None)
+    assert main(["run", str(tmp_path / "falls.json")]) == 0
 
 
 def test_command_line_as_a_process(scene):
