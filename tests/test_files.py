@@ -13,7 +13,7 @@ import pytest
 
 from sfetcas import SceneError, load
 from sfetcas.cli import main
-from sfetcas.description.matrices import _from_market, _from_npz, read_matrix
+from sfetcas.description.matrices import _from_market, _from_npz, _matrix, read_matrix
 from sfetcas.sweeps.cases import read_cases
 
 
@@ -112,6 +112,11 @@ def test_what_unpacks_to_more_than_it_may_is_refused(kind, tmp_path):
     write(tmp_path / "k.npz")
     with pytest.raises(ValueError, match=sentence):
         read_matrix(tmp_path / "k.npz")
+
+
+def test_numbers_that_no_float_holds_are_no_matrix():
+    with pytest.raises(ValueError, match=r"^found \[\[1000.*\.\.\., accepted: a square matrix of finite numbers"):
+        _matrix([[10**400]], "stiffness")
 
 
 def test_no_more_is_unpacked_than_an_archive_says(tmp_path):
