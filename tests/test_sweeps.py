@@ -33,6 +33,7 @@ from sfetcas import (
 from sfetcas.benchmark import lee_frame
 from sfetcas.cli import main
 from sfetcas.equilibria.quantities import Quantity
+from sfetcas.processes import context_of
 from sfetcas.sweeps import feeding, work
 from sfetcas.sweeps.cases import Cases, read_cases
 from sfetcas.sweeps.quantities import wanted_of
@@ -285,6 +286,13 @@ def test_an_interrupt_keeps_what_is_done(own):
     assert 4 <= found.solved.sum() < 40 or not own
     assert np.isfinite(found.values(TIP)[:4]).all()
     assert {f.reason for f in found.failures} <= {"interrupted before"}
+
+
+def test_where_no_socket_may_have_its_name_processes_start_otherwise(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / ("d" * 110)))
+    with Workers(1) as own:
+        assert own.submit(os.getpid).result() != os.getpid()
+    assert context_of([]).get_start_method() == "spawn"
 
 
 def test_progress_counts_every_case():
