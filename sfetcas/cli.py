@@ -37,7 +37,7 @@ from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
 from .stopping import INTERRUPTED, SENTENCE, arrived, asked, heard
 from .sweeps.sweeping import sweep
-from .sweeps.texts import cases_in_words, usual_quantities
+from .sweeps.texts import assigned, cases_in_words, usual_quantities
 from .tradeoff.tables import as_markdown
 from .tradeoff.trading import Limits, trade, with_peer
 
@@ -507,21 +507,19 @@ def _named_progress() -> Iterator[Callable[[str], object]]:
 
 def _span(text: str) -> tuple[str, tuple[float, float] | None]:
     """An argument with the range that it may have."""
-    name, equals, span = text.partition("=")
-    if not equals:
+    name, span = assigned(text)
+    if not span:
         return name, None
-    low, colon, high = span.partition(":")
     try:
-        if not colon:
-            raise ValueError
-        return name, (float(low), float(high))
+        low, high = map(float, span.split(":"))
+        return name, (low, high)
     except ValueError:
         raise SceneError(f"--argument: found {text!r}, accepted: NAME or NAME=LOW:HIGH") from None
 
 
 def _place(text: str) -> tuple[str, tuple[float, ...]]:
     """Fractions of a member."""
-    name, _, numbers = text.partition("=")
+    name, numbers = assigned(text)
     try:
         return name, tuple(float(x) for x in numbers.split(","))
     except ValueError:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from moving import FALLING
 
-from sfetcas import Scene, cli, outputs
+from sfetcas import Scene, SceneError, cli, outputs
 from sfetcas.cli import main
 from sfetcas.description.records import counted
 
@@ -228,6 +228,27 @@ def test_a_report_that_cannot_be_written_is_told_and_costs_no_file(scene, tmp_pa
     message = "sfetcas: what is printed cannot be written: No space left on device\n"
     assert capsys.readouterr().err == message
     assert out.exists() == (command == "run")
+
+
+@pytest.mark.parametrize(
+    ("text", "argument"),
+    [
+        ("loads.a=2.value", ("loads.a=2.value", None)),
+        ("loads.a=2.value.1=-1e3:.5", ("loads.a=2.value.1", (-1000.0, 0.5))),
+        ("sections.s=1.E=1:2", ("sections.s=1.E", (1.0, 2.0))),
+        ("sections.s=1.E", ("sections.s=1.E", None)),
+    ],
+)
+def test_names_may_have_signs_of_equality(text, argument):
+    assert cli._span(text) == argument
+
+
+def test_places_are_behind_the_last_sign_of_equality():
+    assert cli._place("a=2=0,0.5, 1") == ("a=2", (0.0, 0.5, 1.0))
+    with pytest.raises(SceneError, match=r"--places: found 'a=x', accepted: MEMBER=0,0\.5,1"):
+        cli._place("a=x")
+    with pytest.raises(SceneError, match="--argument: found 'a=1:2:3', accepted: NAME or NAME=LOW:HIGH"):
+        cli._span("a=1:2:3")
 
 
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
