@@ -14,6 +14,7 @@ import pytest
 from sfetcas import SceneError, load
 from sfetcas.cli import main
 from sfetcas.description.matrices import _from_market, _from_npz, _matrix, read_matrix
+from sfetcas.files import write_file
 from sfetcas.sweeps.cases import read_cases
 
 
@@ -142,6 +143,13 @@ def peak_of(work, *given):
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+
+
+def test_any_name_that_a_folder_takes_is_written(tmp_path):
+    path = tmp_path / f"a.{'b' * 250}"
+    write_file(path, lambda there: there.write_text("all"))
+    assert path.read_text() == "all"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_scene_that_names_a_device_is_one_sentence(tmp_path, capsys):
