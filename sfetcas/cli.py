@@ -108,10 +108,10 @@ def _judged(command: Callable[[], int]) -> int:
     except BrokenPipeError:
         _print_no_more()
         return SOLVED
-    except Exception:
+    except Exception as failure:
         try:
-            # What was printed before and could not be written is still there.
-            sys.stdout.flush()
+            # Where it is that nothing can be printed, it happens again.
+            print(end="\n" if isinstance(failure, OSError) else "", flush=True)
         except OSError as error:
             print(f"sfetcas: what is printed cannot be written: {error.strerror}", file=sys.stderr)
             _print_no_more()

@@ -118,13 +118,14 @@ def test_films_need_their_program(tmp_path, monkeypatch):
         save_animation(made(ENDED), tmp_path / "out.mp4")
 
 
-def test_what_ffmpeg_says_where_it_fails_is_told(tmp_path, monkeypatch):
+def test_what_ffmpeg_says_where_it_fails_is_told(tmp_path, monkeypatch, caplog):
     program = tmp_path / "ffmpeg"
     program.write_text("#!/bin/sh\ncat > /dev/null\necho No space left >&2\nexit 1\n")
     program.chmod(0o755)
     monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", str(program))
     with pytest.raises(SceneError, match=r"^the program ffmpeg failed: No space left$"):
         save_animation(made(ENDED), tmp_path / "out.mp4")
+    assert caplog.text == ""
 
 
 @pytest.mark.parametrize("ending", [*PICTURES, ".gif"])

@@ -1,5 +1,6 @@
 """The command line as other programs use it: exit codes, one sentence, answers, nothing half-written."""
 
+import io
 import json
 import os
 import subprocess
@@ -220,9 +221,12 @@ def test_output_that_cannot_be_written_costs_no_report(scene, tmp_path, capsys, 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a disk that is full")
 @pytest.mark.parametrize("command", ["info", "run"])
-def test_a_report_that_cannot_be_written_is_told_and_costs_no_file(scene, tmp_path, capsys, monkeypatch, command):
+@pytest.mark.parametrize("buffering", [-1, 0])
+def test_a_report_that_cannot_be_written_is_told_and_costs_no_file(
+    scene, tmp_path, capsys, monkeypatch, command, buffering
+):
     out = tmp_path / "answer.json"
-    with open("/dev/full", "w") as full:
+    with io.TextIOWrapper(open("/dev/full", "wb", buffering), write_through=not buffering) as full:
         monkeypatch.setattr(sys, "stdout", full)
         assert main([command, str(scene()), *(["--json", str(out)] if command == "run" else [])]) == 2
     message = "sfetcas: what is printed cannot be written: No space left on device\n"

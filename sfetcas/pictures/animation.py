@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -81,6 +82,8 @@ def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike
         texts = [f"factor {in_short(step.factor)}" for step in steps]
     film = _Film(steps, answer.scene.title, gravity=1.0 if isinstance(answer, Trajectory) else 0.0)
     writer: Any = (FFMpegWriter if check_ending(file, ENDINGS) == ".mp4" else PillowWriter)(fps=rate)
+    log = logging.getLogger("matplotlib.animation")
+    before, log.disabled = log.disabled, True
     try:
         with writer.saving(film.figure, os.fspath(file), DPI):
             for number, text in enumerate(texts):
@@ -90,6 +93,8 @@ def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike
         said = (error.stderr or "").split("\n")
         reason = next((line for line in reversed(said) if line.strip()), f"exit code {error.returncode}")
         raise SceneError(f"the program ffmpeg failed: {reason.strip()}") from None
+    finally:
+        log.disabled = before
 
 
 def _paced(times: Array) -> tuple[Index, int, str]:
