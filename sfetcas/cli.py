@@ -31,13 +31,13 @@ from .errors import SceneError, SolveError, Status
 from .mechanics.elements import ELEMENTS
 from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
-from .outputs import outputs_of, outputs_of_sweep, outputs_of_trade
+from .outputs import Output, outputs_of, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
 from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
-from .stopping import INTERRUPTED, SENTENCE, heard
+from .stopping import INTERRUPTED, SENTENCE, arrived, asked, heard
 from .sweeps.sweeping import sweep
-from .sweeps.texts import cases_in_words, usual_quantities
+from .sweeps.texts import assigned, cases_in_words, usual_quantities
 from .tradeoff.tables import as_markdown
 from .tradeoff.trading import Limits, trade, with_peer
 
@@ -53,6 +53,10 @@ REPORT = "a mistake of sfetcas, not of the scene; please report it with the line
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code is returned."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            # Whoever closed it wants to see nothing.
+            setattr(sys, name, io.StringIO())
     options = _parser().parse_args(arguments)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -70,8 +74,25 @@ def _noted(message: Warning | str, *_: object, **__: object) -> None:
 def _ended(options: argparse.Namespace) -> int:
     """Run a command; the exit code is returned."""
     try:
-        with np.errstate(over="raise"):
-            return int(options.command(options))
+        return _judged(lambda: int(options.command(options)))
+    except KeyboardInterrupt:
+        arrived()
+        print(SENTENCE, file=sys.stderr)
+        return INTERRUPTED
+
+
+def _judged(command: Callable[[], int]) -> int:
+    """The exit code of a command, also where it fails, which is told."""
+    try:
+        try:
+            with np.errstate(over="raise"):
+                code = command()
+            sys.stdout.flush()
+            return code
+        finally:
+            # What failed may be what somebody made of an interrupt.
+            if asked() and sys.exc_info()[0] is not None:
+                raise KeyboardInterrupt
     except SceneError as error:
         print(f"sfetcas: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -84,16 +105,24 @@ def _ended(options: argparse.Namespace) -> int:
     except MemoryError:
         print("sfetcas: no solution: the scene needs more memory than there is", file=sys.stderr)
         return NO_SOLUTION
-    except KeyboardInterrupt:
-        print(SENTENCE, file=sys.stderr)
-        return INTERRUPTED
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return SOLVED
-    except Exception:
+    except Exception as failure:
+        try:
+            # Where it is that nothing can be printed, it happens again.
+            print(end="\n" if isinstance(failure, OSError) else "", flush=True)
+        except OSError as error:
+            print(f"sfetcas: what is printed cannot be written: {error.strerror}", file=sys.stderr)
+            _print_no_more()
+            return BAD_INPUT
         traceback.print_exc()
         print(f"sfetcas: internal error: {REPORT}", file=sys.stderr)
         return INTERNAL
+
+
+def _print_no_more() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -228,9 +257,7 @@ def _run(options: argparse.Namespace) -> int:
 
     def told(solution: Answer) -> None:
         solved = time.perf_counter() - begin
-        for output in outputs:
-            output.write(solution)
-        report(solution, solved)
+        _give(solution, lambda: report(solution, solved), outputs)
 
     try:
         solution, checks = _answered(options.file, scene, settings)
@@ -240,6 +267,15 @@ def _run(options: argparse.Namespace) -> int:
         raise
     told(solution)
     return _verdict(solution, checks)
+
+
+def _give(answer: object, tell: Callable[[], object], outputs: Sequence[Output]) -> None:
+    """Print an answer and write its files; what fails of one does not cost the other."""
+    try:
+        tell()
+    finally:
+        for output in outputs:
+            output.write(answer)
 
 
 def _answered(file: Path, scene: Scene, settings: Settings) -> tuple[Answer, list[Check]]:
@@ -401,9 +437,7 @@ def _trade(options: argparse.Namespace) -> int:
         for command in options.peer:
             progress(f"peer, {command}")
             found = with_peer(found, command, options.file, options.budget)
-    for output in outputs:
-        output.write(found)
-    print(as_markdown(found, every=False), end="")
+    _give(found, lambda: print(as_markdown(found, every=False), end=""), outputs)
     return SOLVED
 
 
@@ -423,9 +457,7 @@ def _sweep(options: argparse.Namespace) -> int:
             options.file,
             lambda: sweep(scene, cases, quantities, workers=options.workers, settings=settings, progress=progress),
         )
-    for output in outputs:
-        output.write(found)
-    report_sweep(found)
+    _give(found, lambda: report_sweep(found), outputs)
     if found.interrupted:
         print("sfetcas: interrupted: what was solved before is kept", file=sys.stderr)
         return INTERRUPTED
@@ -475,21 +507,19 @@ def _named_progress() -> Iterator[Callable[[str], object]]:
 
 def _span(text: str) -> tuple[str, tuple[float, float] | None]:
     """An argument with the range that it may have."""
-    name, equals, span = text.partition("=")
-    if not equals:
+    name, span = assigned(text)
+    if not span:
         return name, None
-    low, colon, high = span.partition(":")
     try:
-        if not colon:
-            raise ValueError
-        return name, (float(low), float(high))
+        low, high = map(float, span.split(":"))
+        return name, (low, high)
     except ValueError:
         raise SceneError(f"--argument: found {text!r}, accepted: NAME or NAME=LOW:HIGH") from None
 
 
 def _place(text: str) -> tuple[str, tuple[float, ...]]:
     """Fractions of a member."""
-    name, _, numbers = text.partition("=")
+    name, numbers = assigned(text)
     try:
         return name, tuple(float(x) for x in numbers.split(","))
     except ValueError:

@@ -75,7 +75,9 @@ def write_file(path: Path, writer: Callable[[Path], Any]) -> None:
     """Write beside the final name first, so that nothing half-written is ever seen."""
     name = ""
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
+        # By its ending a writer knows its kind; a long one is of no kind, and there may be no longer name.
+        suffix = path.suffix if len(path.suffix) < 16 else ""
+        handle, name = tempfile.mkstemp(dir=path.parent, suffix=suffix)
         os.close(handle)
         writer(Path(name))
         os.chmod(name, 0o666 & ~_umask())

@@ -3,18 +3,51 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
+import os
 import signal
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from multiprocessing import resource_tracker
+from typing import Any
 
-__all__ = ["begin_apart", "postponed"]
+from .stopping import noted
+
+__all__ = ["begin_apart", "context_of", "postponed"]
 
 SIGNALS = {signal.SIGINT, signal.SIGTERM}
+
+
+LONGEST = 70
+"""Bytes of the folder for temporary files, so that with 32 more a socket may have its name, on any system."""
+
+
+def context_of(preloaded: Sequence[str]) -> Any:
+    """How processes are started: by a server that has imported some modules, where the system can (``forkserver``)."""
+    short = len(os.fsencode(tempfile.gettempdir())) <= LONGEST
+    if not (short and "forkserver" in multiprocessing.get_all_start_methods()):
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(preloaded))
+    return context
 
 
 @contextlib.contextmanager
 def postponed() -> Iterator[None]:
     """Within this signals wait: a process is started whole, or not at all."""
+    signals: list[int] = []
+    try:
+        # Other threads take them, too, so that it is not enough to block them in this one.
+        with noted(forward=False) as signals, _blocked():
+            yield
+    finally:
+        if signals:
+            signal.raise_signal(signals[0])
+
+
+@contextlib.contextmanager
+def _blocked() -> Iterator[None]:
+    """For what is started meanwhile, until :func:`begin_apart`."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -6,16 +6,20 @@ import re
 import sys
 import xml.etree.ElementTree as ElementTree
 
+import matplotlib
 import numpy as np
 import pytest
 import scenes
 from matplotlib.animation import FFMpegWriter
+from matplotlib.figure import Figure
 from moving import FALLING, SPACE, STRUCK
 from PIL import Image
 
 from sfetcas import Scene, SceneError, Settings, solve
 from sfetcas.cli import main
 from sfetcas.pictures.animation import _Film, _paced, save_animation
+from sfetcas.pictures.files import ENDINGS as PICTURES
+from sfetcas.pictures.files import save_figure
 from sfetcas.pictures.paraview import save_vtk
 
 ENDED = {**FALLING, "analysis": {**FALLING["analysis"], "output": 0.1}}
@@ -112,6 +116,29 @@ def test_films_need_their_program(tmp_path, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
     with pytest.raises(SceneError, match=r"found the ending '\.mp4', but no program ffmpeg"):
         save_animation(made(ENDED), tmp_path / "out.mp4")
+
+
+def test_what_ffmpeg_says_where_it_fails_is_told(tmp_path, monkeypatch, caplog):
+    program = tmp_path / "ffmpeg"
+    program.write_text("#!/bin/sh\ncat > /dev/null\necho No space left >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", str(program))
+    with pytest.raises(SceneError, match=r"^the program ffmpeg failed: No space left$"):
+        save_animation(made(ENDED), tmp_path / "out.mp4")
+    assert caplog.text == ""
+
+
+@pytest.mark.parametrize("ending", [*PICTURES, ".gif"])
+def test_where_a_disk_is_full_it_is_said(tmp_path, ending):
+    resource = pytest.importorskip("resource")
+    path, limits = tmp_path / f"a{ending}", resource.getrlimit(resource.RLIMIT_FSIZE)
+    answer = made(ENDED) if ending == ".gif" else None
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            save_animation(answer, path) if answer else save_figure(Figure(facecolor="red"), path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 def test_what_a_failed_motion_reached_is_animated(write, tmp_path):

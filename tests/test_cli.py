@@ -1,5 +1,6 @@
 """The command line as other programs use it: exit codes, one sentence, answers, nothing half-written."""
 
+import io
 import json
 import os
 import subprocess
@@ -9,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from moving import FALLING
 
-from sfetcas import Scene, cli
+from sfetcas import Scene, SceneError, cli, outputs
 from sfetcas.cli import main
 from sfetcas.description.records import counted
 
@@ -207,6 +209,57 @@ def test_output_that_cannot_be_written_is_exit_2_and_leaves_the_old_one(scene, t
     assert main(["run", str(unsolvable), "--json", str(out)]) == 2
     assert out.read_text() == "old"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["answer.json", "scene.toml"]
+
+
+def test_output_that_cannot_be_written_costs_no_report(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(outputs, "_json", lambda *_: lambda answer, path: path.joinpath("absent").read_text())
+    assert main(["run", str(scene()), "--json", str(tmp_path / "answer.json")]) == 2
+    caught = capsys.readouterr()
+    assert "node B: position" in caught.out
+    assert caught.err.count("could not be written") == caught.err.count("\n") == 1
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a disk that is full")
+@pytest.mark.parametrize("command", ["info", "run"])
+@pytest.mark.parametrize("buffering", [-1, 0])
+def test_a_report_that_cannot_be_written_is_told_and_costs_no_file(
+    scene, tmp_path, capsys, monkeypatch, command, buffering
+):
+    out = tmp_path / "answer.json"
+    with io.TextIOWrapper(open("/dev/full", "wb", buffering), write_through=not buffering) as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main([command, str(scene()), *(["--json", str(out)] if command == "run" else [])]) == 2
+    message = "sfetcas: what is printed cannot be written: No space left on device\n"
+    assert capsys.readouterr().err == message
+    assert out.exists() == (command == "run")
+
+
+@pytest.mark.parametrize(
+    ("text", "argument"),
+    [
+        ("loads.a=2.value", ("loads.a=2.value", None)),
+        ("loads.a=2.value.1=-1e3:.5", ("loads.a=2.value.1", (-1000.0, 0.5))),
+        ("sections.s=1.E=1:2", ("sections.s=1.E", (1.0, 2.0))),
+        ("sections.s=1.E", ("sections.s=1.E", None)),
+    ],
+)
+def test_names_may_have_signs_of_equality(text, argument):
+    assert cli._span(text) == argument
+
+
+def test_places_are_behind_the_last_sign_of_equality():
+    assert cli._place("a=2=0,0.5, 1") == ("a=2", (0.0, 0.5, 1.0))
+    with pytest.raises(SceneError, match=r"--places: found 'a=x', accepted: MEMBER=0,0\.5,1"):
+        cli._place("a=x")
+    with pytest.raises(SceneError, match="--argument: found 'a=1:2:3', accepted: NAME or NAME=LOW:HIGH"):
+        cli._span("a=1:2:3")
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_closed_streams_are_no_mistake(tmp_path, monkeypatch, stream):
+    (tmp_path / "falls.json").write_text(json.dumps({**FALLING, "analysis": {"type": "dynamic", "end": 0.02}}))
+    monkeypatch.setattr(sys, stream, None)
+    assert main(["run", str(tmp_path / "falls.json")]) == 0
 
 
 def test_command_line_as_a_process(scene):

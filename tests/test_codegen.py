@@ -471,7 +471,7 @@ def test_titles_stand_in_comments(title, tmp_path):
         assert "agree" in said(built(tmp_path / "c", "c"))
 
 
-@pytest.mark.parametrize("name", ["sf", "math", "m", "json", "main", "while"])
+@pytest.mark.parametrize("name", ["sf", "math", "m", "json", "main", "while", "INSTALL", "preinstall", "pythonfmu"])
 def test_names_that_mean_something_else(name, tmp_path):
     with pytest.raises(SceneError, match="accepted: a name of letters"):
         export(beam(), tmp_path / "c", name=name)
@@ -481,6 +481,9 @@ def test_foreign_folders_are_not_overwritten(tmp_path):
     place = tmp_path / "web"
     place.mkdir()
     (place / "manifest.json").write_text("{}")
+    with pytest.raises(SceneError, match="holds other things"):
+        export(beam(), place, overwrite=True)
+    (place / "manifest.json").write_text("[" * 200_000)
     with pytest.raises(SceneError, match="holds other things"):
         export(beam(), place, overwrite=True)
     (place / "manifest.json").unlink()

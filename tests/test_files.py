@@ -1,8 +1,11 @@
 """Files that are read: plain ones of a bounded size only, whatever a scene or a command line names."""
 
+import contextlib
 import io
 import os
 import re
+import struct
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -10,7 +13,8 @@ import pytest
 
 from sfetcas import SceneError, load
 from sfetcas.cli import main
-from sfetcas.description.matrices import read_matrix
+from sfetcas.description.matrices import _from_market, _from_npz, _matrix, read_matrix
+from sfetcas.files import write_file
 from sfetcas.sweeps.cases import read_cases
 
 
@@ -76,12 +80,29 @@ def test_links_and_made_up_files_are_read(tmp_path):
             read_matrix(type(tmp_path)("/proc/self/status"))
 
 
+def bzipped(path):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("stiffness.npy", header((6, 6)) + bytes(1000))
+
+
+def headed(text):
+    """An array with another head."""
+    return lambda path: path.write_bytes(b"\x93NUMPY\1\0" + struct.pack("<H", len(text)) + text.encode() + bytes(288))
+
+
 PICKLED = io.BytesIO()
 np.save(PICKLED, np.array([print], dtype=object), allow_pickle=True)
 ARCHIVES = {
     "more than it holds": (lambda p: p.write_bytes(header((10**6, 10**6)) + bytes(64)), "announces 1000000 x 1000000"),
     "a bomb": (bomb, r"330 MB unpacked, accepted: a matrix of 300 MB"),
     "objects": (lambda p: p.write_bytes(PICKLED.getvalue()), "holds no arrays of numbers"),
+    "packed otherwise": (bzipped, r"in the way 12, accepted: not packed \(0\) or as numpy packs them \(8\)"),
+    "a head without an end": (headed("(" * 90 + "\n"), "holds no arrays of numbers"),
+    "a head of another kind": (headed("{{}: 1}\n"), "holds no arrays of numbers"),
+    "a head of parentheses": (headed("-" * 9000 + "1\n"), "holds no arrays of numbers"),
+    "sizes below nothing": (lambda p: p.write_bytes(header((-6, -6)) + bytes(288)), "announces -6 x -6 numbers, accep"),
+    "sizes of no end": (lambda p: p.write_bytes(header((10**300, 0))), "0 numbers, accepted: 1 to 6000 rows"),
+    "sizes that are true": (lambda p: p.write_bytes(header((True, True)) + bytes(8)), "announces True x True numbers"),
     "half": (lambda p: p.write_bytes(b"PK\3\4 and nothing else"), "cannot be read"),
 }
 
@@ -92,6 +113,43 @@ def test_what_unpacks_to_more_than_it_may_is_refused(kind, tmp_path):
     write(tmp_path / "k.npz")
     with pytest.raises(ValueError, match=sentence):
         read_matrix(tmp_path / "k.npz")
+
+
+def test_numbers_that_no_float_holds_are_no_matrix():
+    with pytest.raises(ValueError, match=r"^found \[\[1000.*\.\.\., accepted: a square matrix of finite numbers"):
+        _matrix([[10**400]], "stiffness")
+
+
+def test_no_more_is_unpacked_than_an_archive_says(tmp_path):
+    content = header((6, 6)) + bytes(20_000_000)
+    with zipfile.ZipFile(tmp_path / "k.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("stiffness.npy", content)
+    said, lie = (struct.pack("<I", size) for size in (len(content), 416))
+    archive = (tmp_path / "k.npz").read_bytes().replace(said, lie)
+    assert peak_of(_from_npz, archive, tmp_path, "stiffness") < 1_000_000
+
+
+def test_numbers_of_a_text_are_read_without_a_text_for_each(tmp_path):
+    text = b"%%MatrixMarket matrix array real general\n300 300\n" + 90_000 * b"10\n"
+    assert peak_of(_from_market, text, tmp_path) < 20 * len(text)
+
+
+def peak_of(work, *given):
+    """Most bytes that some work has at once, whether it is refused or not."""
+    tracemalloc.start()
+    try:
+        with contextlib.suppress(ValueError):
+            work(*given)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_any_name_that_a_folder_takes_is_written(tmp_path):
+    path = tmp_path / f"a.{'b' * 250}"
+    write_file(path, lambda there: there.write_text("all"))
+    assert path.read_text() == "all"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_scene_that_names_a_device_is_one_sentence(tmp_path, capsys):

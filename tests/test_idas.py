@@ -14,7 +14,6 @@ import sfetcas
 from sfetcas import Scene, SceneError, Settings, SolveError, Status, assemble, uniform_mesh
 from sfetcas.description.loads import History
 from sfetcas.dynamics import idas
-from sfetcas.dynamics.idas import _interrupts
 from sfetcas.dynamics.index_one import IndexOne
 from sfetcas.dynamics.inertia import Inertia
 from sfetcas.dynamics.projecting import closed
@@ -22,6 +21,7 @@ from sfetcas.dynamics.simulation import simulate
 from sfetcas.dynamics.stages import StageEquations
 from sfetcas.mechanics.equations import Equations, State
 from sfetcas.mechanics.masses import masses_of
+from sfetcas.stopping import noted
 
 ACCURACY = 1e-4
 RAMP = {"t": [0, 0.2, 1], "polynomial": [[0, 0, 0, 10, -15, 6], [1]]}
@@ -450,7 +450,7 @@ def test_interrupts_that_casadi_swallows_are_seen():
 
 def _check_interrupts():
     before = signal.getsignal(signal.SIGINT)
-    with _interrupts() as seen:
+    with noted(forward=True) as seen:
         assert seen == []
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)

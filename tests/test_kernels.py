@@ -201,6 +201,22 @@ def test_cache_folder(monkeypatch, tmp_path):
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert kernels.cache_folder() == tmp_path / ".cache" / "sfetcas"
+    # Never in the folder in which the program runs.
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert kernels.cache_folder() == tmp_path / ".cache" / "sfetcas"
+    for nowhere in ("", "relative"):
+        monkeypatch.setenv("HOME", nowhere)
+        assert kernels.cache_folder() is None
+
+
+def test_without_a_home_nothing_is_compiled(monkeypatch):
+    def nobody():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("SFETCAS_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", nobody)
+    assert kernels.chosen(ELEMENT.turning, 1e9) is kernels.compiled(ELEMENT.turning) is ELEMENT.turning
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])

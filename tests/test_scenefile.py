@@ -8,7 +8,7 @@ import pytest
 
 from sfetcas.description import scenefile
 from sfetcas.description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
-from sfetcas.description.scenefile import dump, load, parse
+from sfetcas.description.scenefile import _table, dump, load, parse
 from sfetcas.description.sections import CrossSection
 from sfetcas.errors import SceneError
 
@@ -191,6 +191,19 @@ def test_a_byte_order_mark_and_windows_lines_are_read(tmp_path):
         ("scene.toml", b"title = 'a'\ntitle = 'b'", "not read as TOML: Cannot overwrite a value (at "),
         ("scene.json", b'{"title": }', "not read as JSON: Expecting value: line 1 column 11"),
         ("scene.json", b'{"nodes": {"A": {}, "A": {}}}', "not read as JSON: the key 'A' stands twice in one"),
+        ("scene.toml", b"a." * 20 + b"b = 1", "not read as TOML: found the key 'a.a."),
+        ("scene.toml", b"[ a" + b' . "b \'c"' * 20 + b"]", "not read as TOML: found the key 'a . x . "),
+        (
+            "scene.toml",
+            b"gravity = " + b"9" * 5000,
+            "not read as TOML: found a whole number with over 4300 digits, acc",
+        ),
+        ("scene.json", b'{"title": ' + b"9" * 5000 + b"}", "not read as JSON: found a whole number with over 4300"),
+        (
+            "scene.toml",
+            b"title = 0x" + b"f" * 5000,
+            "title: found a whole number with over 4300 digits, accepted: a te",
+        ),
         ("scene.json", b"[" * 100000, "not read as JSON: lists or tables are nested too deeply"),
         ("scene.json", b"[]", "found [], accepted: a table"),
         ("scene.json", b"{}", "scene without members: "),
@@ -205,6 +218,42 @@ def test_files_that_are_refused(tmp_path, name, content, sentence):
     with pytest.raises(SceneError, match="^" + re.escape(f"{path}: {sentence}")) as caught:
         load(path)
     assert "\n" not in str(caught.value)
+
+
+DOTS = "a." * 30 + "a"
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        f'"{DOTS}"',
+        f"'{DOTS}'",
+        f'"it\\"s {DOTS}"',
+        f'"""\n{DOTS} "" \\""" {DOTS}"""""',
+        f"'''\n{DOTS} '' {DOTS}'''",
+        f'"a" # it\'s {DOTS}\n# """ {DOTS}',
+        f'"a"\ngravity = [0, -9.81, 0.0] # {DOTS}',
+    ],
+)
+def test_dots_in_texts_and_comments_are_no_keys(title):
+    beam = "nodes.'A.'.position = [0, 0]"
+    with pytest.raises(SceneError, match="found the name 'A\\.', accepted: a printable name without a dot"):
+        parse(f"title = {title}\n{beam}", "toml")
+
+
+def test_a_key_that_stands_twice_is_found_in_few_comparisons():
+    compared = []
+
+    class Key(str):
+        __hash__ = str.__hash__
+
+        def __eq__(self, other):
+            compared.append(other)
+            return str.__eq__(self, other)
+
+    with pytest.raises(SceneError, match="the key '999' stands twice"):
+        _table([(Key(min(i, 999)), i) for i in range(1001)])
+    assert len(compared) < 5000
 
 
 def test_a_syntax_error_names_its_line(tmp_path):

@@ -6,11 +6,12 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from pathlib import Path
 
 import pytest
 
-from sfetcas import cli, stopping
+from sfetcas import cli, processes, stopping
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 SIGNALS = {signal.SIGTERM: 143, signal.SIGINT: 130}
@@ -103,6 +104,58 @@ def test_a_sweep_ends_with_all_its_processes(tmp_path):
     assert error.replace("here\n", "") == "sfetcas: interrupted: what was solved before is kept\n"
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 4001
     assert not list((tmp_path / "tmp").iterdir())
+
+
+SWALLOWING = """
+from sfetcas import cli
+import time
+def swallowing(*_, **__):
+    try:
+        say()
+        time.sleep(60)
+    except KeyboardInterrupt:
+        pass
+    try:
+        time.sleep(3)
+    finally:
+        time.sleep(0.5)
+        os.write(2, b"in order\\n")
+cli.solve = swallowing
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs a timer")
+@pytest.mark.parametrize("number", SIGNALS)
+def test_what_a_library_swallows_is_raised_again_until_it_arrives(number, tmp_path):
+    # Meanwhile what puts things in order is not disturbed.
+    process = started(tmp_path, "run", str(PROBLEMS / "bend_45_degrees.toml"), before=SWALLOWING)
+    assert ended(process, number) == (SIGNALS[number], f"in order\n{stopping.SENTENCE}\n")
+
+
+def test_signals_that_other_threads_take_wait_while_processes_start():
+    seen = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: seen.append(number))
+    over = threading.Event()
+    other = threading.Thread(target=over.wait)
+    other.start()
+    try:
+        with processes.postponed():
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.05)
+            assert seen == []
+        assert seen == [signal.SIGTERM]
+    finally:
+        over.set()
+        other.join()
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_after_all_was_written_a_signal_adds_nothing(tmp_path):
+    # The name of what runs is another one then, where it is ``python -m sfetcas``.
+    before = "import atexit, sfetcas\nsay()\nsys.argv[0] = '__main__.py'\n"
+    before += "atexit.register(os.kill, os.getpid(), signal.SIGTERM)"
+    process = started(tmp_path, "info", str(PROBLEMS / "bend_45_degrees.toml"), before=before)
+    assert ended(process) == (0, "")
 
 
 def test_within_another_program_signals_are_left_alone():

@@ -32,6 +32,8 @@ from sfetcas import (
 )
 from sfetcas.benchmark import lee_frame
 from sfetcas.cli import main
+from sfetcas.equilibria.quantities import Quantity
+from sfetcas.processes import context_of
 from sfetcas.sweeps import feeding, work
 from sfetcas.sweeps.cases import Cases, read_cases
 from sfetcas.sweeps.quantities import wanted_of
@@ -127,6 +129,17 @@ def test_quantities_of_every_analysis(scene, quantity, told):
     wanted = wanted_of(scene, [quantity])[0].expect
     asked = changed(scene, {f"sections.{section}.EI3": value}).replace(expect=[wanted])
     assert np.array_equal(np.atleast_1d(found.values(quantity)[0]), told(solve(asked)))
+
+
+def test_names_with_spaces_and_words_of_selectors_are_names():
+    table = cantilever()
+    table["nodes"]["x step 2"] = table["nodes"].pop("B")
+    table["members"] = {"the m at 1": {**table["members"]["m"], "nodes": ["A", "x step 2"]}}
+    table["loads"]["tip"]["node"] = "x step 2"
+    tip, root = "nodes.x step 2.position", "members.the m at 1.force at 0"
+    found = here(made(table), {"loads.tip.value.1": [1.0]}, [tip, root], settings=Settings(accuracy_of=root))
+    assert list(found.table)[1:7] == [*(f"{tip}.{i}" for i in range(3)), *(f"{root[:-5]}.{i} at 0" for i in range(3))]
+    assert Quantity.named("nodes.x at 2.position") == Quantity("nodes.x at 2.position")
 
 
 def test_of_several_equilibria_the_default_one_is_taken(no_solver):
@@ -273,6 +286,13 @@ def test_an_interrupt_keeps_what_is_done(own):
     assert 4 <= found.solved.sum() < 40 or not own
     assert np.isfinite(found.values(TIP)[:4]).all()
     assert {f.reason for f in found.failures} <= {"interrupted before"}
+
+
+def test_where_no_socket_may_have_its_name_processes_start_otherwise(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / ("d" * 110)))
+    with Workers(1) as own:
+        assert own.submit(os.getpid).result() != os.getpid()
+    assert context_of([]).get_start_method() == "spawn"
 
 
 def test_progress_counts_every_case():

@@ -1,5 +1,6 @@
 """Time steps as generated C: the steps of the integrator, to the last bit."""
 
+import importlib
 import json
 import re
 import shutil
@@ -168,6 +169,30 @@ def test_unit_for_cosimulation(tmp_path):
     assert [y, angle] == pytest.approx([told["nodes.B.position"][1], told["nodes.B.angle"][0]], abs=1e-10)
     # An earlier export with its unit is one.
     export(rod(step=0.01), tmp_path / "c", name="motion", overwrite=True)
+
+
+LIBRARY = """
+import json, os
+class Motion:
+    def told(self, arguments):
+        with open(os.path.join(os.path.dirname(__file__), "manifest.json")) as file:
+            return {one["name"]: [0.0] * one["size"] for one in json.load(file)["results"]}
+"""
+
+
+def test_numbers_in_a_unit_have_names_of_their_own(tmp_path, monkeypatch):
+    export(rod(step=0.01), tmp_path / "c", name="twice", arguments={"nodes.B.position.0": (0.5, 1.5), "factor": None})
+    (tmp_path / "c" / "twice.py").write_text(LIBRARY)
+    monkeypatch.syspath_prepend(tmp_path / "c")
+    unit = importlib.import_module("twice_unit").TwiceUnit(instance_name="unit")
+    assert {"nodes.B.position.0", "answer.nodes.B.position.0", "nodes.B.velocity.0"} < {
+        v.name for v in unit.vars.values()
+    }
+    described = unit.to_xml()
+    names = [one.get("name") for one in described.iter("ScalarVariable")]
+    assert len(set(names)) == len(names)
+    # What is structured has numbers in brackets.
+    assert described.get("variableNamingConvention") == "flat"
 
 
 def test_a_history_that_is_no_argument_stands_as_the_argument_would():

@@ -35,10 +35,11 @@ RESERVED = (
     " auto break case char const continue default do double else enum extern float for goto if inline int long "
     " register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while "
     " class namespace template this throw new delete public private protected virtual operator using bool true false "
-    " main check sf casadi m test all clean install help "
+    " main check sf casadi pythonfmu m test all clean install help "
+    " ALL_BUILD INSTALL PACKAGE RUN_TESTS ZERO_CHECK package package_source preinstall edit_cache rebuild_cache depend "
     " complex fenv inttypes limits math setjmp stdarg stdbool stddef stdint stdio stdlib tgmath wchar wctype features "
 )
-"""Words that are no names in C or C++, names of files of the folder, and headers that its own would hide."""
+"""Words that are no names in C, in C++ or of targets of CMake, files of the folder, and what its own would hide."""
 
 
 def export(
@@ -153,7 +154,9 @@ def check_name(name: str) -> None:
     # Constants begin with the name in capitals; a loader may not hide what Python itself imports.
     taken = f" {name} " in RESERVED or name.lower() == "sf" or name in sys.stdlib_module_names
     if not plain or taken or keyword.iskeyword(name) or len(name) > 60:
-        accepted = "a name of letters, digits and _ that begins with a letter and is no word of C or module of Python"
+        accepted = (
+            "a name of letters, digits and _ that begins with a letter and is no word of C or CMake or module of Python"
+        )
         raise SceneError(f"found {say(name)}, accepted: {accepted}", ("name",))
 
 
@@ -180,7 +183,7 @@ def _ours(path: Path) -> bool:
     try:
         manifest = json.loads(read_file(path / "manifest.json", LARGEST))
         name = manifest["name"] if manifest["made_by"] == "sfetcas" else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
     if not isinstance(name, str):
         return False

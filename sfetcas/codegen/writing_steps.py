@@ -49,6 +49,15 @@ class StepWriter(Writer):
         named = {**values, "Name": self.name[:1].upper() + self.name[1:]}
         return {f"{self.name}_unit.py": filled(template("unit.py.in"), named)}
 
+    def _manifest(self) -> dict[str, Any]:
+        """With other names in the unit for results whose numbers have the names of arguments."""
+        manifest = super()._manifest()
+        given = {name for one in self.arguments.arguments for name in one.names}
+        for one in manifest["results"]:
+            if given & {one["name"], *(f"{one['name']}.{i}" for i in range(one["size"]))}:
+                one["in_unit"] = f"answer.{one['name']}"
+        return manifest
+
     @property
     def statuses(self) -> list[Status]:
         """Those of a step."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
-import lzma
 import math
+import re
+import tokenize
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
@@ -38,6 +40,9 @@ SAME = 1e-7
 LARGEST = 6000
 """Rows of a matrix that are read: a thousand nodes of one small member."""
 
+PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Ways of an archive that are unpacked piece by piece."""
+
 MOST_BYTES = 300_000_000
 """Of a file with a matrix, and of what it unpacks to: so many rows of numbers of 8 bytes."""
 
@@ -47,7 +52,7 @@ def _matrix(value: Any, name: str) -> tuple[tuple[float, ...], ...]:
         value = read_matrix(Path(value), name)
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.zeros(0)
     square = array.ndim == 2 and array.shape[0] == array.shape[1]
     if not square or not np.isfinite(array).all():
@@ -97,17 +102,34 @@ def _from_npz(content: bytes, path: Path, name: str) -> Floats:
             if entry.file_size > MOST_BYTES:
                 message = f"{path}: found {entry.file_size / 1e6:.4g} MB unpacked, accepted: a matrix of"
                 raise ValueError(f"{message} {MOST_BYTES / 1e6:.4g} MB at most")
-            return _from_npy(archive.read(entry), path)
+            if entry.compress_type not in PACKED:
+                found = f"arrays packed in the way {entry.compress_type}"
+                raise ValueError(f"{path}: found {found}, accepted: not packed (0) or as numpy packs them (8)")
+            with archive.open(entry) as stream:
+                # What it says of its size need not be so: no more than that is unpacked.
+                return _from_npy(stream.read(entry.file_size + 1), path)
     except (
         zipfile.BadZipFile,
         zlib.error,
-        lzma.LZMAError,
         EOFError,
         OSError,
         NotImplementedError,
         RuntimeError,
     ) as error:
         raise ValueError(f"the file {path} cannot be read: {error}") from None
+
+
+UNREAD = (
+    ValueError,
+    EOFError,
+    SyntaxError,
+    TypeError,
+    OverflowError,
+    MemoryError,
+    RecursionError,
+    tokenize.TokenError,
+)
+"""What numpy raises at a head that is none, which it reads as Python."""
 
 
 def _from_npy(content: bytes, path: Path) -> Floats:
@@ -117,15 +139,17 @@ def _from_npy(content: bytes, path: Path) -> Floats:
         major, _ = np.lib.format.read_magic(stream)
         read_head = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
         shape, _, kind = read_head(stream)
-    except (ValueError, EOFError):
+    except UNREAD:
         raise ValueError(f"the file {path} holds no arrays of numbers of numpy") from None
     if kind.hasobject:
         raise ValueError(f"the file {path} holds no arrays of numbers of numpy")
     if kind.kind not in "fiu":
         raise ValueError(f"the file {path} holds {kind.name}, accepted: real numbers")
+    told = " x ".join(map(str, shape))[:60]
+    if not all(type(size) is int and 0 < size <= LARGEST for size in shape):
+        raise ValueError(f"the file {path} announces {told} numbers, accepted: 1 to {LARGEST} rows and columns")
     if math.prod(shape) * kind.itemsize > len(content):
-        told = " x ".join(map(str, shape))
-        raise ValueError(f"the file {path} announces {told[:60]} numbers and holds fewer, accepted: all of them")
+        raise ValueError(f"the file {path} announces {told} numbers and holds fewer, accepted: all of them")
     stream.seek(0)
     try:
         return np.asarray(np.lib.format.read_array(stream, allow_pickle=False), dtype=float)
@@ -133,25 +157,31 @@ def _from_npy(content: bytes, path: Path) -> Floats:
         raise ValueError(f"the file {path} holds no arrays of numbers of numpy") from None
 
 
+COMMENT = re.compile(r"(?<![^\r\n])[ \t]*%[^\r\n]*")
+
+
 def _from_market(content: bytes, path: Path) -> Floats:
     """Matrix Market exchange format, coordinate or array, general or symmetric (Boisvert et al. 1996)."""
     try:
-        lines = content.decode("utf-8-sig").strip().splitlines()
+        first, *rest = re.split(r"[\r\n]+", content.decode("utf-8-sig").strip(), maxsplit=1)
     except UnicodeDecodeError:
         raise ValueError(f"the file {path} is no text, accepted: Matrix Market, or .npz") from None
-    head = lines[0].lower().split() if lines else []
+    head = first.lower().split()
     if head[:2] != ["%%matrixmarket", "matrix"] or len(head) != 5:
         raise ValueError(f"the file {path} does not begin as Matrix Market does, '%%MatrixMarket matrix'")
     kinds = ("array", "coordinate"), ("real", "double", "integer"), ("general", "symmetric")
     for found, accepted in zip(head[2:], kinds, strict=True):
         if found not in accepted:
             raise ValueError(f"the file {path} is {found}, accepted: {', '.join(accepted)}")
-    text = " ".join(line for line in lines[1:] if not line.lstrip().startswith("%"))
-    # Fortran writes the exponent of double precision with a D.
-    numbers = text.replace("D", "e").replace("d", "e").split()
+    text = COMMENT.sub("", rest[0]) if rest else ""
     try:
-        return _market_entries(np.array(numbers, dtype=float), head[2], head[4])
-    except (ValueError, IndexError):
+        with warnings.catch_warnings():
+            # Before it was an error, numpy warned of what is no number.
+            warnings.simplefilter("error", DeprecationWarning)
+            # Fortran writes the exponent of double precision with a D.
+            numbers = np.fromstring(text.replace("D", "e").replace("d", "e"), sep=" ")
+        return _market_entries(numbers, head[2], head[4])
+    except (ValueError, IndexError, DeprecationWarning):
         raise ValueError(f"the file {path} does not hold the entries that its head announces") from None
 
 

@@ -43,7 +43,10 @@ R = TypeVar("R", bound="Record")
 
 def say(value: object) -> str:
     """A found value, short enough for a sentence."""
-    return _short(repr(list(value) if isinstance(value, tuple) else value))
+    try:
+        return _short(repr(list(value) if isinstance(value, tuple) else value))
+    except ValueError:
+        return "a whole number with over 4300 digits"
 
 
 def _short(word: str) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,18 @@ __all__ = ["dump", "load", "parse"]
 
 LARGEST = 50_000_000
 """Bytes of a scene file: a hundred thousand members take half of it, and are more than can be solved."""
+
+MOST_PARTS = 20
+"""Of a key with dots: scenes need a few, and the reader of TOML takes minutes with thousands."""
+
+_QUOTED = re.compile(
+    r'#[^\n]*|"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\[^\n])*"?'
+    r"|'{3}.*?(?:'{3}|\Z)|'[^'\n]*'?",
+    re.DOTALL,
+)
+"""Comments and texts of TOML, also without their ends, so that nothing is read twice."""
+
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_PARTS}}}", re.ASCII)
 
 _ENDINGS = {".toml": "toml", ".json": "json"}
 
@@ -74,6 +88,8 @@ def parse(text: str, format: str, folder: Path | None = None) -> Scene:
 def _values(text: str, format: str) -> Any:
     """The tables of a text."""
     try:
+        if format == "toml":
+            _check_keys(text)
         values = tomllib.loads(text) if format == "toml" else json.loads(text, object_pairs_hook=_table)
         if "\\ud" in text.lower():
             # Half of a pair stands for no character, and could neither be printed nor written.
@@ -83,8 +99,19 @@ def _values(text: str, format: str) -> Any:
         raise
     except UnicodeEncodeError as error:
         raise SceneError(f"not read as JSON: found {error.object[error.start]!a}, half of a character") from None
-    except ValueError as error:
+    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
         raise SceneError(f"not read as {format.upper()}: {error}") from None
+    except ValueError:
+        # Python reads no longer ones, as that takes long.
+        found = "a whole number with over 4300 digits"
+        raise SceneError(f"not read as {format.upper()}: found {found}, accepted: finite numbers") from None
+
+
+def _check_keys(text: str) -> None:
+    """Refuse keys of TOML with very many parts; what is quoted is one part, or no key."""
+    long = _LONG_KEY.search(_QUOTED.sub(lambda found: "" if found[0].startswith("#") else "x", text))
+    if long:
+        raise SceneError(f"not read as TOML: found the key {say(long[0])}, accepted: {MOST_PARTS} parts at most")
 
 
 def dump(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -137,7 +164,7 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
         keys = [key for key, _ in pairs]
-        double = next(key for key in keys if keys.count(key) > 1)
+        double = Counter(keys).most_common(1)[0][0]
         raise SceneError(f"not read as JSON: the key {say(double)} stands twice in one table")
     return table
 

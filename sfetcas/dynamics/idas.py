@@ -9,13 +9,9 @@ Source: Hindmarsh et al. 2005 (SUNDIALS, doi 10.1145/1089014.1089020); Eich 1993
 
 from __future__ import annotations
 
-import contextlib
-import signal
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from types import FrameType
 from typing import final
 
 import casadi as ca
@@ -24,6 +20,7 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
+from ..stopping import noted
 from .beginning import at_rest
 from .index_one import LINEAR, IndexOne
 from .inertialess import check_inertia
@@ -187,7 +184,8 @@ class _Solver:
             problem = self._one.problem
             self._made[fractions] = ca.integrator("idas", "idas", problem, 0.0, list(fractions), self._options)
         function = self._made[fractions]
-        with _interrupts() as interrupted:
+        # CasADi takes an interrupt for a residual that cannot be evaluated, and forgets it.
+        with noted(forward=True) as interrupted:
             try:
                 z = self._one.answers(x, 0.0, p)[0]
                 found = np.array(function(x0=x, z0=z, p=p)["xf"])
@@ -197,27 +195,6 @@ class _Solver:
                 return None
         self.steps = int(function.stats()["nsteps"])
         return list(found.T) if np.isfinite(found).all() else None
-
-
-@contextlib.contextmanager
-def _interrupts() -> Iterator[list[int]]:
-    """Interrupts that come meanwhile: CasADi takes one for a residual that cannot be evaluated, and forgets it."""
-    seen: list[int] = []
-    before = signal.getsignal(signal.SIGINT)
-    # Without a handler of Python there is nothing to be forgotten; only the main thread may change it.
-    if not callable(before) or threading.current_thread() is not threading.main_thread():
-        yield seen
-        return
-
-    def remember(number: int, frame: FrameType | None) -> None:
-        seen.append(number)
-        before(number, frame)
-
-    signal.signal(signal.SIGINT, remember)
-    try:
-        yield seen
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 class _Projection:

@@ -23,6 +23,7 @@ from ..mechanics.equations import Equations
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
+from ..stopping import arrived
 from .beginning import at_rest, equilibrium_before, moving, posed, velocities
 from .conserving import Conserving
 from .idas import Idas
@@ -195,6 +196,7 @@ class Simulation:
                 if watch is not None and watch.passed(run.instants):
                     break
         except KeyboardInterrupt:
+            arrived()
             run.interrupted = True
         except SolveError as error:
             if not run.instants:

@@ -6,6 +6,7 @@ place is needed, ``members.beam.moment at 0.5``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -17,10 +18,13 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .solution import Equilibrium, Posture
 
-__all__ = ["WHERE", "Further", "Quantity", "entry_of", "value_of"]
+__all__ = ["VALUE", "WHERE", "Further", "Quantity", "entry_of", "value_of"]
 
 WHERE = ("analysis", "accuracy_of")
 """Where a scene names what the accuracy is of."""
+
+VALUE = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[^\s.]+"
+"""A number or a word behind a quantity; a dot in another place is one of the name, which may have spaces."""
 
 Further = Callable[[str, str], dict[str, Any]]
 """Of a kind and a name (``nodes``, ``B``) what an answer has beyond what all have; empty where that is nothing."""
@@ -125,17 +129,16 @@ class Quantity:
         SceneError
             No number stands after ``at``, or no place along a member.
         """
-        name, found, place = text.partition(" at ")
-        if not found and name.startswith("members."):
-            accepted = f"a place along the member too, as {name.strip()} at 0.5"
+        found = re.fullmatch(rf"(.*\S)\s+at\s+({VALUE})", text.strip())
+        if not found and text.startswith("members."):
+            accepted = f"a place along the member too, as {text.strip()} at 0.5"
             raise SceneError(f"found {text!r}, accepted: {accepted}", WHERE)
         if not found:
             return cls(text.strip())
         try:
-            at = float(place)
+            return cls(found[1], float(found[2]))
         except ValueError:
             raise SceneError(f"found {text!r}, accepted: NAME, or members.NAME.KEY at FRACTION", WHERE) from None
-        return cls(name.strip(), at)
 
     def value(self, step: Posture, look_up: Callable[..., Any] = value_of) -> Array:
         """What an answer says, as numbers, (n,).

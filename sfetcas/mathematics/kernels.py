@@ -65,12 +65,19 @@ LOADED = 256
 """Libraries that are kept at hand, some for each kind of element; one that is not is read again."""
 
 
-def cache_folder() -> Path:
-    """Where compiled kernels are kept: $SFETCAS_CACHE, else a folder of the user's cache."""
+def cache_folder() -> Path | None:
+    """Where compiled kernels are kept: $SFETCAS_CACHE, else a folder of the user's cache; None where there is none."""
     given = os.environ.get("SFETCAS_CACHE")
     if given:
         return Path(given)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sfetcas"
+    try:
+        usual = Path.home() / ".cache" if os.environ.get("HOME") != "" else None
+    except RuntimeError:
+        # Nobody knows this user.
+        usual = None
+    # What is no path from the root is to be ignored; it would be a place in whatever folder the program runs in.
+    places = (place for place in (Path(os.environ.get("XDG_CACHE_HOME", "")), usual) if place and place.is_absolute())
+    return next((place / "sfetcas" for place in places), None)
 
 
 @functools.cache
@@ -123,8 +130,10 @@ def _loaded(name: str, key: str, folder: Path) -> ca.Function:
     raise FileNotFoundError
 
 
-def _load(function: ca.Function, folder: Path) -> ca.Function | None:
+def _load(function: ca.Function, folder: Path | None) -> ca.Function | None:
     """The compiled function from the cache, or None."""
+    if folder is None:
+        return None
     try:
         return _loaded(function.name(), _key(function), folder)
     except OSError:
@@ -137,10 +146,10 @@ def compiled(function: ca.Function) -> ca.Function:
     return _load(function, folder) or (_compile(function, folder) and _load(function, folder)) or function
 
 
-def _compile(function: ca.Function, place: Path) -> bool:
+def _compile(function: ca.Function, place: Path | None) -> bool:
     """Put the library of a function into the cache; whether that went well."""
     compiler = _compiler()
-    if compiler is None:
+    if compiler is None or place is None:
         return False
     try:
         place.mkdir(mode=0o700, parents=True, exist_ok=True)

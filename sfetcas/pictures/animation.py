@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
@@ -66,7 +68,7 @@ def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike
     Raises
     ------
     SceneError
-        As :func:`check_animation`.
+        As :func:`check_animation`, or ffmpeg fails.
     """
     check_animation(answer.scene, file)
     if isinstance(answer, Trajectory):
@@ -80,10 +82,19 @@ def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike
         texts = [f"factor {in_short(step.factor)}" for step in steps]
     film = _Film(steps, answer.scene.title, gravity=1.0 if isinstance(answer, Trajectory) else 0.0)
     writer: Any = (FFMpegWriter if check_ending(file, ENDINGS) == ".mp4" else PillowWriter)(fps=rate)
-    with writer.saving(film.figure, os.fspath(file), DPI):
-        for number, text in enumerate(texts):
-            film.show(number, text)
-            writer.grab_frame()
+    log = logging.getLogger("matplotlib.animation")
+    before, log.disabled = log.disabled, True
+    try:
+        with writer.saving(film.figure, os.fspath(file), DPI):
+            for number, text in enumerate(texts):
+                film.show(number, text)
+                writer.grab_frame()
+    except CalledProcessError as error:
+        said = (error.stderr or "").split("\n")
+        reason = next((line for line in reversed(said) if line.strip()), f"exit code {error.returncode}")
+        raise SceneError(f"the program ffmpeg failed: {reason.strip()}") from None
+    finally:
+        log.disabled = before
 
 
 def _paced(times: Array) -> tuple[Index, int, str]:

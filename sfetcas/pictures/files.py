@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 
@@ -40,4 +41,7 @@ def save_figure(figure: Figure, file: str | os.PathLike[str]) -> None:
         The ending is none of :data:`ENDINGS`.
     """
     dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    figure.savefig(file, dpi=DPI, metadata=dates.get(check_ending(file)))
+    content, ending = io.BytesIO(), check_ending(file)
+    # Libraries that write files by themselves do not all say where a disk is full.
+    figure.savefig(content, format=ending[1:], dpi=DPI, metadata=dates.get(ending))
+    Path(file).write_bytes(content.getvalue())

@@ -10,6 +10,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from ..errors import SceneError
+from ..stopping import arrived
 from .work import FAILED, NOT_RUN, SHORT, SOLVED, UNANSWERED, Job, Outcome, solve_chunk
 from .workers import Workers
 
@@ -74,6 +75,7 @@ class _Feeding:
                 self._take(self.finished.get())
                 self._fill()
         except KeyboardInterrupt:
+            arrived()
             self._rescue()
             return True
         finally:

@@ -16,10 +16,11 @@ import numpy as np
 from ..checks import Answer, asked
 from ..description.records import say, unknown
 from ..description.scene import Expect, Scene
+from ..equilibria.quantities import VALUE
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 
-__all__ = ["Wanted", "wanted_of"]
+__all__ = ["Wanted", "parted", "wanted_of"]
 
 KEYS = {
     "nodes": ("position", "quaternion", "angle", "velocity"),
@@ -43,7 +44,7 @@ SELECTORS = ("at", "step", "time", "crossing", "limit_point", "bifurcation", "fl
 
 COUNTS = SELECTORS[3:]
 
-WORDS = re.compile(rf"(?P<name>.*\S)\s+(?P<key>{'|'.join(SELECTORS)})\s+(?P<value>\S+)\s*")
+WORDS = re.compile(rf"(?P<name>.*\S)\s+(?P<key>{'|'.join(SELECTORS)})\s+(?P<value>{VALUE})\s*")
 
 COMING_AND_GOING = ("contacts", "modes")
 """Kinds of which an answer has more or less as the numbers of the scene are."""
@@ -115,18 +116,29 @@ def wanted_of(scene: Scene, names: Sequence[str]) -> tuple[Wanted, ...]:
     return found
 
 
+def parted(text: str) -> tuple[str, dict[str, str]]:
+    """A quantity and its selectors.
+
+    >>> parted("members.my beam.moment at 0.5 step 2")
+    ('members.my beam.moment', {'step': '2', 'at': '0.5'})
+    """
+    selectors: dict[str, str] = {}
+    while match := WORDS.fullmatch(text):
+        text, selectors[match["key"]] = match["name"], match["value"]
+    return text, selectors
+
+
 def _wanted(text: str) -> Wanted:
     """A quantity with its selectors, which stand behind the name."""
     if not isinstance(text, str):
         raise SceneError(f"found {say(text)}, accepted: names, as 'nodes.tip.position'", ("quantities",))
-    name, keys = text.strip(), dict[str, float]()
-    while match := WORDS.fullmatch(name):
-        key, value = match["key"], match["value"]
+    name, selectors = parted(text.strip())
+    keys: dict[str, float] = {}
+    for key, value in selectors.items():
         try:
             keys[key] = int(value) if key in COUNTS else float(value)
         except ValueError:
             raise SceneError(f"found {value!r}, accepted: a number after {key!r}", ("quantities", text)) from None
-        name = match["name"]
     try:
         return Wanted(text.strip(), Expect.from_dict({"quantity": name, "value": True, **keys}))
     except SceneError as error:

@@ -21,7 +21,7 @@ from ..files import write_file
 from ..mathematics.arrays import Array
 from ..quoting import csv_cell
 from .cases import Cases
-from .quantities import Wanted
+from .quantities import Wanted, parted
 from .work import SHORT, SOLVED, Outcome
 
 __all__ = ["ENDINGS", "Failure", "Sweep", "check_table", "gathered"]
@@ -244,5 +244,5 @@ def gathered(
 
 def _component(name: str, number: int) -> str:
     """A component of a quantity: its number stands before its place, ``members.beam.moment.2 at 0``."""
-    quantity, gap, place = name.partition(" ")
-    return f"{quantity}.{number}{gap}{place}"
+    quantity, _ = parted(name)
+    return f"{quantity}.{number}{name[len(quantity) :]}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -14,9 +15,11 @@ from ..mathematics.arrays import Array
 from .cases import MOST_CASES, Cases, grid, read_cases, sampled
 from .distributions import Distribution, LogNormal, Normal, Uniform
 
-__all__ = ["cases_in_words", "usual_quantities"]
+__all__ = ["assigned", "cases_in_words", "usual_quantities"]
 
 T = TypeVar("T")
+
+NUMBER = r"\s*[+-]?(?:[\d_]+\.?[\d_]*|\.[\d_]+)(?:[eE][+-]?\d+)?\s*"
 
 KINDS: dict[str, Callable[[float, float], Distribution]] = {
     "normal": Normal,
@@ -68,6 +71,18 @@ def usual_quantities(scene: Scene) -> list[str]:
     return [f"nodes.{name}.position" for name in free or scene.nodes]
 
 
+def assigned(text: str) -> tuple[str, str]:
+    """A name and what stands behind the last ``=`` that numbers follow, nothing where none do.
+
+    Names of a scene may have this sign themselves.
+
+    >>> assigned("loads.a=2.value.1=0:10:3"), assigned("loads.a=2.value")
+    (('loads.a=2.value.1', '0:10:3'), ('loads.a=2.value', ''))
+    """
+    found = re.fullmatch(rf"(.+)=({NUMBER}(?:[:,]{NUMBER})*)", text, re.DOTALL)
+    return (found[1], found[2]) if found else (text, "")
+
+
 def _named(pairs: Sequence[tuple[str, T]], option: str) -> dict[str, T]:
     names = [name for name, _ in pairs]
     for name in names:
@@ -77,10 +92,10 @@ def _named(pairs: Sequence[tuple[str, T]], option: str) -> dict[str, T]:
 
 
 def _varied(text: str) -> tuple[str, Array]:
-    name, _, values = text.rpartition("=")
+    name, values = assigned(text)
     parts = values.split(":")
     try:
-        if not name or len(parts) not in (1, 3):
+        if len(parts) not in (1, 3):
             raise ValueError
         if len(parts) == 1:
             return name, np.array([float(value) for value in values.split(",")])

@@ -8,7 +8,6 @@ imports what is needed once and copies itself (``forkserver``), where the system
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import threading
 from collections.abc import Callable
@@ -17,7 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
 from ..errors import SceneError
-from ..processes import begin_apart, postponed
+from ..processes import begin_apart, context_of, postponed
 
 __all__ = ["Workers", "cores"]
 
@@ -55,13 +54,14 @@ class _Lane:
 
     def submit(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> Future[T]:
         """Have a piece of work done."""
-        try:
-            future = self._pool.submit(function, *args, **kwargs)
-        except BrokenExecutor:
-            self._pool.shutdown()
-            self._pool, self._blamed = self._make(), False
-            future = self._pool.submit(function, *args, **kwargs)
-        self._flying.append(future)
+        with postponed():
+            try:
+                future = self._pool.submit(function, *args, **kwargs)
+            except BrokenExecutor:
+                self._pool.shutdown()
+                self._pool, self._blamed = self._make(), False
+                future = self._pool.submit(function, *args, **kwargs)
+            self._flying.append(future)
         future.add_done_callback(self._done)
         return future
 
@@ -99,10 +99,7 @@ class Workers(Executor):
     def __init__(self, count: int) -> None:
         if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
             raise SceneError(f"found {count!r}, accepted: a number of processes from 1 to {MOST}", ("workers",))
-        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-        self._context: Any = multiprocessing.get_context(method)
-        if method == "forkserver":
-            self._context.set_forkserver_preload(PRELOADED)
+        self._context = context_of(PRELOADED)
         self.room = AHEAD * count
         self._reader, self._writer = self._context.Pipe(duplex=False)
         self._lanes = [_Lane(self._pool) for _ in range(count)]

@@ -6,12 +6,11 @@ the system can; elsewhere each imports for itself.
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..processes import begin_apart, postponed
+from ..processes import begin_apart, context_of, postponed
 
 __all__ = ["Apart", "EndedError"]
 
@@ -29,10 +28,7 @@ class Apart:
     """Runs functions in fresh processes."""
 
     def __init__(self) -> None:
-        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-        self._context: Any = multiprocessing.get_context(method)
-        if method == "forkserver":
-            self._context.set_forkserver_preload(PRELOADED)
+        self._context = context_of(PRELOADED)
 
     def __call__(self, longest: float, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function returns.
