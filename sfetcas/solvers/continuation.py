@@ -51,6 +51,9 @@ BLOCKED = 1e-3
 TRAVEL = 0.5
 """A step moves nothing that is driven by more than this, in lengths of the scene, and turns it by a radian at most."""
 
+FARTHEST = 200.0
+"""So many of these steps a way has at most: what is driven on beyond, in the plane, takes longer ones."""
+
 CREPT, CREEPS = 1e-3, 3
 """What lands this near, rad, has left nothing; so many times it happens by chance, and else the way leads nowhere."""
 
@@ -112,10 +115,11 @@ def follow(
     that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
     the way ends.  ``refuse`` is shown each state, and raises where there is no sense in going on.
     """
-    # A whole turn of what is held or driven looks like none, and what it meets on its way may have snapped meanwhile.
+    # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
     turn = max(float(np.linalg.norm(whole.turn, axis=1).max(initial=0.0)), whole.driven)
-    longest = 1.0 / max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0)
+    driven = min(max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0), FARTHEST)
+    longest = 1.0 / max(turn if prepared.model.space else 0.0, driven)
     done, step = 0.0, 0.5
     left: list[float] = []
     crept = 0
@@ -124,7 +128,7 @@ def follow(
     def free(there: State, at: float) -> bool:
         return allowed is None or allowed(now.state, way(done), there, way(at))
 
-    tries = MOST + int(AROUND / longest) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
+    tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
     for _ in range(tries):
         if done >= 1.0:
             return Followed(now.state, True, tuple(left))
