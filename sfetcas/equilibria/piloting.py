@@ -100,8 +100,11 @@ class Piloting(Meshing):
             # What falls on and on does so on a finer mesh too; one that is too coarse is left by other ways.
             if error.status in (Status.ITERATIONS, Status.BENT):
                 raise
+            mesh = pilot.model.mesh.refined().refined()
+            if mesh.elements == pilot.model.mesh.elements:
+                raise
             try:
-                finer = self._prepared(pilot.model.mesh.refined().refined())
+                finer = self._prepared(mesh)
                 return _with_change_point(self._on_pilot(finer, factor, None))
             except SolveError:
                 raise error from None
