@@ -326,12 +326,14 @@ class Prepared:
 
     def _fallen(self, state: State, loading: Loading) -> Corrected:
         """The equilibrium below a state."""
+        # Where closings are redundant IPOPT lets multipliers hold what falls, and leads across to the other side.
+        flows = not self.model.minimisable or bool(self.equations.redundant)
+        found = self.downhill(state, loading) if flows else None
+        if found is not None:
+            return found
         if self.model.minimisable:
             return self.minimise(loading, state)[0]
-        found = self.downhill(state, loading)
-        if found is None:
-            raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
-        return found
+        raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
 
     def nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
         """The state moved along the escape shape to the side of lower energy, closings restored."""
@@ -344,13 +346,15 @@ class Prepared:
             moved = replace(equations.moved(state, step), lam=state.lam)
             if equations.rows:
                 moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)
-            sides.append((equations.at(moved, loading).potential, moved))
+            sides.append((equations.at(moved, loading), moved))
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.  Loads that follow
         # are not in the potential: from an unstable state both sides go down.
         (up, first), (down, second) = sides
         if not self.model.has_potential:
             return first
-        return second if up - down > 1e-9 * max(abs(up), abs(down)) else first
+        # Near where it becomes unstable what a load gives is nearly what the strain takes.
+        size = max(abs(up.potential), abs(down.potential), up.strain, down.strain)
+        return second if up.potential - down.potential > 1e-9 * size else first
 
     def load_size(self, found: Corrected) -> float:
         """Largest elastic moment or load in the balance of a state, dimensionless."""
