@@ -11,7 +11,7 @@ from sfetcas.contact.contact_statics import ContactRun
 from sfetcas.contact.cushions import Cushions
 from sfetcas.equilibria.statics import Settings, _Run
 from sfetcas.mechanics.contact_joints import CushionedPlane, CushionedRound
-from sfetcas.mechanics.joints import by_turning
+from sfetcas.mechanics.terms import by_turning
 
 FLAT, ROUND = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
 

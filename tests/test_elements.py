@@ -12,10 +12,11 @@ from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
+from sfetcas.mechanics.terms import by_turning, curvatures_of, energies_of, rows_of, slopes_of
 from sfetcas.solvers.newton import correct
 from sfetcas.solvers.stability import StabilityTest
 
-ALL = [Element(p, space, gauss) for p in range(1, 9) for space in (False, True) for gauss in (False, True)]
+ALL = [Element(space, p, gauss) for p in range(1, 9) for space in (False, True) for gauss in (False, True)]
 IDS = [f"{e.name}-{'space' if e.space else 'plane'}-{'gauss' if e.gauss else 'nodes'}" for e in ALL]
 each = pytest.mark.parametrize("element", ALL, ids=IDS)
 
@@ -48,8 +49,49 @@ def moved(element, q, phi):
     return quat.multiply(quat.from_rotation_vector(phi.T), q.T).T
 
 
-def number(function, *arguments):
-    return float(function(*arguments))
+CONSTANT = np.array([0.3, -0.7, 0.4])
+"""A share of the pull that is given as the multiplier of the chord."""
+
+
+def arguments(element, q, stiffness, tangent, pull):
+    """Rotations, displacements, data, loads and multipliers, which together pull as given."""
+    constant = CONSTANT[: element.axes]
+    data = np.concatenate([stiffness.ravel(order="F"), tangent.ravel(order="F")])
+    return q, np.zeros((element.axes, 0)), data, (pull - constant[:, None]).ravel(order="F"), constant
+
+
+def turning(element, q, stiffness, tangent, pull):
+    """Strain energy, work of the pull, moments, stiffness, chord and its derivative."""
+    given = arguments(element, q, stiffness, tangent, pull)
+    energy, strain, gained, moments, matrix, spin = by_turning(element)(*given)
+    work = float(energy - strain) + CONSTANT[: element.axes] @ gained.full().ravel() + (pull * tangent).sum()
+    return strain, ca.DM(work), moments, matrix, gained + tangent.sum(axis=1), spin
+
+
+def energy_of(element, q, stiffness, tangent, pull):
+    """Strain energy and work of the pull."""
+    given = arguments(element, q, stiffness, tangent, pull)
+    energy, gained = energies_of(element)(*given[:4])[0], rows_of(element)(*given[:4])
+    return float(energy) + given[4] @ gained.full().ravel() + (pull * tangent).sum()
+
+
+def gradient_of(element, q, stiffness, tangent, pull):
+    """Its derivative by the components."""
+    given = arguments(element, q, stiffness, tangent, pull)
+    gradient, jacobian = slopes_of(element)(*given[:4])
+    return (gradient + jacobian.T @ given[4]).full().ravel()
+
+
+def hessian_of(element, q, stiffness, tangent, pull):
+    """Its second derivative by the components, where the energy has a weight, too."""
+    *given, lam = arguments(element, q, stiffness, tangent, pull)
+    return curvatures_of(element)(*given, 1.7 * lam, 1.7).full() / 1.7
+
+
+def chord(element, q, tangent):
+    data = np.concatenate([np.zeros(element.stiffnesses * (element.order + 1)), tangent.ravel(order="F")])
+    nothing = np.zeros((element.axes, 0)), data, np.zeros(tangent.size)
+    return rows_of(element)(q, *nothing).full().ravel() + tangent.sum(axis=1)
 
 
 @each
@@ -57,7 +99,7 @@ def test_rigid_rotation_of_an_unloaded_element_costs_nothing(element):
     _, stiffness, tangent, pull = data(element)
     one = quat.from_rotation_vector([0.7, -1.1, 2.0]) if element.space else np.array([2.0])
     q = np.tile(one[:, None], element.order + 1)
-    out = element.turning(q, stiffness, tangent, 0.0 * pull)
+    out = turning(element, q, stiffness, tangent, 0.0 * pull)
     # The differentiation matrix annihilates constants up to rounding, which grows with the order.
     scale = np.abs(stiffness).max()
     assert float(out[0]) == pytest.approx(0.0, abs=1e-22 * scale)
@@ -71,7 +113,7 @@ def test_undeformed_element_has_no_strain_and_its_own_reach(element):
     _, stiffness, tangent, pull = data(element, 3)
     q = np.zeros((element.components, element.order + 1))
     q[0] = 1.0 if element.space else 0.0
-    out = element.turning(q, stiffness, tangent, pull)
+    out = turning(element, q, stiffness, tangent, pull)
     assert float(out[0]) == pytest.approx(0.0, abs=1e-25)  # squares of rounding
     np.testing.assert_allclose(out[4].full().ravel(), tangent.sum(axis=1), atol=1e-14)
     assert float(out[1]) == pytest.approx((pull * tangent).sum(), abs=1e-13)
@@ -80,8 +122,8 @@ def test_undeformed_element_has_no_strain_and_its_own_reach(element):
 @each
 def test_gradient_and_hessian_against_complex_and_central_differences(element):
     q, stiffness, tangent, pull = data(element, 1)
-    gradient = element.gradient(q, stiffness, tangent, pull)[1].full().ravel()
-    hessian = element.hessian(q, stiffness, tangent, pull).full()
+    gradient = gradient_of(element, q, stiffness, tangent, pull)
+    hessian = hessian_of(element, q, stiffness, tangent, pull)
     size, h = q.size, 1e-5
     by_energy, by_gradient = np.zeros(size), np.zeros((size, size))
     for i in range(size):
@@ -89,8 +131,8 @@ def test_gradient_and_hessian_against_complex_and_central_differences(element):
         step[i] = h
         step = step.reshape(q.shape, order="F")
         # Fourth order: h^4 times a fifth derivative of order 1e3 stays below 1e-16.
-        e = [number(element.energy, q + k * step, stiffness, tangent, pull) for k in (-2, -1, 1, 2)]
-        g = [element.gradient(q + k * step, stiffness, tangent, pull)[1].full().ravel() for k in (-2, -1, 1, 2)]
+        e = [energy_of(element, q + k * step, stiffness, tangent, pull) for k in (-2, -1, 1, 2)]
+        g = [gradient_of(element, q + k * step, stiffness, tangent, pull) for k in (-2, -1, 1, 2)]
         by_energy[i] = (e[0] - 8 * e[1] + 8 * e[2] - e[3]) / (12 * h)
         by_gradient[i] = (g[0] - 8 * g[1] + 8 * g[2] - g[3]) / (12 * h)
     # Rounding of the energy over h: 1e-16 / 1e-5, relative to the size of the entries.
@@ -102,11 +144,11 @@ def test_gradient_and_hessian_against_complex_and_central_differences(element):
 def test_turning_is_the_derivative_along_rotations(element):
     """Gradient and Hessian of phi -> energy(exp(phi) q) by differences, and through E of gradient and hessian."""
     q, stiffness, tangent, pull = data(element, 2)
-    strain, work, moments, matrix, reach, spin = (a.full() for a in element.turning(q, stiffness, tangent, pull))
+    strain, work, moments, matrix, reach, spin = (a.full() for a in turning(element, q, stiffness, tangent, pull))
     n, turns = element.order + 1, element.turns
 
     def energy(vector):
-        return number(element.energy, moved(element, q, vector.reshape(turns, n, order="F")), stiffness, tangent, pull)
+        return energy_of(element, moved(element, q, vector.reshape(turns, n, order="F")), stiffness, tangent, pull)
 
     assert strain[0, 0] + work[0, 0] == pytest.approx(energy(np.zeros(turns * n)), rel=1e-14)
     assert work[0, 0] == pytest.approx((pull * turned_tangents(element, q, tangent)).sum(), rel=1e-12, abs=1e-13)
@@ -123,21 +165,19 @@ def test_turning_is_the_derivative_along_rotations(element):
         assert v @ moments.ravel() == pytest.approx(first, abs=1e-11 * scale)
         assert v @ matrix @ v == pytest.approx(second, abs=1e-8 * scale)
         reached = [
-            element.reach(moved(element, q, (k * h * v).reshape(turns, n, order="F")), tangent).full().ravel()
-            for k in (-2, -1, 1, 2)
+            chord(element, moved(element, q, (k * h * v).reshape(turns, n, order="F")), tangent) for k in (-2, -1, 1, 2)
         ]
         slope = (reached[0] - 8 * reached[1] + 8 * reached[2] - reached[3]) / (12 * h)
         np.testing.assert_allclose(spin @ v, slope, atol=1e-10)
-    gradient = element.gradient(q, stiffness, tangent, pull)[1].full().ravel()
-    hessian = element.hessian(q, stiffness, tangent, pull).full()
+    gradient = gradient_of(element, q, stiffness, tangent, pull)
+    hessian = hessian_of(element, q, stiffness, tangent, pull)
     e_map, radial = spin_map(element, q), np.repeat((q * gradient.reshape(q.shape, order="F")).sum(axis=0), 3)
     expected = e_map.T @ hessian @ e_map - (0.25 * np.diag(radial) if element.space else 0.0)
     size = max(1.0, np.abs(hessian).max())
     np.testing.assert_allclose(moments.ravel(), e_map.T @ gradient, atol=1e-14 * size)
     np.testing.assert_allclose(matrix, expected, atol=1e-14 * size)
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * size)
-    value, jacobian = element.reach_jacobian(q, tangent)
-    np.testing.assert_allclose(value.full(), reach, atol=1e-14)
+    jacobian = slopes_of(element)(*arguments(element, q, stiffness, tangent, pull)[:4])[1]
     np.testing.assert_allclose(jacobian.full() @ e_map, spin, atol=1e-13)
 
 
@@ -178,7 +218,7 @@ def test_strain_energy_by_its_definition(element):
         expected = 0.5 * np.einsum("ni,nij,nj->", kappa, full, kappa)
     else:
         expected = 0.5 * (stiffness[0] * slope[:, 0] ** 2).sum()
-    assert number(element.energy, q, stiffness, tangent, 0.0 * pull) == pytest.approx(expected, rel=1e-12)
+    assert energy_of(element, q, stiffness, tangent, 0.0 * pull) == pytest.approx(expected, rel=1e-12)
 
 
 @each
@@ -187,8 +227,8 @@ def test_strain_energy_does_not_see_a_superposed_rotation(element):
     turn = quat.from_rotation_vector([1.3, 0.4, -0.9]) if element.space else 1.7
     turned = quat.multiply(turn, q.T).T if element.space else q + turn
     matrix = quat.matrix(turn) if element.space else turned_about([0, 0, 1], 1.7)[:2, :2]
-    before = element.turning(q, stiffness, tangent, pull)
-    after = element.turning(turned, stiffness, tangent, matrix @ pull)
+    before = turning(element, q, stiffness, tangent, pull)
+    after = turning(element, turned, stiffness, tangent, matrix @ pull)
     # The rotated scene with rotated pulls: same energies, turned moments and reach; rounding only.
     scale = np.abs(stiffness).max() * element.order**2
     assert float(after[0]) == pytest.approx(float(before[0]), rel=1e-12)
@@ -203,7 +243,7 @@ def test_strain_energy_does_not_see_a_superposed_rotation(element):
 def test_sum_of_moments_is_the_moment_of_the_pulls(element):
     """A common small rotation does no elastic work: the moments at the nodes add up to sum t x pull."""
     q, stiffness, tangent, pull = data(element, 6)
-    moments = element.turning(q, stiffness, tangent, pull)[2].full().reshape(-1, element.turns).sum(axis=0)
+    moments = turning(element, q, stiffness, tangent, pull)[2].full().reshape(-1, element.turns).sum(axis=0)
     t = turned_tangents(element, q, tangent)
     expected = np.cross(t.T, pull.T).sum(axis=0) if element.space else (t[0] * pull[1] - t[1] * pull[0]).sum()
     np.testing.assert_allclose(
@@ -215,11 +255,9 @@ def test_sum_of_moments_is_the_moment_of_the_pulls(element):
 @pytest.mark.parametrize("p", range(1, 9))
 def test_energy_of_a_uniformly_bent_plane_element(p, gauss):
     """1/2 EI kappa^2 h exactly: the angle is linear along the element."""
-    element, h, ei, turn = Element(p, False, gauss), 0.7, 2.5, 1.1
+    element, h, ei, turn = Element(False, p, gauss), 0.7, 2.5, 1.1
     stiffness = (ei * element.weights / h)[None, :]
-    energy = number(
-        element.energy, (turn * element.nodes)[None, :], stiffness, np.zeros((2, p + 1)), np.zeros((2, p + 1))
-    )
+    energy = energy_of(element, (turn * element.nodes)[None, :], stiffness, np.zeros((2, p + 1)), np.zeros((2, p + 1)))
     assert energy == pytest.approx(0.5 * ei * turn**2 / h, rel=1e-13)
 
 
@@ -230,13 +268,13 @@ def test_energy_of_a_uniformly_bent_element_in_space(p, axis, gauss):
     """1/2 D kappa^2 h about each axis; the quaternion (cos, sin) is interpolated, so of order 2p in the angle."""
     h, stiff = 0.7, np.array([0.9, 2.5, 1.6])
     errors = []
-    element = Element(p, True, gauss)
+    element = Element(True, p, gauss)
     for turn in (0.8, 0.4):
         phi = turn * element.nodes[:, None] * np.eye(3)[axis]
         stiffness = np.zeros((6, p + 1))
         stiffness[[0, 3, 5]] = stiff[:, None] * element.weights / h
         zero = np.zeros((3, p + 1))
-        energy = number(element.energy, quat.from_rotation_vector(phi).T, stiffness, zero, zero)
+        energy = energy_of(element, quat.from_rotation_vector(phi).T, stiffness, zero, zero)
         errors.append(abs(energy / (0.5 * stiff[axis] * turn**2 / h) - 1.0))
     # Halving the angle divides the error by 4^p; below 1e-12 it is rounding.  Constants: (turn/2)^2p / (2p)!.
     assert errors[0] < 0.2 * 0.8**2 * 0.2 ** (2 * (p - 1))
@@ -245,7 +283,7 @@ def test_energy_of_a_uniformly_bent_element_in_space(p, axis, gauss):
 
 def test_cross_terms_of_the_stiffness():
     """Entries 12, 13 and 23 of the upper triangle couple the curvatures; p = 1 at the nodes, checked by hand."""
-    element = Element(1, True)
+    element = Element(True, 1)
     rng = np.random.default_rng(0)
     q = field(element, rng)
     slope = q[:, 1] - q[:, 0]
@@ -257,7 +295,7 @@ def test_cross_terms_of_the_stiffness():
         zero = np.zeros((3, 2))
         k = [2.0 * quat.multiply(quat.conjugate(q[:, n]), slope)[1:] for n in (0, 1)]
         expected = 0.5 * (k[0] @ full @ k[0] + 3.0 * k[1] @ full @ k[1])
-        assert number(element.energy, q, stiffness, zero, zero) == pytest.approx(expected, rel=1e-13)
+        assert energy_of(element, q, stiffness, zero, zero) == pytest.approx(expected, rel=1e-13)
 
 
 def tip(order, gauss, elements, space=False):
@@ -316,8 +354,8 @@ def test_names():
 
 def test_functions_are_made_once():
     element = element_by_name("SFET4", True)
-    assert element.turning is element.turning
-    assert isinstance(element.energy, ca.Function)
+    assert by_turning(element) is by_turning(element)
+    assert isinstance(by_turning(element), ca.Function)
 
 
 @pytest.mark.filterwarnings("error")

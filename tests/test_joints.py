@@ -9,7 +9,7 @@ from scenes import made, model_of
 
 from sfetcas.description.matrices import rigid_motions
 from sfetcas.mathematics import quaternion as quat
-from sfetcas.mechanics import joints
+from sfetcas.mechanics import joints, terms
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.positions import normals
@@ -114,7 +114,7 @@ class Case:
     Freedoms are rotation vectors of the second side (None, w), or displacements of the second place.
     """
 
-    kind: joints.Connection
+    kind: terms.Term
     data: np.ndarray
     state: Callable
     load: tuple = ()
@@ -195,7 +195,7 @@ def columns(kind, q, u):
 
 def evaluated(kind, q, u, data, load, lam):
     """Energy, stored energy, rows, gradient, stiffness, spin as arrays."""
-    result = joints.by_turning(kind)(*columns(kind, q, u), data, load, lam)
+    result = terms.by_turning(kind)(*columns(kind, q, u), data, load, lam)
     energy, stored, rows, gradient, stiffness, spin = (part.full() for part in result)
     return float(energy[0, 0]), float(stored[0, 0]), rows.ravel(), gradient.ravel(), stiffness, spin
 
@@ -312,17 +312,19 @@ def test_components_and_turning_are_one_function(name):
     q, u, _ = anywhere(kind)(rng)
     data, load, lam = numbers(case, rng)
     energy, _, rows, gradient, _, spin = evaluated(kind, q, u, data, load, lam)
-    found = [part.full() for part in joints.by_components(kind)(*columns(kind, q, u), data, load, lam, 1.3)]
-    assert found[0][0, 0] == energy
-    np.testing.assert_array_equal(found[1].ravel(), rows)
+    sides = columns(kind, q, u)
+    gradient_of, jacobian = (part.full() for part in terms.slopes_of(kind)(*sides, data, load))
+    hessian = terms.curvatures_of(kind)(*sides, data, load, lam, 1.3).full()
+    assert float(terms.energies_of(kind)(*sides, data, load)[0]) == pytest.approx(energy, rel=1e-14)
+    np.testing.assert_allclose(terms.rows_of(kind)(*sides, data, load).full().ravel(), rows, rtol=1e-14)
 
     def components(q, u):
         return np.concatenate([*q, *u, np.zeros(0)])
 
     along = np.array([slope(components, kind, q, u, i) for i in range(width(kind))])
-    np.testing.assert_allclose(along @ (found[2].ravel() + found[3].T @ lam), gradient, atol=1e-10)
-    np.testing.assert_allclose(found[3] @ along.T, spin, atol=1e-11)
-    np.testing.assert_allclose(found[4], found[4].T, atol=1e-13 * max(1.0, np.abs(found[4]).max()))
+    np.testing.assert_allclose(along @ (gradient_of.ravel() + jacobian.T @ lam), gradient, atol=1e-10)
+    np.testing.assert_allclose(jacobian @ along.T, spin, atol=1e-11)
+    np.testing.assert_allclose(hessian, hessian.T, atol=1e-13 * max(1.0, np.abs(hessian).max()))
 
 
 @pytest.mark.parametrize("name", ["turn spring", "turn spring, plane", "spring", "spring, plane", *BODIES])

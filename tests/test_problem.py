@@ -97,8 +97,8 @@ def test_program_and_equations_are_one_problem(name, assembly, gauss):
     x = problem.unknowns(one)
     radial = np.zeros(norms)
     for r, i in enumerate(problem._unit):
-        width = int(problem.model.widths[i])
-        part = slice(problem._reduction.first[i], problem._reduction.first[i] + width)
+        numbers = problem.terms.tables.number[i]
+        part = numbers[numbers >= 0]
         radial[r] = -0.5 * x[part] @ (gradient + jacobian.T @ lam)[part]
     hessian = own(x, problem.nlp.p_value, 1.0, np.concatenate([radial, one.lam]))[4].full()
     matrix = np.zeros((total, total))

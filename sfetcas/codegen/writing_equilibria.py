@@ -112,7 +112,7 @@ class EquilibriumWriter(Writer):
         """Sizes, rules and patterns."""
         solver, program = self.solver, self.arguments.program
         equations = program.equations
-        moments, loads = program.slice_of("moment"), program.slice_of_loads
+        moments, loads = program.slice_of_moments, program.slice_of_loads
         constants: dict[str, object] = {
             "TOTAL": program.expressions.total,
             "UNKNOWNS": equations.unknowns,

@@ -33,9 +33,9 @@ def rolling(held: Held) -> Corrected:
     corrected, equations = held.corrected, held.prepared.equations
     entries = corrected.point.entries.copy()
     for turn, axis, stiffness in _rolled(held):
-        unknowns = equations.number[turn]
-        basis = equations.basis(turn)
-        about = axis[3 - len(unknowns) :] if basis is None else basis.T @ axis
+        tables = equations.tables
+        cells = slice(tables.width * turn, tables.width * (turn + 1))
+        unknowns, about = tables.unknown[cells], tables.weight[cells] * axis[3 - tables.width :]
         for i, a in zip(unknowns, about, strict=True):
             for j, b in zip(unknowns, about, strict=True):
                 if i >= 0 and j >= 0:

@@ -26,12 +26,14 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mathematics.constants import times
+from ..mathematics.constants import picked, times
 from ..mathematics.interpolation import differentiation
 from ..mathematics.quaternion import product, turned
 from ..mechanics.elements import Element
-from ..mechanics.joints import Connection, Hinge, TurnSpring, name_of
+from ..mechanics.joints import Hinge, TurnSpring
+from ..mechanics.load_terms import Moment
 from ..mechanics.observed import Axes
+from ..mechanics.terms import Side, Term, name_of
 from .methods import Begin, Method
 from .stages import StageEquations
 
@@ -100,45 +102,32 @@ class _Middle:
         moved = system.quantities(q, places, end, begin.near) - begin.x
         forces = system.forces(moved / h, 2.0 * (moved / h - begin.rates) / h)
         c, b = 1.0 / h, 2.0 / h**2
-        linear = forces[: system.linear]
-        on_places = times(system.by_place.T, linear) - middle.force
-        turning = -middle.moment
-        if not model.space and system.acts("moment"):
-            # Moments in the plane have a potential, that of the angle.  What their factor changes of the matrix is as
-            # small as the angle of a step: it is left out.
-            turning *= ca.vec(system.many(_share(), system.layout.rotations)(begin.q, q))
-        gaps = system.open_gaps(y, end)
+        linear, tables = forces[: system.linear], system.tables
+        gaps, rows = system.open_gaps(y, end), []
         entries, full, coupled = [], [], []
-        if system.elements:
-            turns = model.rotations.turns.ravel().tolist()
-            pull = middle.pull + times(system.closing.T, lam[:n, :])
-            pull += times(system.by_tangent.T, linear)
-            pull = ca.reshape(pull, system.axes, system.elements * system.points)
-            function = system.many(_element(model.element), system.elements)
-            moments, stiffness, mean, spin = function(begin.q[:, turns], q[:, turns], end.stiffness, end.tangent, pull)
-            gaps += times(system.closing, ca.vec(system.tangents(q, end)) - ca.vec(end.tangent))
-            turning += times(system.onto_rotations, ca.vec(moments))
-            signs, picked = ca.DM(system.closed.value), system.closed.entry.tolist()
-            entries += [ca.vec(stiffness), ca.vec(spin)[picked] * signs, ca.vec(mean)[picked] * signs]
-            massive = system.massive_columns
-            coupled += self._inner(system, mean[:, massive], spin[:, massive], c, b)
-        rows = [gaps]
-        for number, (group, sides) in enumerate(zip(model.connections, system.linked, strict=True)):
-            count, width = len(group.data), group.kind.sizes[2]
-            first = n + sum(len(g.rows) for g in model.connections[:number])
-            own = ca.reshape(lam[first : first + count * width], width, count)
-            sides_of = *system.sides(group, begin.q, before), *system.sides(group, q, places)
-            loads = [system.link_load(number, given) for given in (middle, end)]
-            function, data = system.many(_between(group.kind), count), system.data(number, end, begin.near)
-            gradient, stiffness, values, mean, spin = function(*sides_of, data, *loads, own)
+        for number, (group, sides) in enumerate(zip(model.terms, tables.sides, strict=True)):
+            count, element = len(group.data), number == 0
+            if not count:
+                continue
+            ends = zip(system.sides(group, begin.q, before), system.sides(group, q, places), strict=True)
+            (q0, q1), (u0, u1) = ends
+            loads = [system.load(number, given) for given in (middle, end)]
+            if element:
+                loads[0] += ca.reshape(times(system.by_tangent.T, linear), *loads[0].shape)
+            function = system.many(_element(group.kind) if element else _between(group.kind), count)
+            data, own = system.data(number, end, begin.near), system.multipliers(number, lam)
+            gradient, stiffness, values, mean, spin = function(q0, u0, q1, u1, data, *loads, own)
             full.append((sides, gradient))
             entries.append(ca.vec(stiffness))
-            if width:
+            if element:
+                gaps += times(system.closing, ca.vec(values))
+                signs, chosen = ca.DM(tables.closed.value), tables.closed.entry
+                entries += [picked(ca.vec(part), chosen) * signs for part in (spin, mean)]
+                massive = system.massive_columns
+                coupled += self._inner(system, mean[:, massive], spin[:, massive], c, b)
+            elif group.rows:
                 rows.append(ca.vec(values))
                 entries += [ca.vec(spin), ca.vec(mean)]
-        if system.twisting:
-            # Moments that are dead do not change when what they act on turns.
-            entries.append(ca.MX.zeros(9 * system.layout.rotations))
         observed = []
         for seen, sides, (first, last) in zip(system.masses.observables, system.observed, system.ranges, strict=True):
             count, width = len(seen.data), seen.kind.sizes[2]
@@ -151,7 +140,8 @@ class _Middle:
             entries.append(ca.vec(stiffness))
             weight = b * ca.DM(seen.mass.T) + c * ca.DM(seen.damping.T)
             observed.append(ca.vec(system.paired(width, mean.shape[1] // count, count)(mean, spin, weight)))
-        self.residual = system.gathered(turning, on_places, full, lam[:n, :], rows)
+        on_places = times(system.by_place.T, linear) - middle.force
+        self.residual = system.gathered(full, on_places, lam[:n, :], [gaps, *rows])
         places_of = [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
         self.entries = [*entries, ca.MX(1), *observed, *coupled, *places_of]
 
@@ -214,13 +204,6 @@ def _relative(a0: ca.SX, a1: ca.SX, b0: ca.SX, b1: ca.SX) -> ca.SX:
     return 0.5 * (_onward(a0, b0, of_a, of_b) + _onward(a1, b1, -of_a, -of_b))
 
 
-@functools.cache
-def _share() -> ca.Function:
-    """(q0, q1) -> gain of an angle in the plane over that of its Rodrigues vector."""
-    q0, q1, still = ca.SX.sym("q0"), ca.SX.sym("q1"), ca.SX(0)
-    return ca.Function("share", [q0, q1], [_relative(still, still, q0, q1)])
-
-
 def _vectors(element: Element, q: ca.SX, tangent: ca.SX) -> list[ca.SX]:
     """Turned tangents of an element at rotations."""
     if element.space:
@@ -239,15 +222,17 @@ def _crossed(a: ca.SX, b: ca.SX) -> ca.SX:
 
 @functools.cache
 def _element(element: Element) -> ca.Function:
-    """(q0, q1, stiffness, tangent, pull) -> moments, their derivative, mean spins, spins at the end.
+    """What :func:`_between` gives of an element: moments, their derivative, chord, mean spins, spins at the end.
 
     The derivative is that of elastic moments at the mean state, which differs from the exact one by the square of what
     nodes turn in a step; that of all else is exact.
     """
     n, axes, turns = element.order + 1, element.axes, element.turns
+    _, _, _, data_size, load_size = element.sizes
     q0, q1 = ca.SX.sym("q0", element.components, n), ca.SX.sym("q1", element.components, n)
-    stiffness, tangent = ca.SX.sym("stiffness", element.stiffnesses, n), ca.SX.sym("tangent", axes, n)
-    pull = ca.SX.sym("pull", axes, n)
+    data, load, lam = ca.SX.sym("data", data_size), ca.SX.sym("load", load_size), ca.SX.sym("lam", axes)
+    stiffness, tangent = element.split(data)
+    pull = ca.reshape(load, axes, n) + ca.repmat(lam, 1, n)
     slopes = differentiation(element.nodes)
     moments = [ca.SX.zeros(turns) for _ in range(n)]
     for k in range(n):
@@ -262,14 +247,15 @@ def _element(element: Element) -> ca.Function:
     work = ca.vertcat(*[_crossed(mean[k], pull[:, k]) for k in range(n)])
     basis = _basis(q1)
     near = ca.mtimes(ca.jacobian(_at_mean(element, q0, q1, stiffness) + work, ca.vec(q1)), basis)
-    by_pull = ca.jacobian(work, ca.vec(pull))
-    mean_spin = ca.horzcat(*[by_pull[turns * k : turns * (k + 1), axes * k : axes * (k + 1)].T for k in range(n)])
-    ends = sum(_vectors(element, q1, tangent), ca.SX.zeros(axes))
-    spin = ca.mtimes(ca.jacobian(ends, ca.vec(q1)), basis)
-    results = [ca.densify(part) for part in (ca.vertcat(*moments) + work, near, mean_spin, spin)]
-    return ca.Function(
-        f"conserving_{'space' if element.space else 'plane'}_{n}", [q0, q1, stiffness, tangent, pull], results
+    mean_spin = ca.jacobian(work, lam).T
+    gained = sum(
+        (now - rest for now, rest in zip(_vectors(element, q1, tangent), ca.horzsplit(tangent), strict=True)),
+        ca.SX.zeros(axes),
     )
+    spin = ca.mtimes(ca.jacobian(gained, ca.vec(q1)), basis)
+    results = [ca.densify(part) for part in (ca.vertcat(*moments) + work, near, gained, mean_spin, spin)]
+    u0, u1, end = ca.SX.sym("u0", axes, 0), ca.SX.sym("u1", axes, 0), ca.SX.sym("load_end", load_size)
+    return ca.Function(f"between_{name_of(element)}", [q0, u0, q1, u1, data, load, end, lam], results)
 
 
 def _strain(row: Array, k: int, q: ca.SX) -> ca.SX:
@@ -303,8 +289,12 @@ def _at_mean(element: Element, q0: ca.SX, q1: ca.SX, stiffness: ca.SX) -> ca.SX:
     return ca.mtimes(_basis(middle).T, gradient)
 
 
+def _sides(q: ca.SX, u: ca.SX) -> tuple[list[Side], list[Side]]:
+    return [ca.vertsplit(one) for one in ca.horzsplit(q)], [ca.vertsplit(one) for one in ca.horzsplit(u)]
+
+
 @functools.cache
-def _between(kind: Connection) -> ca.Function:
+def _between(kind: Term) -> ca.Function:
     """(q0, u0, q1, u1, data, load, load_end, lam) -> gradient, its derivative, rows at the end, both spins.
 
     The gradient is that of ``energy + lam.rows``; spins are the derivatives of the rows, mean ones (rows, width) and
@@ -317,13 +307,17 @@ def _between(kind: Connection) -> ca.Function:
     load, load_end = ca.SX.sym("load", loads), ca.SX.sym("load_end", loads)
 
     def values(q: ca.SX, u: ca.SX, given: ca.SX) -> tuple[ca.SX, ca.SX]:
-        sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
+        sides = _sides(q, u)
         return kind.energy(*sides, data, given), ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, data, given))
 
     def spins(q: ca.SX, u: ca.SX, given: ca.SX) -> tuple[ca.SX, ca.SX]:
         energy, found = values(q, u, given)
         x, basis = ca.vertcat(ca.vec(q), ca.vec(u)), ca.diagcat(_basis(q), ca.SX.eye(u.numel()))
-        return ca.mtimes(basis.T, ca.gradient(energy, x)), ca.mtimes(ca.jacobian(found, x), basis)
+        gradient = ca.mtimes(basis.T, ca.gradient(energy, x))
+        if not kind.has_potential:
+            # Moments that are dead do not change when what they act on turns.
+            gradient += ca.vertcat(*kind.forces(*_sides(q, u), data, given))
+        return gradient, ca.mtimes(ca.jacobian(found, x), basis)
 
     q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
     middle = 0.5 * (q0 + q1)
@@ -340,6 +334,9 @@ def _between(kind: Connection) -> ca.Function:
     if isinstance(kind, TurnSpring) and not kind.space:
         # Quadratic in the relative angle: its gain is exact with the derivative at the mean.
         derivative *= _relative(q0[0], q1[0], q0[1], q1[1])
+    if isinstance(kind, Moment) and not kind.space:
+        # Linear in the angle, whose gain over that of its Rodrigues vector this is.
+        derivative *= _relative(ca.SX(0), ca.SX(0), q0, q1)
     gradient = derivative + ca.mtimes(mean_spin.T, lam)
     end, of_end = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u.numel()))
     changed = ca.mtimes(ca.jacobian(gradient, end), of_end)

@@ -13,10 +13,11 @@ from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
 from ..mechanics.body_points import BodyPoints
 from ..mechanics.equations import Equations, State
-from ..mechanics.joints import by_turning
-from ..mechanics.loading import Loading, carried
+from ..mechanics.load_terms import carried
+from ..mechanics.loading import Loading
 from ..mechanics.masses import Observables
 from ..mechanics.observed import Axes
+from ..mechanics.terms import by_turning
 from .stages import StageEquations
 
 __all__ = ["Inertia"]

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..mathematics.linear import SparseMap
+from ..mechanics.rotations import Turn
 from .small_motion import SmallMotion
 
 __all__ = ["Matrices", "matrices_of"]
@@ -105,7 +106,7 @@ def _names(motion: SmallMotion) -> tuple[str, ...]:
             places.setdefault(turn, f"{name} at end {i + 1}")
     names = [""] * equations.turning_unknowns
     for turn, place in places.items():
-        held = equations.basis(turn) is not None
+        held = model.space and model.rotations.kind[turn] == Turn.AXIS
         for axis, number in enumerate(equations.number[turn]):
             if number >= 0:
                 about = "its axis" if held else "xyz"[axis + 3 - equations.number.shape[1]]

@@ -449,8 +449,5 @@ def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, A
 
 def _rotation(equations: Equations, turn: int, shape: Array) -> Array:
     """Rotation vector (3,) of a rotation in a change of the unknowns."""
-    vector = np.append(shape, 0.0)[equations.number[turn]]
-    basis = equations.basis(turn)
-    if basis is not None:
-        return np.asarray(basis @ vector)
+    vector = equations.spins(shape)[turn]
     return np.concatenate([np.zeros(3 - len(vector)), vector])

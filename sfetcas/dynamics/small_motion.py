@@ -23,10 +23,10 @@ from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap, SparseSolver
 from ..mathematics.spectra import largest
 from ..mechanics.equations import Equations, Point, State, turned_tangents
-from ..mechanics.joints import by_turning
 from ..mechanics.loading import Loading
 from ..mechanics.masses import masses_of
 from ..mechanics.spinning import vectors_of
+from ..mechanics.terms import by_turning
 from .stages import StageEquations
 
 __all__ = ["Eigenmotions", "SmallMotion"]

@@ -23,10 +23,10 @@ import numpy as np
 
 from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
-from ..mechanics.entries import Entries, Pattern
 from ..mechanics.expressions import Given, moved_by
-from ..mechanics.joints import by_turning
-from ..mechanics.stationarity import Forces, Stationarity, StationarityPlaces, summed
+from ..mechanics.stationarity import Forces, Stationarity, summed
+from ..mechanics.tables import Pattern
+from ..mechanics.terms import by_turning
 from .system import System
 
 __all__ = ["StageEquations"]
@@ -98,19 +98,20 @@ class StageEquations(System):
 
     def static_matrix(self, stage: _Stage) -> ca.MX:
         """Derivative of a stage's residual by its unknowns at given inertia and damping forces, (total, total)."""
-        return summed(self.total, self._probe.tied, stage.entries)
+        return summed(self.total, self.tables.tied(self._probe.static), stage.entries)
 
     def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
         """Its derivative by rates (c) and accelerations (b) of the unknowns, (total, total)."""
         return summed(self.total, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
 
     @functools.cached_property
-    def _probe(self) -> Places:
-        return Places(self)
+    def _probe(self) -> StagePlaces:
+        return StagePlaces(self)
 
     def _system(self, stages: int) -> Pattern:
         """Pattern of the matrix of all stages, unknown by unknown, each with its stages."""
-        probe, static = self._probe, self._probe.tied
+        probe = self._probe
+        static = self.tables.tied(probe.static)
         one, coupled = probe.static.count, probe.coupled.places
         rows, columns = (np.concatenate([static[k], coupled[k], np.arange(self.total)]) for k in (0, 1))
         both = np.unique(np.concatenate([columns * self.total + rows, rows * self.total + columns]))
@@ -138,18 +139,18 @@ SOFT = 1e-10
 """Softness of closings in the matrix over the inverse of what resists them, the whole mass being one."""
 
 
-class Places(StationarityPlaces):
+class StagePlaces:
     """Where the entries of a stage and of a pair of stages go, in the order in which :class:`_Stage` gives them."""
 
     def __init__(self, system: StageEquations) -> None:
-        super().__init__(system)
-        self.coupled = Entries(system.unknown, system.weight)
-        static, coupled, cells = self.static, self.coupled, system.cells
+        tables = system.tables
+        self.static, self.coupled = tables.static_entries(), tables.entries()
+        static, coupled, cells = self.static, self.coupled, tables.sides[0]
         for sides in system.observed:
             static.add(sides[:, None, :], sides[:, :, None])
             coupled.add(sides[:, None, :], sides[:, :, None])
         inside = system.massive
-        own, at = cells[inside], system.place_cells(system.start[inside])
+        own, at = cells[inside], tables.place_cells(system.start[inside])
         coupled.add(own[:, None, :], own[:, :, None])
         coupled.add(own[:, :, None], at[:, None, :])
         coupled.add(at[:, None, :], own[:, :, None])
@@ -165,7 +166,7 @@ class Places(StationarityPlaces):
             coupled.add(own[:, :, None], at[:, None, :])
             coupled.add(at[:, None, :], own[:, :, None])
         row, column, _ = system.place_weights
-        coupled.add(system.place_cells(row)[:, :, None], system.place_cells(column)[:, None, :])
+        coupled.add(tables.place_cells(row)[:, :, None], tables.place_cells(column)[:, None, :])
 
 
 class _Stage:
@@ -179,7 +180,7 @@ class _Stage:
         linear = forces[: system.linear]
         further = Forces(times(system.by_place.T, linear), times(system.by_tangent.T, linear))
         places = system.displacements(q, y, given)
-        static = Stationarity(system, q, y, lam, places, given, near, further)
+        static = Stationarity(system, q, y, lam, given, near, further)
         entries, shares = static.entries, []
         self._spin = static.spin[:, system.massive_columns]
         self._spins = []

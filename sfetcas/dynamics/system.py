@@ -19,8 +19,9 @@ from ..mechanics.equations import Equations, State
 from ..mechanics.expressions import Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
-from ..mechanics.singles import arms_product, rows_of, weighted_product
+from ..mechanics.singles import arms_product, weighted_product
 from ..mechanics.spinning import vectors_of
+from ..mechanics.terms import rows_of
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -54,7 +55,7 @@ class System(Expressions):
         if len(self.model.positions.E.value):
             raise ValueError("motion needs the nodal assembly on a mesh with a place at every cut")
         self.masses = masses
-        self.observed = [self.sides_of(group) for group in masses.observables]
+        self.observed = [self.tables.sides_of(group) for group in masses.observables]
         self._place()
         self._weigh()
 

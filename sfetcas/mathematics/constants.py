@@ -8,7 +8,7 @@ import numpy as np
 from .arrays import Array
 from .linear import SparseMap
 
-__all__ = ["by_axes", "constant", "hanging", "sparse", "times"]
+__all__ = ["by_axes", "constant", "hanging", "picked", "sparse", "times"]
 
 
 def constant(matrix: SparseMap) -> ca.DM:
@@ -34,6 +34,11 @@ def by_axes(matrix: SparseMap, axes: int) -> SparseMap:
 def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
     """A product that leaves out what is not there."""
     return ca.densify(ca.mtimes(matrix, vector)) if matrix.nnz() else ca.MX.zeros(matrix.shape[0], vector.shape[1])
+
+
+def picked(vector: ca.MX, entries: Array) -> ca.MX:
+    """Entries of a column, also none of them."""
+    return vector[entries.tolist()] if len(entries) else ca.MX(0, 1)
 
 
 def hanging(onto: ca.DM, matrix: ca.DM) -> ca.DM:

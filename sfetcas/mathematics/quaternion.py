@@ -28,6 +28,7 @@ __all__ = [
     "product",
     "rotate",
     "turned",
+    "turned_by",
 ]
 
 
@@ -94,6 +95,14 @@ def conjugate(q: ArrayLike) -> Array:
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """``R(q) v`` for arrays of shape (..., 4) and (..., 3)."""
     return _stacked(turned(_components(q), _components(v)))
+
+
+def turned_by(q: Array, v: Array) -> Array:
+    """Vectors (..., axes) turned by rotations: quaternions (..., 4), or angles (..., 1) in the plane."""
+    if q.shape[-1] == 4:
+        return rotate(q, v)
+    c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
+    return _stacked([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1]])
 
 
 def matrix(q: ArrayLike) -> Array:

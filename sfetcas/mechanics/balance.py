@@ -15,12 +15,12 @@ import numpy as np
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.linear import SparseMap, smallest
-from .connections import GROUND, Group
 from .equations import Equations, State
 from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
 from .joints import Spring as Tension
 from .loading import Loading
 from .rotations import STIFF, Turn, end_joints
+from .terms import GROUND, Group
 
 __all__ = ["Balance", "SpringState", "three"]
 
@@ -334,7 +334,7 @@ class Balance:
     def _angle(self, group: Group, number: int) -> float:
         """Angle of a rotational spring, all turns counted."""
         model, state = self.model, self._state
-        part = model.winding.parts[next(i for i, other in enumerate(model.connections) if other is group)]
+        part = model.winding.parts[next(i for i, other in enumerate(model.terms) if other is group)]
         if part is not None:
             return float(model.winding.angles(state.q, state.wound)[part][number])
         a, b = (0.0 if turn == GROUND else float(state.q[turn, 0]) for turn in group.turns[number])

@@ -30,14 +30,15 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .body_masses import SMALLEST, BodyMass
 from .connections import freedoms
-from .joints import Body, Connection, Side
+from .joints import Body
+from .terms import Side, Term
 
 __all__ = ["BodyPoints", "points_of"]
 
 
 @final
 @dataclass(frozen=True)
-class BodyPoints(Connection):
+class BodyPoints(Term):
     """Points and numbers of a small member; data: rest vectors (nodes x axes), [x B] of each point, N, by columns.
 
     Attributes

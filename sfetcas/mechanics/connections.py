@@ -27,7 +27,6 @@ from .contact_joints import (
 from .elements import Element
 from .joints import (
     Body,
-    Connection,
     DrivenSlide,
     DrivenTurn,
     Hinge,
@@ -43,45 +42,16 @@ from .mesh import Cushion, Mesh, Touch
 from .positions import normals
 from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
 from .segments import Segments, cushioned
+from .terms import GROUND, Group, Term
 
-__all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
-
-GROUND = -1
-"""Number of a side that is the ground: it neither turns nor moves."""
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """All connections of one kind.
-
-    Attributes
-    ----------
-    kind : Connection
-    turns, places : ndarray (n, rotations | places)
-        Numbers of the sides.
-    data : ndarray (n, data)
-    rows : tuple of str
-        Names of the rows, those of the first connection first.
-    names : tuple of str
-        What each connection is: a spring, a member, a motion, or a joint.
-    nodes : tuple of str
-        The node at which it is; of a small member its first.
-    """
-
-    kind: Connection
-    turns: Index
-    places: Index
-    data: Array
-    rows: tuple[str, ...]
-    names: tuple[str, ...]
-    nodes: tuple[str, ...]
+__all__ = ["anchored", "body_numbers", "connect", "freedoms"]
 
 
 @dataclass(frozen=True)
 class _One:
     """One connection before it is put to its group."""
 
-    kind: Connection
+    kind: Term
     name: str
     node: str
     data: Array
@@ -95,14 +65,14 @@ def connect(
 ) -> tuple[Group, ...]:
     """The groups of a scene; those of a kind in the order of the scene."""
     maker = _Maker(scene, segments, rotations, element.space, scales)
-    by_kind: dict[Connection, list[_One]] = {}
+    by_kind: dict[Term, list[_One]] = {}
     ones = [*maker.all(), *maker.stops(mesh), *_Toucher(scene, mesh, segments, rotations, element, scales).all()]
     for one in ones:
         by_kind.setdefault(one.kind, []).append(one)
     return tuple(_grouped(kind, ones) for kind, ones in by_kind.items())
 
 
-def _grouped(kind: Connection, ones: list[_One]) -> Group:
+def _grouped(kind: Term, ones: list[_One]) -> Group:
     turns, places, rows, data, _ = kind.sizes
     n = len(ones)
     return Group(

@@ -10,7 +10,7 @@ from typing import final
 
 import casadi as ca
 
-from .joints import Connection, Side
+from .terms import Side, Term
 
 __all__ = [
     "Along",
@@ -29,7 +29,7 @@ CENTRE = 1e-60
 
 @final
 @dataclass(frozen=True)
-class OnPlane(Connection):
+class OnPlane(Term):
     """A place on a plane; data: its normal, the gap in the undeformed scene."""
 
     @property
@@ -44,7 +44,7 @@ class OnPlane(Connection):
 
 @final
 @dataclass(frozen=True)
-class OnRound(Connection):
+class OnRound(Term):
     """A place on a circle, cylinder or sphere; data: projection across the axis, centre to place, radius, sign."""
 
     @property
@@ -59,7 +59,7 @@ class OnRound(Connection):
 
 @final
 @dataclass(frozen=True)
-class CushionedPlane(Connection):
+class CushionedPlane(Term):
     """A place that a cushion keeps off a plane; data: as of a place on it, stiffness, thickness."""
 
     @property
@@ -74,7 +74,7 @@ class CushionedPlane(Connection):
 
 @final
 @dataclass(frozen=True)
-class CushionedRound(Connection):
+class CushionedRound(Term):
     """A place that a cushion keeps off something round; data: as of a place on it, stiffness, thickness."""
 
     @property
@@ -110,7 +110,7 @@ def _cushion(gap: ca.SX, data: ca.SX) -> ca.SX:
 
 @final
 @dataclass(frozen=True)
-class OnEdge(Connection):
+class OnEdge(Term):
     """A place whose section passes an edge at no distance; data: edge, undeformed tangent, edge to place, side.
 
     The distance counts across the edge and the tangent of the section.  It is the gap where the place is the one
@@ -133,7 +133,7 @@ class OnEdge(Connection):
 
 @final
 @dataclass(frozen=True)
-class Along(Connection):
+class Along(Term):
     """A section whose tangent lies in a plane; data: the normal of the plane, the tangent in the undeformed scene."""
 
     @property
@@ -149,7 +149,7 @@ class Along(Connection):
 
 @final
 @dataclass(frozen=True)
-class AlongRound(Connection):
+class AlongRound(Term):
     """A section tangential to a circle about its centre; data: centre to place, tangent.  Plane only."""
 
     @property
@@ -166,7 +166,7 @@ class AlongRound(Connection):
 
 @final
 @dataclass(frozen=True)
-class Bent(Connection):
+class Bent(Term):
     """Two rotations whose difference is prescribed by a circle between them; data: the angle.  Plane only."""
 
     @property

@@ -12,7 +12,8 @@ this is the interpolation of the source; for a curved one it interpolates the sm
 
 Of each integration point an element is told the stiffness (times weight over length, in the fixed axes of the
 undeformed scene), the tangent (unit tangent of the unloaded centre line times weight times length) and the
-pull (minus the internal force): its energy is the strain energy plus ``sum pull.R(q) tangent``.
+pull (minus the internal force) that loads cause: its energy is the strain energy plus ``sum pull.(R(q) - I) tangent``.
+Its row is the chord that it gains, ``sum (R(q) - I) tangent``, whose multiplier is the constant part of the pull.
 
 Two ways to integrate: *at the nodes* (Lobatto), where ``q`` is exactly unit and everything is polynomial, and
 *Gauss*, with the interpolated quaternion divided by its norm.  Both are of order 2p at the element ends.
@@ -24,40 +25,45 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
 from ..mathematics import interpolation
 from ..mathematics.arrays import Array
-from ..mathematics.quaternion import Components, product, turned
+from ..mathematics.quaternion import product
+from .terms import ARGUMENTS, Side, Term, name_of
 
 __all__ = ["ELEMENTS", "Element", "element_by_name"]
 
 
+@final
 @dataclass(frozen=True)
-class Element(Components):
+class Element(Term):
     """One element type: order, integration and dimension; everything else follows and is made once.
 
     Attributes
     ----------
     order : int
         Polynomial order p of the interpolation; the element has p + 1 nodes.
-    space : bool
-        Quaternions (4 numbers a node) or, in the plane, one angle a node.
     gauss : bool
         Integration on p + 1 Gauss points with the norm divided out instead of at the nodes.
     """
 
     order: int
-    space: bool
     gauss: bool = False
 
     @property
     def name(self) -> str:
         """The name of scene files: SFET2, SFET3, ..."""
         return f"SFET{self.order + 1}"
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """A rotation at each node; data: stiffnesses and tangents of all points, load: their pulls."""
+        n = self.order + 1
+        return n, 0, self.axes, n * (self.stiffnesses + self.axes), n * self.axes
 
     @property
     def stiffnesses(self) -> int:
@@ -88,14 +94,31 @@ class Element(Components):
         """Integrals from 0 to each integration point of what is given at them, shape (p + 1, p + 1)."""
         return interpolation.integration(self.points, self.points)
 
-    def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    # -- what it says ---------------------------------------------------------------------------------
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Strain energy, and the work that the pull of loads has still to do."""
+        stiffness, tangent = self.split(data)
+        pull = ca.reshape(load, self.axes, self.order + 1)
+        here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
+        energy = ca.SX(0)
+        for k in range(self.order + 1):
+            energy += self._strain_energy(here[:, k], slope[:, k], stiffness[:, k])
+            energy += ca.dot(pull[:, k], self._tangent(here[:, k], tangent[:, k]) - tangent[:, k])
+        return energy
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The vector from the first to the last node less that of the undeformed element."""
+        tangent = self.split(data)[1]
+        here = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
+        gained = [self._tangent(here[:, k], tangent[:, k]) - tangent[:, k] for k in range(self.order + 1)]
+        return ca.vertsplit(sum(gained[1:], gained[0]))
+
+    def split(self, data: Any) -> tuple[Any, Any]:
+        """Stiffnesses and tangents of the points, a column each."""
         n = self.order + 1
-        return (
-            ca.SX.sym("q", self.components, n),
-            ca.SX.sym("stiffness", self.stiffnesses, n),
-            ca.SX.sym("tangent", self.axes, n),
-            ca.SX.sym("pull", self.axes, n),
-        )
+        stiffness, tangent = ca.vertsplit(data, [0, n * self.stiffnesses, data.shape[0]])
+        return ca.reshape(stiffness, self.stiffnesses, n), ca.reshape(tangent, self.axes, n)
 
     def _at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Rotation and its derivative by xi at the integration points."""
@@ -129,153 +152,117 @@ class Element(Components):
 
     def _tangent(self, here: ca.SX, tangent: ca.SX) -> ca.SX:
         """The turned tangent ``R(q) t_0`` of one point."""
-        t = ca.vertsplit(tangent)
-        if not self.space:
-            c, s = ca.cos(here[0]), ca.sin(here[0])
-            return ca.vertcat(c * t[0] - s * t[1], s * t[0] + c * t[1])
-        v = ca.vertcat(*turned(ca.vertsplit(here), t))
-        return v / ca.dot(here, here) if self.gauss else v
-
-    def _energy(self, q: ca.SX, stiffness: ca.SX, tangent: ca.SX, pull: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Energy, and the vector from the first to the last node."""
-        here, slope = self._at_points(q)
-        energy: ca.SX = ca.SX(0)
-        reach: ca.SX = ca.SX(self.axes, 1)
-        for k in range(self.order + 1):
-            turned_tangent = self._tangent(here[:, k], tangent[:, k])
-            energy += self._strain_energy(here[:, k], slope[:, k], stiffness[:, k])
-            energy += ca.dot(pull[:, k], turned_tangent)
-            reach += turned_tangent
-        return energy, ca.densify(reach)
-
-    def _spin(self, q: ca.SX) -> ca.SX:
-        """Derivative of the nodal unknowns by rotations about the fixed axes: ``dq = 1/2 (0, phi) q``."""
-        if not self.space:
-            return ca.SX.eye(self.order + 1)
-        blocks = []
-        for k in range(self.order + 1):
-            node = ca.vertsplit(q[:, k])
-            columns = [product([0.0, *axis], node) for axis in np.eye(3).tolist()]
-            blocks.append(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))
-        return ca.diagcat(*blocks)
-
-    def _function(self, name: str, arguments: list[Any], results: dict[str, Any]) -> ca.Function:
-        tag = f"{name}_{self._tag}"
-        names = list(ARGUMENTS) if len(arguments) == 4 else ["q", "tangent"]
-        return ca.Function(tag, arguments, list(results.values()), names, list(results))
-
-    @functools.cached_property
-    def energy(self) -> ca.Function:
-        """(q, stiffness, tangent, pull) -> energy: strain energy plus ``sum pull.R(q) t`` over the points."""
-        symbols = self._symbols()
-        return self._function("energy", list(symbols), {"energy": self._energy(*symbols)[0]})
-
-    @functools.cached_property
-    def gradient(self) -> ca.Function:
-        """(q, stiffness, tangent, pull) -> energy and its gradient by ``vec(q)``."""
-        if self.space:
-            return self._gradient_in_space()
-        q, *data = self._symbols()
-        energy = self._energy(q, *data)[0]
-        gradient = ca.vec(ca.gradient(energy, q))
-        return self._function("gradient", [q, *data], {"energy": energy, "gradient": gradient})
-
-    @functools.cached_property
-    def hessian(self) -> ca.Function:
-        """(q, stiffness, tangent, pull) -> dense Hessian of the energy by ``vec(q)``."""
-        if self.space:
-            return self._hessian_in_space()
-        q, *data = self._symbols()
-        hessian = ca.densify(ca.hessian(self._energy(q, *data)[0], q)[0])
-        return self._function("hessian", [q, *data], {"hessian": hessian})
-
-    @functools.cached_property
-    def reach(self) -> ca.Function:
-        """(q, tangent) -> the vector from the first to the last node, shape (axes, 1)."""
-        q, stiffness, tangent, pull = self._symbols()
-        return self._function("reach", [q, tangent], {"reach": self._energy(q, stiffness, tangent, pull)[1]})
-
-    @functools.cached_property
-    def reach_jacobian(self) -> ca.Function:
-        """(q, tangent) -> the reach and its dense derivative by ``vec(q)``."""
-        q, stiffness, tangent, pull = self._symbols()
-        reach = self._energy(q, stiffness, tangent, pull)[1]
-        jacobian = ca.densify(ca.jacobian(reach, q))
-        return self._function("reach_jacobian", [q, tangent], {"reach": reach, "jacobian": jacobian})
+        v = ca.vertcat(*self.forth(ca.vertsplit(here), ca.vertsplit(tangent)))
+        return v / ca.dot(here, here) if self.space and self.gauss else v
 
     @functools.cached_property
     def turned(self) -> ca.Function:
         """(q, tangent) -> turned tangents of the points, (axes, p + 1)."""
-        q, _, tangent, _ = self._symbols()
+        n = self.order + 1
+        q, tangent = ca.SX.sym("q", self.components, n), ca.SX.sym("tangent", self.axes, n)
         here = self._at_points(q)[0]
-        found = [self._tangent(here[:, k], tangent[:, k]) for k in range(self.order + 1)]
-        return self._function("turned", [q, tangent], {"turned": ca.densify(ca.horzcat(*found))})
+        found = ca.horzcat(*[self._tangent(here[:, k], tangent[:, k]) for k in range(n)])
+        return ca.Function(f"turned_{name_of(self)}", [q, tangent], [ca.densify(found)])
 
-    @functools.cached_property
-    def turning(self) -> ca.Function:
-        """(q, stiffness, tangent, pull) -> strain energy, work, moments, turning stiffness, reach and its spin.
-
-        Derivatives by rotations ``phi`` about the fixed axes at the nodes, on unit quaternions: with ``E`` from
-        ``dq = 1/2 (0, phi) q`` the gradient is ``E^T g`` and the Hessian ``E^T H E - 1/4 (q.g) I`` (the second
-        term keeps the quaternion on the unit sphere; it is what the multiplier of the norm does).
-        """
-        return self._turning_in_space() if self.space else self._turning_in_plane()
-
-    @functools.cached_property
-    def moments(self) -> ca.Function:
-        """(q, stiffness, tangent, pull) -> the moments of :attr:`turning` alone, of which derivatives are short."""
-        if self.space:
-            return self._moments_in_space()
-        q, *data = self._symbols()
-        gradient = ca.gradient(self._energy(q, *data)[0], q)
-        return self._function("moments", [q, *data], {"moments": ca.densify(ca.vec(gradient))})
-
-    def _moments_in_space(self) -> ca.Function:
-        q, *data = self._large_symbols()
-        gradient = self._of_point("gradient").map(self.order + 1)(*self._at(q), *data)[1]
-        moments = ca.mtimes(self._spins(q).T, ca.vec(self._on_nodes(gradient)))
-        return self._function("moments", [q, *data], {"moments": ca.densify(moments)})
-
-    def _turning_in_plane(self) -> ca.Function:
-        q, *data = self._symbols()
-        energy, reach = self._energy(q, *data)
-        strain = ca.substitute(energy, data[2], ca.SX.zeros(data[2].shape))
-        hessian, gradient = ca.hessian(energy, q)
-        results = {
-            "strain": strain,
-            "work": energy - strain,
-            "moments": ca.densify(ca.vec(gradient)),
-            "stiffness_turning": ca.densify(hessian),
-            "reach": reach,
-            "reach_spin": ca.densify(ca.jacobian(reach, q)),
-        }
-        return self._function("turning", [q, *data], results)
-
+    # -- derivatives ----------------------------------------------------------------------------------
     # In space derivatives of the whole element are long: those of one point, mapped over the points and put together
     # by constant matrices, are a tenth of the code, and as fast.
 
-    def _turning_in_space(self) -> ca.Function:
-        q, *data = self._large_symbols()
-        strain, work, tangents, gradient, hessian, change = self._point.map(self.order + 1)(*self._at(q), *data)
-        by_q = self._on_nodes(gradient)
-        spin = self._spins(q)
-        radial = ca.sum1(q * by_q)
-        stiffness = ca.mtimes(spin.T, ca.mtimes(self._between_nodes(hessian), spin))
-        stiffness -= 0.25 * ca.diag(ca.vec(ca.repmat(radial, 3, 1)))
-        by_node = ca.reshape(ca.mtimes(ca.reshape(change, 12, self.order + 1), self._shape), 3, 4 * (self.order + 1))
+    def turning(self) -> ca.Function:
+        """As of any term, in space from those of the points."""
+        if not self.space:
+            return super().turning()
+        symbols, q, stiffness, tangent, load, pull = self._large_symbols()
+        strain, tangents, gradient, hessian, change = self._point.map(self.order + 1)(
+            *self._at(q), stiffness, tangent, pull
+        )
+        by_q, spin, gained = self._on_nodes(gradient), self._spins(q), tangents - tangent
+        matrix = ca.mtimes(spin.T, ca.mtimes(self._between_nodes(hessian), spin))
+        # What keeps quaternions on the unit sphere.
+        matrix -= 0.25 * ca.diag(ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1)))
         results = {
-            "strain": ca.sum2(strain),
-            "work": ca.sum2(work),
-            "moments": ca.densify(ca.mtimes(spin.T, ca.vec(by_q))),
-            "stiffness_turning": ca.densify(stiffness),
-            "reach": ca.sum2(tangents),
-            "reach_spin": ca.densify(ca.mtimes(by_node, spin)),
+            "energy": ca.sum2(strain) + ca.dot(load, gained),
+            "stored": ca.sum2(strain),
+            "rows": ca.sum2(gained),
+            "gradient": ca.densify(ca.mtimes(spin.T, ca.vec(by_q))),
+            "stiffness": ca.densify(matrix),
+            "spin": ca.densify(ca.mtimes(self._by_nodes(change), spin)),
         }
-        return self._function("turning", [q, *data], results)
+        return self._function("turning", symbols, results)
 
-    def _large_symbols(self) -> list[ca.MX]:
-        """As :meth:`_symbols`, for functions put together of others."""
-        return [ca.MX.sym(name, *part.shape) for name, part in zip(ARGUMENTS, self._symbols(), strict=True)]
+    def turning_forces(self) -> ca.Function:
+        """As of any term, in space from those of the points."""
+        if not self.space:
+            return super().turning_forces()
+        symbols, q, stiffness, tangent, _, pull = self._large_symbols()
+        tangents, gradient, _ = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, pull)
+        moments = ca.mtimes(self._spins(q).T, ca.vec(self._on_nodes(gradient)))
+        return self._function("forces", symbols, {"rows": ca.sum2(tangents - tangent), "gradient": ca.densify(moments)})
+
+    def slopes(self) -> ca.Function:
+        """As of any term, in space from those of the points."""
+        if not self.space:
+            return super().slopes()
+        symbols, q, stiffness, tangent, load, _ = self._large_symbols()
+        _, gradient, change = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, load)
+        results = {"gradient": ca.densify(ca.vec(self._on_nodes(gradient))), "jacobian": self._by_nodes(change)}
+        return self._function("slopes", symbols[:4], results)
+
+    def curvatures(self) -> ca.Function:
+        """As of any term, in space from those of the points."""
+        if not self.space:
+            return super().curvatures()
+        symbols, q, stiffness, tangent, load, _ = self._large_symbols()
+        weight = ca.MX.sym("weight")
+        pull = weight * load + ca.repmat(symbols[4], 1, self.order + 1)
+        hessian = self._of_point("hessian").map(self.order + 1)(*self._at(q), weight * stiffness, tangent, pull)
+        return self._function("curvatures", [*symbols, weight], {"hessian": self._between_nodes(hessian)})
+
+    @functools.cached_property
+    def convex(self) -> ca.Function:
+        """(q, u, data, load, lam) -> a positive matrix in place of the stiffness of :meth:`turning`.
+
+        Of the strain energy the share of the first derivatives of the curvature (Gauss and Newton), exact in the plane;
+        of the pull what it resists where it is tension, and as much where it is compression, about both normals.
+        """
+        symbols, q, stiffness, tangent, _, pull = self._large_symbols()
+        if self.space:
+            return self._function("convex", symbols, {"convex": self._convex_in_space(q, stiffness, tangent, pull)})
+        parts = [ca.SX.sym(name, *part.shape) for name, part in zip("qctp", (q, stiffness, tangent, pull), strict=True)]
+        here, slope = self._at_points(parts[0])
+        total = ca.SX(self.order + 1, self.order + 1)
+        for k in range(self.order + 1):
+            by_turns = ca.jacobian(slope[:, k], parts[0])
+            along = ca.fabs(ca.dot(self._tangent(here[:, k], parts[2][:, k]), parts[3][:, k]))
+            row = ca.DM(interpolation.evaluation(self.nodes, self.points[k : k + 1]))
+            total += parts[1][0, k] * ca.mtimes(by_turns.T, by_turns) + along * ca.mtimes(row.T, row)
+        inner = ca.Function(f"convex_parts_{name_of(self)}", parts, [ca.densify(total)])
+        return self._function("convex", symbols, {"convex": inner(q, stiffness, tangent, pull)})
+
+    def _convex_in_space(self, q: ca.MX, stiffness: ca.MX, tangent: ca.MX, pull: ca.MX) -> ca.MX:
+        n = self.order + 1
+        hessian, across = self._convex_point.map(n)(*self._at(q), stiffness, tangent, pull)
+        spin = self._spins(q)
+        pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
+        summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
+        order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
+        total = ca.mtimes(spin.T, ca.mtimes(self._between_nodes(hessian), spin))
+        return ca.densify(total + ca.reshape(summed.nz[order.tolist()], 3 * n, 3 * n))
+
+    def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX, ca.MX, ca.MX]:
+        """Arguments q, u, data, load, lam of functions put together of others.
+
+        And rotations, stiffnesses, tangents, pulls of loads and whole pulls, a column a node or point.
+        """
+        turns, places, rows, data, load = self.sizes
+        shapes = ((self.components, turns), (self.axes, places), (data, 1), (load, 1), (rows, 1))
+        symbols = [ca.MX.sym(name, *shape) for name, shape in zip(ARGUMENTS, shapes, strict=True)]
+        given = ca.reshape(symbols[3], self.axes, turns)
+        return symbols, symbols[0], *self.split(symbols[2]), given, given + ca.repmat(symbols[4], 1, turns)
+
+    def _function(self, name: str, arguments: list[ca.MX], results: dict[str, ca.MX]) -> ca.Function:
+        names = [*ARGUMENTS, "weight"][: len(arguments)]
+        return ca.Function(f"{name}_{name_of(self)}", arguments, list(results.values()), names, list(results))
 
     @functools.cached_property
     def _shape(self) -> ca.DM:
@@ -294,6 +281,11 @@ class Element(Components):
     def _on_nodes(self, gradient: ca.MX) -> ca.MX:
         """Derivatives by the nodes (4, nodes) from those by rotations and slopes at the points (8, points)."""
         return ca.mtimes(gradient[:4, :], self._shape) + ca.mtimes(gradient[4:, :], self._derivative)
+
+    def _by_nodes(self, change: ca.MX) -> ca.MX:
+        """Derivative (3, 4 nodes) of the chord from those (3, 4 points) of the tangents by the rotations there."""
+        n = self.order + 1
+        return ca.densify(ca.reshape(ca.mtimes(ca.reshape(change, 12, n), self._shape), 3, 4 * n))
 
     def _between_nodes(self, hessian: ca.MX) -> ca.MX:
         """The same of second derivatives: (4 nodes, 4 nodes) from (8, 8 points)."""
@@ -319,81 +311,37 @@ class Element(Components):
         blocks = block.map(self.order + 1)(q)
         return ca.diagcat(*ca.horzsplit(blocks, 3))
 
-    def _gradient_in_space(self) -> ca.Function:
-        q, *data = self._large_symbols()
-        energy, gradient = self._of_point("gradient").map(self.order + 1)(*self._at(q), *data)
-        results = {"energy": ca.sum2(energy), "gradient": ca.densify(ca.vec(self._on_nodes(gradient)))}
-        return self._function("gradient", [q, *data], results)
-
-    def _hessian_in_space(self) -> ca.Function:
-        q, *data = self._large_symbols()
-        hessian = self._of_point("hessian").map(self.order + 1)(*self._at(q), *data)
-        return self._function("hessian", [q, *data], {"hessian": self._between_nodes(hessian)})
-
     def _of_point(self, what: str) -> ca.Function:
-        """(rotation, slope, stiffness, tangent, pull) of a point -> its energy and gradient (8,), or Hessian (8, 8)."""
+        """(rotation, slope, stiffness, tangent, pull) of a point -> Hessian (8, 8) of its energy.
+
+        Or turned tangent, gradient (8,), and the derivative of the turned tangent by the rotation (3, 4).
+        """
         here, slope, *data = self._point_symbols()
-        energy = self._strain_energy(here, slope, data[0]) + ca.dot(data[2], self._tangent(here, data[1]))
+        now = self._tangent(here, data[1])
+        energy = self._strain_energy(here, slope, data[0]) + ca.dot(data[2], now)
         hessian, gradient = ca.hessian(energy, ca.vertcat(here, slope))
-        results = [energy, gradient] if what == "gradient" else [hessian]
-        name = f"point_{what}_{self._tag}"
+        results = [now, gradient, ca.jacobian(now, here)] if what == "gradient" else [hessian]
+        name = f"point_{what}_{name_of(self)}"
         return ca.Function(name, [here, slope, *data], [ca.densify(one) for one in results], {"cse": True})
 
     @functools.cached_property
     def _point(self) -> ca.Function:
-        """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :attr:`turning`.
+        """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :meth:`turning`.
 
-        Strain energy, work, turned tangent, gradient (8,) and Hessian (8, 8) by rotation and slope, and the derivative
+        Strain energy, turned tangent, gradient (8,) and Hessian (8, 8) by rotation and slope, and the derivative
         of the turned tangent by the rotation (3, 4).
         """
         here, slope, *data = self._point_symbols()
         strain = self._strain_energy(here, slope, data[0])
         now = self._tangent(here, data[1])
-        work = ca.dot(data[2], now)
-        hessian, gradient = ca.hessian(strain + work, ca.vertcat(here, slope))
-        results = [strain, work, now, gradient, hessian, ca.jacobian(now, here)]
-        return ca.Function(
-            f"point_{self._tag}", [here, slope, *data], [ca.densify(one) for one in results], {"cse": True}
-        )
+        hessian, gradient = ca.hessian(strain + ca.dot(data[2], now), ca.vertcat(here, slope))
+        results = [strain, now, gradient, hessian, ca.jacobian(now, here)]
+        symbols = [here, slope, *data]
+        return ca.Function(f"point_{name_of(self)}", symbols, [ca.densify(one) for one in results], {"cse": True})
 
     def _point_symbols(self) -> list[ca.SX]:
         names = {"here": 4, "slope": 4, "stiffness": 6, "tangent": 3, "pull": 3}
         return [ca.SX.sym(name, size) for name, size in names.items()]
-
-    @property
-    def _tag(self) -> str:
-        return f"{'space' if self.space else 'plane'}_{self.order + 1}{'_gauss' if self.gauss else ''}"
-
-    @functools.cached_property
-    def convex(self) -> ca.Function:
-        """(q, stiffness, tangent, pull) -> a positive matrix in place of the turning stiffness of :attr:`turning`.
-
-        Of the strain energy the share of the first derivatives of the curvature (Gauss and Newton), exact in the plane;
-        of the pull what it resists where it is tension, and as much where it is compression, about both normals.
-        """
-        if self.space:
-            return self._convex_in_space()
-        q, stiffness, tangent, pull = self._symbols()
-        here, slope = self._at_points(q)
-        total = ca.SX(self.order + 1, self.order + 1)
-        for k in range(self.order + 1):
-            by_turns = ca.jacobian(slope[:, k], q)
-            along = ca.fabs(ca.dot(self._tangent(here[:, k], tangent[:, k]), pull[:, k]))
-            row = ca.DM(interpolation.evaluation(self.nodes, self.points[k : k + 1]))
-            total += stiffness[0, k] * ca.mtimes(by_turns.T, by_turns) + along * ca.mtimes(row.T, row)
-        return self._function("convex", [q, stiffness, tangent, pull], {"convex": ca.densify(total)})
-
-    def _convex_in_space(self) -> ca.Function:
-        n = self.order + 1
-        q, *data = self._large_symbols()
-        hessian, across = self._convex_point.map(n)(*self._at(q), *data)
-        spin = self._spins(q)
-        pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
-        summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
-        order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
-        total = ca.mtimes(spin.T, ca.mtimes(self._between_nodes(hessian), spin))
-        total += ca.reshape(summed.nz[order.tolist()], 3 * n, 3 * n)
-        return self._function("convex", [q, *data], {"convex": ca.densify(total)})
 
     @functools.cached_property
     def _convex_point(self) -> ca.Function:
@@ -406,10 +354,11 @@ class Element(Components):
         results = [ca.mtimes(by_both.T, ca.mtimes(self._section(stiffness), by_both))]
         results.append(ca.fabs(ca.dot(now, pull)) * across)
         symbols = [here, slope, stiffness, tangent, pull]
-        return ca.Function(f"convex_{self._tag}", symbols, [ca.densify(one) for one in results], {"cse": True})
+        return ca.Function(
+            f"convex_point_{name_of(self)}", symbols, [ca.densify(one) for one in results], {"cse": True}
+        )
 
 
-ARGUMENTS = ("q", "stiffness", "tangent", "pull")
 ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))
 """Names of the elements, by their number of nodes."""
 
@@ -417,4 +366,4 @@ ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))
 @functools.cache
 def element_by_name(name: str, space: bool, gauss: bool = False) -> Element:
     """The element type of a name, made once a process so that its functions are, too."""
-    return Element(ELEMENTS.index(name) + 1, space, gauss)
+    return Element(space, ELEMENTS.index(name) + 1, gauss)

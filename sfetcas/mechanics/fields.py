@@ -43,8 +43,8 @@ class Fields:
         self.q = state.q
         model = self.model
         self.turned = turned_tangents(model, state.q)
-        reach = self.turned.sum(axis=1)
-        nodal, _ = equations.displacements(state, loading, reach)
+        gained = (self.turned - model.beams.tangent).sum(axis=1)
+        nodal, _ = equations.displacements(state, loading, gained)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
         self._pull = loading.pull + equations.segment_pulls(state.lam, loading)[model.segments.owner][:, None, :]
 

@@ -1,9 +1,9 @@
 """What joints, springs and small bodies ask of the rotations and displacements that they connect.
 
-A connection sees the world only through its *sides*: rotations ``q`` since the undeformed scene (an angle in the
-plane, a quaternion in space) and displacements ``u`` of places.  It states an energy, or rows that have to be
-zero, or both; every derivative comes from CasADi, once a process and kind.  To add a joint, write one class here
-and one row in ``tests/test_joints.py``; what touches obstacles stands in :mod:`~sfetcas.mechanics.contact_joints`.
+Each is a kind of :class:`~sfetcas.mechanics.terms.Term`: it sees the world only through its *sides*, rotations ``q``
+since the undeformed scene (an angle in the plane, a quaternion in space) and displacements ``u`` of places, and states
+an energy, or rows that have to be zero, or both.  To add a joint, write one class here and one row in
+``tests/test_joints.py``; what touches obstacles stands in :mod:`~sfetcas.mechanics.contact_joints`.
 
 A ball asks nothing, a rigid joint lets both sides share one rotation, and in the plane a hinge asks nothing.
 """
@@ -11,90 +11,27 @@ A ball asks nothing, a rigid joint lets both sides share one rotation, and in th
 from __future__ import annotations
 
 import abc
-import functools
-from dataclasses import dataclass, fields
-from typing import final
+from dataclasses import dataclass
+from typing import ClassVar, final
 
 import casadi as ca
-import numpy as np
 
-from ..mathematics.quaternion import Components, product, turned
+from .terms import Side, Term
 
 __all__ = [
     "Body",
-    "Connection",
     "DrivenSlide",
     "DrivenTurn",
     "Hinge",
     "LineSpring",
     "LineStop",
-    "Side",
     "Slide",
     "Spring",
     "TurnSpring",
     "TurnStop",
     "Turning",
     "Universal",
-    "by_components",
-    "by_turning",
-    "forces_by_turning",
-    "name_of",
 ]
-
-Side = list[ca.SX]
-"""Components of a rotation or of a vector."""
-
-
-@dataclass(frozen=True)
-class Connection(Components, abc.ABC):
-    """A kind of connection; what it says stands in the methods that a new kind gives.
-
-    Attributes
-    ----------
-    space : bool
-        Quaternions and three axes, or angles and two.
-    """
-
-    space: bool
-
-    @property
-    @abc.abstractmethod
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """Rotations, places, rows, data and loads (data that grow with the load factor)."""
-
-    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Potential energy, dimensionless."""
-        return ca.SX(0)
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """What has to be zero: angles (rad) and displacements, dimensionless."""
-        return []
-
-    # -- what the sides say to each other --------------------------------------------------------
-
-    def back(self, q: Side, v: Side) -> Side:
-        """The vector seen from the turned side, ``R(q)^T v``."""
-        if self.space:
-            return turned([q[0], -q[1], -q[2], -q[3]], v)
-        c, s = ca.cos(q[0]), ca.sin(q[0])
-        return [c * v[0] + s * v[1], c * v[1] - s * v[0]]
-
-    def turned_back(self, q: Side, v: Side) -> Side:
-        """What turning back changes, ``R(q)^T v - v``, also of small rotations to full precision."""
-        if self.space:
-            spin = [-a for a in q[1:]]
-            once = ca.cross(ca.vertcat(*spin), ca.vertcat(*v))
-            return ca.vertsplit(2.0 * (q[0] * once + ca.cross(ca.vertcat(*spin), once)))
-        s, versine = ca.sin(q[0]), 2.0 * ca.sin(0.5 * q[0]) ** 2
-        return [s * v[1] - versine * v[0], -s * v[0] - versine * v[1]]
-
-    def forth(self, q: Side, v: Side) -> Side:
-        """The vector turned with the side, ``R(q) v``."""
-        return self.back([-q[0]] if not self.space else [q[0], -q[1], -q[2], -q[3]], v)
-
-    def relative(self, a: Side, b: Side) -> Side:
-        """Rotation of side b against side a, seen from the undeformed scene."""
-        return product([a[0], -a[1], -a[2], -a[3]], b) if self.space else [b[0] - a[0]]
 
 
 def _dot(a: Side, b: Side) -> ca.SX:
@@ -103,7 +40,7 @@ def _dot(a: Side, b: Side) -> ca.SX:
 
 @final
 @dataclass(frozen=True)
-class Hinge(Connection):
+class Hinge(Term):
     """Two rotations that differ about one axis only; data: two directions normal to it.  Space only."""
 
     @property
@@ -119,7 +56,7 @@ class Hinge(Connection):
 
 @final
 @dataclass(frozen=True)
-class Universal(Connection):
+class Universal(Term):
     """An axis of either side that stay normal to each other; data: both, undeformed.  Space only."""
 
     @property
@@ -135,8 +72,10 @@ class Universal(Connection):
 
 @final
 @dataclass(frozen=True)
-class DrivenTurn(Connection):
+class DrivenTurn(Term):
     """The angle between two rotations about an axis is prescribed; data: axis, load: angle."""
+
+    is_driven: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -154,7 +93,7 @@ class DrivenTurn(Connection):
 
 @final
 @dataclass(frozen=True)
-class Slide(Connection):
+class Slide(Term):
     """A place that slides along a line carried by a rotation at another one; data: directions across the line."""
 
     @property
@@ -171,8 +110,10 @@ class Slide(Connection):
 
 @final
 @dataclass(frozen=True)
-class DrivenSlide(Connection):
+class DrivenSlide(Term):
     """The travel of a slide is prescribed; data: direction of the line, load: travel."""
+
+    is_driven: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -186,7 +127,7 @@ class DrivenSlide(Connection):
 
 
 @dataclass(frozen=True)
-class Turning(Connection):
+class Turning(Term):
     """What acts on the angle of the second side against the first about an axis of the first; it has no places.
 
     Angles count turns: in the plane by themselves, in space near a value that the state carries.  With ``r`` the
@@ -276,7 +217,7 @@ class TurnStop(Turning):
 
 @final
 @dataclass(frozen=True)
-class LineStop(Connection):
+class LineStop(Term):
     """A spring along a direction that stands at a stop; data: direction, travel of the stop."""
 
     @property
@@ -292,7 +233,7 @@ class LineStop(Connection):
 
 @final
 @dataclass(frozen=True)
-class Spring(Connection):
+class Spring(Term):
     """A spring between two places with a free length; data: their distance (vector), stiffness, free length."""
 
     @property
@@ -315,7 +256,7 @@ class Spring(Connection):
 
 @final
 @dataclass(frozen=True)
-class LineSpring(Connection):
+class LineSpring(Term):
     """A spring that acts along a direction fixed in space; data: direction, stiffness, rest travel."""
 
     @property
@@ -332,7 +273,7 @@ class LineSpring(Connection):
 
 @final
 @dataclass(frozen=True)
-class Body(Connection):
+class Body(Term):
     """A body with linear elasticity in a frame that it carries, on macro-nodes with six (three) freedoms each.
 
     The frame turns with the mean of the rotations; of each node the displacement since the undeformed body,
@@ -411,92 +352,3 @@ class Body(Connection):
         """Deformations that do not exist."""
         rest, _, stiff = self._split(data)
         return ca.vertsplit(ca.mtimes(stiff, self.deformation(q, u, rest))) if self.stiff else []
-
-
-# -- derivatives, the same for all kinds --------------------------------------------------------------
-
-
-def _symbols(kind: Connection) -> tuple[list[ca.SX], ca.SX, ca.SX]:
-    """Arguments q, u, data, load, lam; energy and rows."""
-    turns, places, rows, data, load = kind.sizes
-    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
-    arguments = [q, u, ca.SX.sym("data", data), ca.SX.sym("load", load), ca.SX.sym("lam", rows)]
-    sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
-    energy = kind.energy(*sides, arguments[2], arguments[3])
-    residual = ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, arguments[2], arguments[3]))
-    return arguments, energy, residual
-
-
-def name_of(kind: Connection) -> str:
-    """A name for functions of a kind, of its own for each kind."""
-    extra = ""
-    for item in fields(kind):
-        value = getattr(kind, item.name)
-        if item.name != "space" and value is not False:
-            extra += "_" + (
-                name_of(value) if isinstance(value, Connection) else item.name if value is True else str(value)
-            )
-    return f"{type(kind).__name__.lower()}_{'space' if kind.space else 'plane'}{extra}"
-
-
-@functools.cache
-def by_turning(kind: Connection) -> ca.Function:
-    """(q, u, data, load, lam) -> energy, its share without loads, rows, gradient, stiffness, and the rows' derivative.
-
-    Derivatives of the Lagrangian ``energy + lam.rows`` by rotations about the fixed axes of all sides, then by all
-    displacements, on unit quaternions (see :attr:`sfetcas.mechanics.elements.Element.turning`).
-    """
-    arguments, energy, rows = _symbols(kind)
-    q, u = arguments[0], arguments[1]
-    x = ca.vertcat(ca.vec(q), ca.vec(u))
-    hessian, gradient = ca.hessian(energy + ca.dot(arguments[4], rows), x)
-    spin, radial = [ca.SX.eye(q.numel())], ca.SX.zeros(u.numel(), 1)
-    if kind.space:
-        sides = [ca.vertsplit(q[:, i]) for i in range(q.shape[1])]
-        columns = [[ca.vertcat(*product([0.0, *a], side)) for a in np.eye(3).tolist()] for side in sides]
-        spin = [0.5 * ca.horzcat(*c) for c in columns]
-        parts = [ca.dot(q[:, i], gradient[4 * i : 4 * i + 4]) for i in range(q.shape[1])]
-        radial = ca.vertcat(*[part for part in parts for _ in range(3)], radial)
-    else:
-        radial = ca.SX.zeros(x.numel(), 1)
-    basis = ca.diagcat(*spin, ca.SX.eye(u.numel()))
-    stiffness = ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * ca.diag(radial)
-    results = [
-        energy,
-        ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape)),
-        ca.densify(rows),
-        ca.densify(ca.mtimes(basis.T, gradient)),
-        ca.densify(stiffness),
-        ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
-    ]
-    names = ["energy", "stored", "rows", "gradient", "stiffness", "spin"]
-    return ca.Function(f"turning_{name_of(kind)}", arguments, results, ["q", "u", "data", "load", "lam"], names)
-
-
-@functools.cache
-def forces_by_turning(kind: Connection) -> ca.Function:
-    """(q, u, data, load, lam) -> rows and gradient of :func:`by_turning` alone, of which derivatives are short."""
-    whole = by_turning(kind)
-    symbols = whole.sx_in()
-    found = whole.call(symbols)
-    return ca.Function(f"forces_{name_of(kind)}", symbols, [found[2], found[3]], whole.name_in(), ["rows", "gradient"])
-
-
-@functools.cache
-def by_components(kind: Connection) -> ca.Function:
-    """(q, u, data, load, lam, weight) -> energy, rows, gradient, jacobian, hessian of ``weight energy + lam.rows``.
-
-    Derivatives by the components of all rotations, then of all displacements.
-    """
-    arguments, energy, rows = _symbols(kind)
-    x, weight = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1])), ca.SX.sym("weight")
-    results = [
-        energy,
-        ca.densify(rows),
-        ca.densify(ca.gradient(energy, x)),
-        ca.densify(ca.jacobian(rows, x)),
-        ca.densify(ca.hessian(weight * energy + ca.dot(arguments[4], rows), x)[0]),
-    ]
-    given = ["q", "u", "data", "load", "lam", "weight"]
-    names = ["energy", "rows", "gradient", "jacobian", "hessian"]
-    return ca.Function(f"components_{name_of(kind)}", [*arguments, weight], results, given, names)

@@ -7,6 +7,7 @@ there is the pull of the elements before it.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,20 +15,21 @@ import numpy as np
 
 from ..description.scene import Load, Motion, Scene
 from ..description.sections import evaluate
-from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array
 from ..mathematics.interpolation import pieces
 from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
-from .connections import Group, freedoms
+from .connections import freedoms
 from .elements import Element
-from .joints import Body, DrivenSlide, DrivenTurn
+from .joints import Body, DrivenTurn
+from .load_terms import FollowingSpread, carried, cut_of, followed_elements, inner_cut
 from .mesh import Mesh
 from .rotations import Rotations
 from .segments import Segments
+from .terms import Group, Term
 
-__all__ = ["Followers", "Loading", "carried", "find_followers", "unit_loadings"]
+__all__ = ["Loading", "unit_loadings"]
 
 
 @dataclass(frozen=True)
@@ -42,16 +44,10 @@ class Loading:
         The share of ``force`` that acts on the places themselves.
     moment : ndarray (rotations, 3)
         Moments on rotations, about the fixed axes.
-    twist : ndarray (rotations, 3)
-        Moments on rotations that turn with them.
     jump : ndarray (elements, 3)
         The share of ``moment`` that acts at the start of an element, within a member.
-    couple, couple_twist : ndarray (places, 3)
-        The shares of ``moment`` and ``twist`` that act on nodes themselves.
-    following : ndarray (n, axes)
-        Forces that turn with a rotation, on the pairs of :attr:`Followers`.
-    tangential : ndarray (elements, points, axes)
-        Distributed force times weight times length that turns with the section.
+    couple : ndarray (places, 3)
+        The share of ``moment`` that acts on nodes themselves.
     pull : ndarray (elements, points, axes)
         Minus the internal force at the integration points that the loads along the member cause.
     spread : ndarray (elements, points, axes)
@@ -61,158 +57,72 @@ class Loading:
     turn : ndarray (rotations, 3)
         Prescribed rotation vectors of held rotations.
     loads : tuple of ndarray (n, loads)
-        What grows with the load factor in each group of connections.
+        What grows with the load factor in each group of connections, moments and what follows among them.
+    kinds : tuple of Term
+        Of these groups.
     """
 
     force: Array
     own: Array
     moment: Array
-    twist: Array
     jump: Array
     couple: Array
-    couple_twist: Array
-    following: Array
-    tangential: Array
     pull: Array
     spread: Array
     shift: Array
     turn: Array
     loads: tuple[Array, ...]
+    kinds: tuple[Term, ...]
 
     def scaled(self, factor: float) -> Loading:
         """All loads and motions times a factor."""
         parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS)}
-        return Loading(**parts, loads=tuple(factor * load for load in self.loads))
+        return replace(self, **parts, loads=tuple(factor * load for load in self.loads))
 
     def unloaded(self) -> Loading:
         """The motions alone; the driven joints among them."""
         zero: dict[str, Any] = {name: np.zeros_like(getattr(self, name)) for name in LOADS}
-        loads = tuple(load if load.shape[1] == 1 else np.zeros_like(load) for load in self.loads)
+        loads = tuple(
+            load if kind.is_driven else np.zeros_like(load) for kind, load in zip(self.kinds, self.loads, strict=True)
+        )
         return replace(self, **zero, loads=loads)
 
     def plus(self, other: Loading) -> Loading:
         """The sum of two loadings."""
         parts = {name: getattr(self, name) + getattr(other, name) for name in (*LOADS, *MOTIONS)}
-        return Loading(**parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
+        return replace(self, **parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
+
+    def of(self, chosen: Callable[[Term], bool]) -> float:
+        """Largest load of the groups whose kind is chosen."""
+        pairs = zip(self.kinds, self.loads, strict=True)
+        return max((float(np.abs(load).max(initial=0.0)) for kind, load in pairs if chosen(kind)), default=0.0)
 
     @property
     def nodal(self) -> bool:
-        """Whether it is forces and moments on places, and displacements of them, only."""
-        loaded = any(load.any() for load in self.loads)
-        return not (self.follows or self.pull.any() or loaded)
+        """Whether it is displacements of places, forces on them and terms that are loads, only."""
+        return not (self.pull.any() or self.of(lambda kind: not kind.is_load))
 
     @property
     def driven(self) -> float:
         """Largest angle or travel of a driven joint."""
-        return max((float(np.abs(load).max()) for load in self.loads if load.shape[1] == 1), default=0.0)
+        return self.of(lambda kind: kind.is_driven)
 
     @property
     def follows(self) -> bool:
         """Whether forces or moments turn with what they act on."""
-        return bool(self.following.any() or self.tangential.any() or self.twist.any())
+        return bool(self.of(lambda kind: kind.follows))
 
 
 LOADS = (
     "force",
     "own",
     "moment",
-    "twist",
     "jump",
     "couple",
-    "couple_twist",
-    "following",
-    "tangential",
     "pull",
     "spread",
 )
 MOTIONS = ("shift", "turn")
-
-
-@dataclass(frozen=True)
-class Followers:
-    """Where forces that turn with a rotation act.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the loads.
-    turns, places : ndarray (n,)
-        Numbers of the rotation that each turns with and of the place it acts on.
-    elements : ndarray
-        Elements along which distributed ones act; each is a segment.
-    """
-
-    names: tuple[str, ...]
-    turns: Index
-    places: Index
-    elements: Index
-
-
-def find_followers(scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations) -> Followers:
-    """The followers of a scene.
-
-    Raises
-    ------
-    SceneError
-        Nothing turns with the node that a load shall follow.
-    """
-    names, turns, places, along = [], [], [], []
-    for name, load in scene.loads.items():
-        if not load.follows:
-            continue
-        if load.type == "distributed":
-            along += [part.elements.start for part in segments.parts if part.member == load.member]
-            continue
-        names.append(name)
-        if load.node is not None:
-            turns.append(turning(rotations, name, load.node))
-            places.append(segments.place(load.node))
-            continue
-        member = str(load.member)
-        cut = int(np.argmin(np.abs(mesh.cuts[member] - (load.at or 0.0))))
-        parts = [part for part in segments.parts if part.member == member]
-        chain = rotations.chain(slice(parts[0].elements.start, parts[-1].elements.stop))
-        turns.append(int(chain[cut * element.order]))
-        start = next((part.start for part in parts if part.elements.start == parts[0].elements.start + cut), None)
-        places.append(segments.place(parts[-1].end if start is None else start))
-    index = [np.array(part, dtype=np.intp) for part in (turns, places, sorted(set(along)))]
-    return Followers(tuple(names), *index)
-
-
-def turning(rotations: Rotations, name: str, node: str) -> int:
-    """Rotation of a node that a load acts on.
-
-    Raises
-    ------
-    SceneError
-        There is none.
-    """
-    number = rotations.node_turn[node]
-    if number is None:
-        raise SceneError(f"nothing turns with node {node!r}, so no moment or follower can act on it", ("loads", name))
-    return number
-
-
-def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array, Array]:
-    """Pull (elements, points, axes) and forces on places (places, axes) of forces along the elements.
-
-    The pull at a point is minus the load beyond it up to the end of its segment; within an element "beyond" is
-    the transpose of the matrix that integrates the turned tangents, so that the discrete potential has exactly
-    this gradient.
-    """
-    on_element = forces.sum(axis=1)
-    pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
-    on_places = np.zeros((len(segments.places), element.axes))
-    alone, starts = segments.single
-    np.add.at(on_places, starts, on_element[alone])
-    for part in segments.longer:
-        here = part.elements
-        if not forces[here].any():
-            continue
-        beyond = np.cumsum(on_element[here][::-1], axis=0)[::-1]
-        pull[here] -= (beyond - on_element[here])[:, None, :]
-        on_places[segments.place(part.start)] += beyond[0]
-    return pull, on_places
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +137,6 @@ class _Writer:
     rotations: Rotations
     beams: Beams
     connections: tuple[Group, ...]
-    followers: Followers
 
     def empty(self) -> Loading:
         """No load and no motion."""
@@ -237,17 +146,14 @@ class _Writer:
             force=np.zeros((places, self.element.axes)),
             own=np.zeros((places, self.element.axes)),
             moment=np.zeros((turns, 3)),
-            twist=np.zeros((turns, 3)),
             jump=np.zeros((len(self.beams.weight), 3)),
             couple=np.zeros((places, 3)),
-            couple_twist=np.zeros((places, 3)),
-            following=np.zeros((len(self.followers.names), self.element.axes)),
-            tangential=np.zeros(along),
             pull=np.zeros(along),
             spread=np.zeros(along),
             shift=np.zeros(places * self.element.axes),
             turn=np.zeros((turns, 3)),
             loads=tuple(np.zeros((len(group.names), group.kind.sizes[4])) for group in self.connections),
+            kinds=tuple(group.kind for group in self.connections),
         )
 
     def elements_of(self, member: str) -> slice:
@@ -259,9 +165,11 @@ class _Writer:
         cuts = self.mesh.cuts[member]
         return np.asarray(cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.points)
 
-    def cut(self, load: Load) -> int:
-        """Number of the cut of the member at which a load acts."""
-        return int(np.argmin(np.abs(self.mesh.cuts[str(load.member)] - (load.at or 0.0))))
+    def terms(self, name: str, chosen: Callable[[Term], bool]) -> Iterator[tuple[int, int, Term]]:
+        """Group, number in it, and kind of the terms of a name whose kind is chosen."""
+        for i, group in enumerate(self.connections):
+            if chosen(group.kind) and name in group.names:
+                yield i, group.names.index(name), group.kind
 
     def vector(self, vector: Any) -> Array:
         return np.asarray(vector, dtype=float)[: self.element.axes]
@@ -282,8 +190,8 @@ class _Writer:
         if load.type == "moment":
             self._add_moment(group, name, load)
         elif load.follows and load.type == "force":
-            number = self.followers.names.index(name)
-            group.following[number] += self.vector(load.vector) / self.scales.force
+            ((i, number, _),) = self.terms(f"loads.{name}", lambda kind: kind.is_load)
+            group.loads[i][number] += self.vector(load.vector) / self.scales.force
         elif load.node is not None:
             self.push(group, self.segments.place(load.node), self.vector(load.vector))
         elif self.scene.members[str(load.member)].type == "small":
@@ -305,23 +213,22 @@ class _Writer:
 
     def _add_moment(self, group: Loading, name: str, load: Load) -> None:
         value = np.asarray(load.vector) / self.scales.moment
-        # In the plane a moment that follows is one that does not.
-        follows = load.frame == "follower" and self.element.space
+        ((i, number, kind),) = self.terms(f"loads.{name}", lambda kind: kind.is_load)
+        turn = self.connections[i].turns[number, -1]
+        group.loads[i][number] += value[3 - kind.sizes[4] :]
+        if kind.follows:
+            return
+        group.moment[turn] += value
+        inner = None if load.node is not None else inner_cut(self.mesh, self.beams.first, load)
         if load.node is not None:
-            number = turning(self.rotations, name, load.node)
-            (group.couple_twist if follows else group.couple)[self.segments.place(load.node)] += value
-        else:
-            chain = self.rotations.chain(self.elements_of(str(load.member)))
-            cut = self.cut(load)
-            number = int(chain[cut * self.element.order])
-            if 0 < cut < len(self.mesh.cuts[str(load.member)]) - 1:
-                group.jump[self.beams.first[str(load.member)] + cut] += value
-        (group.twist if follows else group.moment)[number] += value
+            group.couple[self.segments.place(load.node)] += value
+        elif inner is not None:
+            group.jump[inner] += value
 
     def _add_point_force(self, group: Loading, load: Load) -> None:
         member = str(load.member)
         value = self.vector(load.vector) / self.scales.force
-        cut = self.beams.first[member] + self.cut(load)
+        cut = self.beams.first[member] + cut_of(self.mesh, load)
         for place, part in self.segments_of(member):
             if part.start <= cut < part.stop:
                 group.pull[part.start : cut] -= value
@@ -366,7 +273,10 @@ class _Writer:
         part, forces = self.elements_of(member), np.zeros_like(group.spread)
         forces[part] = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
         if follows:
-            group.tangential[part] += forces[part]
+            for i, turned in enumerate(self.connections):
+                if isinstance(turned.kind, FollowingSpread):
+                    elements = followed_elements(self.scene, self.segments)
+                    group.loads[i][:] += forces[elements].reshape(len(elements), -1)
             return
         pull, on_places = carried(forces, self.segments, self.element)
         group.spread[part] += forces[part]
@@ -388,8 +298,8 @@ class _Writer:
 
     def _add_lever(self, group: Loading, member: str, lever: Lever, vector: Array) -> None:
         """A profile times a vector: force, first moment and consistent forces as the body's kernel takes them."""
-        i = next(i for i, g in enumerate(self.connections) if isinstance(g.kind, Body) and member in g.names)
-        kind, axes = self.connections[i].kind, self.element.axes
+        ((i, number, kind),) = self.terms(member, lambda kind: isinstance(kind, Body))
+        axes = self.element.axes
         assert isinstance(kind, Body)
         value = vector[:axes] / self.scales.force
         chosen = freedoms(kind.nodes, kind.space)
@@ -398,7 +308,7 @@ class _Writer:
         first = np.outer(value, lever.first[:axes] / self.scales.length)
         tensor = np.einsum("a,bj->abj", value, ends)
         parts = [lever.total * value, first.T.ravel(), tensor.transpose(2, 1, 0).ravel()]
-        group.loads[i][self.connections[i].names.index(member)] += np.concatenate(parts)
+        group.loads[i][number] += np.concatenate(parts)
 
     # -- motions --------------------------------------------------------------------------------
 
@@ -417,15 +327,13 @@ class _Writer:
 
     def _add_drive(self, group: Loading, name: str, motion: Motion) -> None:
         """Angle or travel of a driven joint."""
-        for load, connections in zip(group.loads, self.connections, strict=True):
-            if name not in connections.names:
-                continue
-            number = connections.names.index(name)
-            if isinstance(connections.kind, DrivenTurn):
-                load[number] += motion.rotation
-            elif isinstance(connections.kind, DrivenSlide):
+        for i, number, kind in self.terms(name, lambda kind: kind.is_driven):
+            if isinstance(kind, DrivenTurn):
+                group.loads[i][number] += motion.rotation
+            else:
                 along = np.asarray(self.scene.nodes[motion.node].direction, dtype=float)
-                load[number] += np.dot(motion.displacement or (), along / np.linalg.norm(along)) / self.scales.length
+                travel = np.dot(motion.displacement or (), along / np.linalg.norm(along))
+                group.loads[i][number] += travel / self.scales.length
 
     def _rotation_vector(self, motion: Motion) -> Array:
         if isinstance(motion.rotation, tuple):
@@ -444,7 +352,6 @@ def unit_loadings(
     rotations: Rotations,
     beams: Beams,
     connections: tuple[Group, ...],
-    followers: Followers,
 ) -> dict[str | None, Loading]:
     """Loadings of factor 1, by the history that multiplies them; None is the load factor itself.
 
@@ -453,7 +360,7 @@ def unit_loadings(
     SceneError
         A moment on a node that nothing turns with.
     """
-    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams, connections, followers)
+    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams, connections)
     groups: dict[str | None, Loading] = {None: writer.empty()}
     for name, load in scene.loads.items():
         writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)

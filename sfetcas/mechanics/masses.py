@@ -22,8 +22,9 @@ from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
-from .joints import Connection, LineSpring, Spring, TurnSpring
+from .joints import LineSpring, Spring, TurnSpring
 from .observed import Axes, Gap, SpringAngle, Strains, Travel
+from .terms import Term
 
 __all__ = ["Masses", "Observables", "masses_of"]
 
@@ -34,7 +35,7 @@ class Observables:
 
     Attributes
     ----------
-    kind : Connection
+    kind : Term
         Its rows are the quantities.
     turns, places : ndarray (n, rotations | places)
     data : ndarray (n, data)
@@ -48,7 +49,7 @@ class Observables:
         that share a rotation have balances of their own.
     """
 
-    kind: Connection
+    kind: Term
     turns: Index
     places: Index
     data: Array
@@ -292,7 +293,7 @@ class _Weigher:
             chosen = np.flatnonzero(damping)
             if not len(chosen):
                 continue
-            observed: Connection = Travel(self.space)
+            observed: Term = Travel(self.space)
             data, unit, spring = group.data[:, :axes], units[1], None
             if isinstance(kind, TurnSpring):
                 observed, data, unit, spring = SpringAngle(self.space, kind), group.data, units[0], number

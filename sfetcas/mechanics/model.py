@@ -20,15 +20,17 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from .beams import Beams, Scales, beams_of, scales_of
-from .connections import Group, connect
+from .connections import connect
 from .elements import Element, element_by_name
-from .loading import Followers, Loading, find_followers, unit_loadings
+from .load_terms import load_groups
+from .loading import Loading, unit_loadings
 from .mesh import Mesh
 from .positions import Positions, entries, place_nodes
 from .pressure import is_pressure
 from .rotations import Rotations, Turn, number_rotations
 from .segments import Segments, cut_members
 from .spinning import Spinning, with_spinning
+from .terms import Group
 from .winding import Winding, winding_of
 
 __all__ = ["Block", "Model", "assemble"]
@@ -60,9 +62,7 @@ class Model:
     positions : Positions
         Displacements of nodes, closing equations.
     connections : tuple of Group
-        Joints, springs and small members.
-    followers : Followers
-        Where forces act that turn with what they act on.
+        Joints, springs, small members, and loads that are terms.
     groups : mapping
         Loadings of factor 1, by history.
     spinning : Spinning or None
@@ -79,7 +79,6 @@ class Model:
     rotations: Rotations
     positions: Positions
     connections: tuple[Group, ...]
-    followers: Followers
     groups: Mapping[str | None, Loading]
     spinning: Spinning | None = None
 
@@ -104,9 +103,18 @@ class Model:
         return self.scene.dimension_reason
 
     @functools.cached_property
+    def terms(self) -> tuple[Group, ...]:
+        """All terms of the Lagrangian by their kinds: the elements, then the connections."""
+        n, beams = len(self.rotations.turns), self.beams
+        data = np.hstack([beams.stiffness.reshape(n, -1), beams.tangent.reshape(n, -1)])
+        nothing, unnamed = np.zeros((n, 0), np.intp), ("",) * n
+        elements = Group(self.element, self.rotations.turns, nothing, data, (), unnamed, unnamed)
+        return (elements, *self.connections)
+
+    @functools.cached_property
     def winding(self) -> Winding:
         """The angles that count turns in space."""
-        return winding_of(self.connections, self.rotations, self.space)
+        return winding_of(self.terms, self.space)
 
     @functools.cached_property
     def row_names(self) -> tuple[str, ...]:
@@ -127,9 +135,14 @@ class Model:
     @functools.cached_property
     def has_potential(self) -> bool:
         """Whether all loads have a potential: none follows, and in space no moment turns what is free to turn."""
-        free = self.rotations.kind == Turn.FREE
-        turning = self.space and any(group.moment[free].any() for group in self.groups.values())
-        return not turning and not any(group.follows for group in self.groups.values())
+        return not any(self._works(group, i) for i, group in enumerate(self.connections))
+
+    def _works(self, group: Group, number: int) -> bool:
+        """Whether a group of connections has loads without potential; a moment on what is held does no work."""
+        if group.kind.has_potential:
+            return False
+        held = (self.rotations.kind[group.turns] == Turn.HELD).all(axis=1) & (group.places.shape[1] == 0)
+        return any(loading.loads[number][~held].any() for loading in self.groups.values())
 
     @functools.cached_property
     def conservative(self) -> bool:
@@ -211,7 +224,7 @@ class Model:
         motions = {name: self.scene.motions[name]}
         scene = self.scene.model_copy(update={"motions": motions, "loads": {}, "gravity": None})
         parts = self.mesh, self.element, self.scales, self.segments, self.rotations, self.beams
-        return unit_loadings(scene, *parts, self.connections, self.followers)[motions[name].history]
+        return unit_loadings(scene, *parts, self.connections)[motions[name].history]
 
     def held(self, loading: Loading) -> Array:
         """Rotations with the held ones at their prescribed values and all others at rest, (rotations, comps)."""
@@ -267,7 +280,7 @@ def assemble(
             assembly = "closing" if closing <= nodal else "nodal"
         positions = both[assembly]
     connections = connect(scene, mesh, segments, rotations, element, scales)
-    followers = find_followers(scene, mesh, element, segments, rotations)
+    connections += load_groups(scene, mesh, element, segments, rotations, beams.tangent)
     model = Model(
         scene=scene,
         mesh=mesh,
@@ -279,8 +292,7 @@ def assemble(
         rotations=rotations,
         positions=positions,
         connections=connections,
-        followers=followers,
-        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections, followers),
+        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections),
     )
     return model if scene.rotating is None else with_spinning(model)
 

@@ -9,7 +9,7 @@ axes ``d_i = R(q) b_i``: with the moments of inertia ``j_i`` about them
 
 so that every mass is constant and rotations are mere coordinates, with or without inertia of their own.
 
-A quantity is a :class:`~sfetcas.mechanics.joints.Connection` whose rows need not vanish: the same derivatives serve.
+A quantity is a :class:`~sfetcas.mechanics.terms.Term` whose rows need not vanish: the same derivatives serve.
 
 Source: Betsch and Steinmann 2001 (directors have a constant mass); the use for beams without inertia is ours.
 """
@@ -21,14 +21,15 @@ from typing import final
 
 import casadi as ca
 
-from .joints import Connection, Side, Turning
+from .joints import Turning
+from .terms import Side, Term
 
 __all__ = ["Axes", "Gap", "SpringAngle", "Strains", "Travel"]
 
 
 @final
 @dataclass(frozen=True)
-class Axes(Connection):
+class Axes(Term):
     """Three directions (in the plane one) that turn with a rotation; data: the directions, undeformed."""
 
     @property
@@ -46,7 +47,7 @@ class Axes(Connection):
 
 @final
 @dataclass(frozen=True)
-class Strains(Connection):
+class Strains(Term):
     """Twist and bending times the length at the nodes of an element, about the axes of the sections.
 
     Kelvin-Voigt damping acts on their rates.  Data: derivatives of the interpolation by xi; in space the axes b1, b2,
@@ -82,7 +83,7 @@ class Strains(Connection):
 
 @final
 @dataclass(frozen=True)
-class SpringAngle(Connection):
+class SpringAngle(Term):
     """The angle of a rotational spring; data: as of the spring.
 
     Attributes
@@ -106,7 +107,7 @@ class SpringAngle(Connection):
 
 @final
 @dataclass(frozen=True)
-class Gap(Connection):
+class Gap(Term):
     """The distance of two places; data: their distance (vector) in the undeformed scene."""
 
     @property
@@ -121,7 +122,7 @@ class Gap(Connection):
 
 @final
 @dataclass(frozen=True)
-class Travel(Connection):
+class Travel(Term):
     """What one place moves against another along a direction fixed in space; data: the direction."""
 
     @property

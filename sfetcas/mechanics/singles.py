@@ -11,8 +11,6 @@ from typing import TypeVar
 import casadi as ca
 
 from ..mathematics.quaternion import product, turned
-from .elements import Element
-from .joints import Connection, name_of
 
 __all__ = [
     "arms_product",
@@ -20,9 +18,6 @@ __all__ = [
     "exponential",
     "moved_rotation",
     "rotation_between",
-    "rows_of",
-    "spread_change",
-    "turned_change",
     "turned_vector",
     "weighted_product",
 ]
@@ -44,31 +39,6 @@ def turned_vector(space: bool) -> ca.Function:
         c, s = ca.cos(q), ca.sin(q)
         now = ca.vertcat(c * t[0] - s * t[1], s * t[0] + c * t[1])
     return ca.Function(f"turned_{tag(space)}", [q, t], [now])
-
-
-@functools.cache
-def turned_change(space: bool) -> ca.Function:
-    """(f) -> minus the derivative of a vector that turns, by its rotation."""
-    f = ca.SX.sym("f", 3 if space else 2)
-    return ca.Function(f"change_{tag(space)}", [f], [ca.densify(ca.skew(f) if space else ca.vertcat(f[1], -f[0]))])
-
-
-@functools.cache
-def spread_change(element: Element) -> ca.Function:
-    """(forces, tangents) -> what turning distributed followers adds, on the first place and on the nodes."""
-    n, axes, turns = element.order + 1, element.axes, element.turns
-    f, t = ca.SX.sym("f", axes, n), ca.SX.sym("t", axes, n)
-    whole = ca.SX(axes + turns * n, turns * n)
-    for i in range(n):
-        change = turned_change(element.space)(f[:, i])
-        columns = slice(turns * i, turns * (i + 1))
-        whole[:axes, columns] = change
-        for j in range(n):
-            arm = t[:, j] / element.weights[j]
-            crossed = ca.skew(arm) if element.space else ca.horzcat(-arm[1], arm[0])
-            rows = slice(axes + turns * j, axes + turns * (j + 1))
-            whole[rows, columns] = element.to_points[i, j] * ca.mtimes(crossed, change)
-    return ca.Function(f"spread_change_{tag(element.space)}_{n}", [f, t], [ca.densify(whole)])
 
 
 @functools.cache
@@ -126,17 +96,6 @@ def counted_angle() -> ca.Function:
     raw, period = share * ca.atan2(sine, cosine), 2.0 * ca.pi * share
     angle = raw + period * ca.floor((near - raw) / period + 0.5)
     return ca.Function("counted_angle", [a, b, axis, across, crossed, near], [angle])
-
-
-@functools.cache
-def rows_of(kind: Connection) -> ca.Function:
-    """(q, u, data, load) -> the rows of a kind."""
-    turns, places, _, data, loads = kind.sizes
-    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
-    given, load = ca.SX.sym("data", data), ca.SX.sym("load", loads)
-    sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
-    rows = ca.densify(ca.vertcat(*kind.residual(*sides, given, load)))
-    return ca.Function(f"values_{name_of(kind)}", [q, u, given, load], [rows])
 
 
 @functools.cache

@@ -12,20 +12,20 @@ grow with the load factor.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array, Index
 from .body_points import BodyPoints
-from .connections import Group
-from .joints import Connection, Side
-from .loading import Loading, carried
+from .load_terms import carried
+from .loading import Loading
 from .masses import Masses, Observables, masses_of
 from .observed import Axes
+from .terms import Group, Side, Term
 
-__all__ = ["SPUN", "Spinning", "SpunInner", "SpunPair", "SpunVectors", "vectors_of", "with_spinning"]
+__all__ = ["Spinning", "SpunInner", "SpunPair", "SpunVectors", "vectors_of", "with_spinning"]
 
 
 def _matrix(load: ca.SX, axes: int) -> ca.SX:
@@ -35,8 +35,10 @@ def _matrix(load: ca.SX, axes: int) -> ca.SX:
 
 @final
 @dataclass(frozen=True)
-class SpunPair(Connection):
+class SpunPair(Term):
     """A mass between two places, or at one that is named twice; data: both at rest, mass; load: P."""
+
+    is_load: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -52,7 +54,7 @@ class SpunPair(Connection):
 
 @final
 @dataclass(frozen=True)
-class SpunInner(Connection):
+class SpunInner(Term):
     """Inner nodes of an element, which hang on its start; data: of each node its place at rest, mass and arms, then
     the tangents of all nodes; load: P.
 
@@ -61,6 +63,8 @@ class SpunInner(Connection):
     nodes : int
         Nodes of the element.
     """
+
+    is_load: ClassVar[bool] = True
 
     nodes: int
 
@@ -88,19 +92,21 @@ class SpunInner(Connection):
 
 @final
 @dataclass(frozen=True)
-class SpunVectors(Connection):
+class SpunVectors(Term):
     """Vectors that are the first rows of a quantity; data: those of the quantity, of each vector what is to be added
     and its mass; load: P.
 
     Attributes
     ----------
-    kind : Connection
+    kind : Term
         The quantity.
     vectors : int
         How many of its rows, by the axes, are vectors.
     """
 
-    kind: Connection
+    is_load: ClassVar[bool] = True
+
+    kind: Term
     vectors: int
 
     @property
@@ -119,10 +125,6 @@ class SpunVectors(Connection):
             r = own[:axes] + rows[k * axes : (k + 1) * axes]
             total -= 0.5 * own[axes] * ca.dot(r, ca.mtimes(p, r))
         return total
-
-
-SPUN = (SpunPair, SpunInner, SpunVectors)
-"""Kinds whose forces are loads, not those of joints or springs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +175,11 @@ def with_spinning(model: Any) -> Any:
     rest = _at_rest(model)
     groups = tuple(_groups(model, masses, *rest))
     nothing = tuple(np.zeros((len(group.names), axes**2)) for group in groups)
-    loadings = {name: replace(load, loads=(*load.loads, *nothing)) for name, load in model.groups.items()}
+    kinds = tuple(group.kind for group in groups)
+    loadings = {
+        name: replace(load, loads=(*load.loads, *nothing), kinds=(*load.kinds, *kinds))
+        for name, load in model.groups.items()
+    }
     empty = loadings[None].scaled(0.0)
     before = len(model.connections)
     here = tuple(np.tile(matrix.ravel(), (len(group.names), 1)) for group in groups)
@@ -200,7 +206,7 @@ def _at_rest(model: Any) -> tuple[Array, Array]:
     return rest / model.scales.length, inner / model.scales.length
 
 
-def _group(kind: Connection, turns: Index, places: Index, data: Array, what: str) -> Group:
+def _group(kind: Term, turns: Index, places: Index, data: Array, what: str) -> Group:
     names = tuple(f"turning axes on {what} {i + 1}" for i in range(len(data)))
     return Group(kind, turns, places, data, (), names, ("",) * len(data))
 

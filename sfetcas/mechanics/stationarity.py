@@ -10,14 +10,15 @@ import functools
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
-from ..mathematics.constants import sparse, times
+from ..mathematics.arrays import Index
+from ..mathematics.constants import picked, sparse, times
 from ..mathematics.linear import pattern
-from .entries import Entries
 from .expressions import Expressions, Given
-from .joints import by_turning, forces_by_turning
+from .load_terms import FollowingSpread, elements_of
+from .tables import Places
+from .terms import by_turning, forces_by_turning
 
-__all__ = ["Forces", "Stationarity", "StationarityPlaces", "summed"]
+__all__ = ["Forces", "Stationarity", "summed"]
 
 
 class Forces:
@@ -25,42 +26,6 @@ class Forces:
 
     def __init__(self, on_places: ca.MX | float = 0.0, pull: ca.MX | float = 0.0) -> None:
         self.on_places, self.pull = on_places, pull
-
-
-class StationarityPlaces:
-    """Where the entries of :class:`Stationarity` go, in the order in which it gives them."""
-
-    def __init__(self, expressions: Expressions) -> None:
-        self._expressions = expressions
-        self.static = Entries(expressions.unknown, expressions.weight)
-        static, cells = self.static, expressions.cells
-        static.add(cells[:, None, :], cells[:, :, None])
-        static.add(expressions.closed.row, expressions.closed.cell)
-        static.add(expressions.closed.cell, expressions.closed.row)
-        links = zip(expressions.model.connections, expressions.linked, expressions.link_rows, strict=True)
-        for group, sides, labels in links:
-            static.add(sides[:, None, :], sides[:, :, None])
-            if group.rows:
-                static.add(labels[:, None, :], sides[:, :, None])
-                static.add(sides[:, :, None], labels[:, None, :])
-        for rows, columns in expressions.follower_cells():
-            static.add(rows, columns)
-
-    @functools.cached_property
-    def tied(self) -> tuple[Index, Index, Array, Index]:
-        """Row, column, weight and number of the entries, with those of the ties between displacements and closings.
-
-        These are one number, 1, after all others.
-        """
-        equations, w = self._expressions.equations, self._expressions.model.positions.W
-        row, column, value, entry = self.static.places
-        r, c = equations.unknowns + w.row, equations.turning_unknowns + w.column
-        return (
-            np.concatenate([row, r, c]),
-            np.concatenate([column, c, r]),
-            np.concatenate([value, np.tile(w.value, 2)]),
-            np.concatenate([entry, np.full(2 * len(w.value), self.static.count)]),
-        )
 
 
 class Stationarity:
@@ -75,15 +40,13 @@ class Stationarity:
     ----------
     residual : MX (unknowns + rows,)
     entries : list of MX
-        As :class:`StationarityPlaces` has them, without the last 1.
-    moments : MX (turns * nodes of elements,)
-        Moments on the nodes of elements.
+        In the order of :attr:`~sfetcas.mechanics.tables.Tables.static`.
     shares : list of (Index, MX)
-        Full coordinates of the sides of connections, and what these do to them.
-    on_places, couples : MX
-        Forces on places, as a residual, and moments on rotations, as loads; what follows is as it is there.
+        Of each group of terms the full coordinates of its sides, and what it takes from them.
+    on_places : MX
+        Dead forces on places, as a residual.
     spin : MX (axes, turns * nodes of elements)
-        Derivatives of the reaches of elements by rotations of their nodes.
+        Derivatives of the chords of elements by rotations of their nodes.
     """
 
     def __init__(
@@ -92,72 +55,70 @@ class Stationarity:
         q: ca.MX,
         y: ca.MX,
         lam: ca.MX,
-        places: ca.MX,
         given: Given,
         near: ca.MX,
         forces: Forces | None = None,
         *,
         entries: bool = True,
     ) -> None:
-        forces = forces or Forces()
-        self._expressions, self._with_entries = expressions, entries
-        model = expressions.model
-        closings = len(model.positions.rows)
+        forces, self._expressions = forces or Forces(), expressions
+        model, tables = expressions.model, expressions.tables
+        self._lam, self._given, self._further = lam[: len(model.positions.rows), :], given, forces
+        places, self._closed = expressions.kept_places(y, given), expressions.open_gaps(y, given)
         self.shares: list[tuple[Index, ca.MX]] = []
         self.entries: list[ca.MX] = []
-        on_places = forces.on_places - given.force
-        gaps = expressions.open_gaps(y, given)
-        turning = -given.moment
-        self.spin, self.moments = ca.MX(expressions.axes, 0), ca.MX(0, 1)
-        if expressions.elements:
-            pull = given.pull + times(expressions.closing.T, lam[:closings, :]) + forces.pull
-            self.pull = pull + expressions.carried(q, given)
-            self._bent(q, given)
-            gaps += times(expressions.closing, ca.vec(expressions.tangents(q, given)) - ca.vec(given.tangent))
-            turning += times(expressions.onto_rotations, self.moments)
-        rows = [gaps]
-        first = closings
-        for number, (group, sides) in enumerate(zip(model.connections, expressions.linked, strict=True)):
-            n, count = len(group.data), group.kind.sizes[2]
-            own = ca.reshape(lam[first : first + n * count], count, n)
-            data = *expressions.sides(group, q, places), expressions.data(number, given, near)
-            function = by_turning(group.kind) if entries else forces_by_turning(group.kind)
-            found = expressions.many(function, n)(*data, expressions.link_load(number, given), own)
-            forced, acting, *stiff = found[2:] if entries else found
-            self.shares.append((sides, acting))
-            self.entries += [ca.vec(one) for one in stiff[:1]]
-            if count:
-                rows.append(ca.vec(forced))
-                self.entries += [ca.vec(one) for one in stiff[1:] * 2]
-            first += n * count
-        pushed, turned_by, followed = expressions.followed(q, given)
-        self.entries += followed
-        self.turning, self.on_places = turning + turned_by, on_places + pushed
-        self.couples = given.moment - turned_by
-        self._lam, self._rows = lam[:closings, :], rows
+        self.on_places, self._rows = forces.on_places - given.force, []
+        self.spin = ca.MX(expressions.axes, 0)
+        for number, group in enumerate(model.terms):
+            arguments = [*expressions.arguments(number, q, places, given, near), expressions.multipliers(number, lam)]
+            if number == 0:
+                arguments[3] += ca.reshape(ca.MX(forces.pull) + ca.MX.zeros(given.pull.shape), *arguments[3].shape)
+            n, function = len(group.data), by_turning(group.kind) if entries else forces_by_turning(group.kind)
+            if not n:
+                self.shares.append((tables.sides[number], ca.MX(tables.sides[number].shape[1], 0)))
+                continue
+            found = expressions.many(function, n)(*arguments)
+            gaps, acting, *stiff = found[2:] if entries else found
+            self.shares.append((tables.sides[number], acting))
+            if number == 0:
+                self._closed += times(expressions.closing, ca.vec(gaps))
+            elif group.rows:
+                self._rows.append(ca.vec(gaps))
+            if not entries:
+                continue
+            self.entries.append(ca.vec(stiff[0]))
+            if number == 0:
+                self.spin, closed = stiff[1], tables.closed
+                spins = picked(ca.vec(self.spin), closed.entry) * ca.DM(closed.value)
+                self.entries += [spins, spins]
+            elif group.rows:
+                self.entries += [ca.vec(stiff[1])] * 2
 
-    def _bent(self, q: ca.MX, given: Given) -> None:
-        """Moments of the elements, and their entries."""
+    @property
+    def pull(self) -> ca.MX:
+        """Minus the internal force at the points of elements, (axes, points of all)."""
         expressions = self._expressions
-        model = expressions.model
-        arguments = (
-            q[:, model.rotations.turns.ravel().tolist()],
-            given.stiffness,
-            given.tangent,
-            ca.reshape(self.pull, expressions.axes, expressions.elements * expressions.points),
-        )
-        if not self._with_entries:
-            self.moments = ca.vec(expressions.many(model.element.moments, expressions.elements)(*arguments))
-            return
-        found = expressions.many(model.element.turning, expressions.elements)(*arguments)
-        self.moments, self.spin = ca.vec(found[2]), found[5]
-        closed = ca.vec(self.spin)[expressions.closed.entry.tolist()] * ca.DM(expressions.closed.value)
-        self.entries += [ca.vec(found[3]), closed, closed]
+        own = ca.reshape(self._given.pull + self._further.pull, expressions.axes, -1)
+        constant = expressions.multipliers(0, self._lam)
+        each = np.repeat(np.arange(expressions.elements), expressions.points)
+        return own + constant[:, each.tolist()]
+
+    def moments(self, nodes: Index) -> ca.MX:
+        """Moments (turns, n) of elements on some of their nodes, what follows along them among these."""
+        expressions = self._expressions
+        own = ca.vec(self.shares[0][1])
+        for group, (_, values) in zip(expressions.model.terms, self.shares, strict=True):
+            if isinstance(group.kind, FollowingSpread):
+                width = self.shares[0][0].shape[1]
+                cells = (elements_of(group)[:, None] * width + np.arange(width)).ravel()
+                onto = sparse(cells, np.arange(len(cells)), np.ones(len(cells)), (own.shape[0], len(cells)))
+                own += times(onto, ca.vec(values[:width, :]))
+        return ca.reshape(own, expressions.turns, -1)[:, nodes.tolist()]
 
     def gathered(self, more: list[tuple[Index, ca.MX]]) -> ca.MX:
         """The residual with further shares on sides."""
-        shares = [*self.shares, *more]
-        return self._expressions.gathered(self.turning, self.on_places, shares, self._lam, self._rows)
+        rows = [self._closed, *self._rows]
+        return self._expressions.gathered([*self.shares, *more], self.on_places, self._lam, rows)
 
     @functools.cached_property
     def residual(self) -> ca.MX:
@@ -165,7 +126,7 @@ class Stationarity:
         return self.gathered([])
 
 
-def summed(total: int, places: tuple[Index, Index, Array, Index], entries: ca.MX) -> ca.MX:
+def summed(total: int, places: Places, entries: ca.MX) -> ca.MX:
     """The matrix (total, total) of entries by their rows, columns, weights and numbers."""
     row, column, weight, entry = places
     cells, inverse = np.unique(column * total + row, return_inverse=True)

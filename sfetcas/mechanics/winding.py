@@ -15,10 +15,10 @@ import numpy as np
 
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
-from .connections import GROUND, Group
 from .joints import DrivenTurn, Turning
 from .loading import Loading
-from .rotations import PARALLEL, Rotations, Turn
+from .rotations import PARALLEL, Turn
+from .terms import GROUND, Group
 
 __all__ = ["Winding", "winding_of"]
 
@@ -32,7 +32,7 @@ SWUNG = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Winding:
-    """The angles of a model that count turns: of springs and stops by groups, then of rotations about held axes.
+    """The angles of a model that count turns: of springs and stops, and of what moments about held axes work on.
 
     Attributes
     ----------
@@ -44,9 +44,7 @@ class Winding:
         Direction carried by the second side whose angle about the axis it is, see
         :class:`~sfetcas.mechanics.joints.Turning`; zero for the angle of the rotation itself.
     parts : tuple of slice or None
-        Of each group of connections its angles.
-    about : mapping of int to int
-        The angle of each rotation about a held axis.
+        Of each group of terms its angles.
     driven : tuple of (int, int, int, float)
         Angles that a driven joint prescribes: which, by which group and connection, and the sign.
     names : tuple of str
@@ -57,7 +55,6 @@ class Winding:
     axis: Array
     across: Array
     parts: tuple[slice | None, ...]
-    about: dict[int, int]
     driven: tuple[tuple[int, int, int, float], ...]
     names: tuple[str, ...]
 
@@ -142,37 +139,32 @@ class Winding:
             return None
         found, (sine, cosine, _) = self.angles(q, near), self._parts(q)
         for angle in np.flatnonzero(np.hypot(sine, cosine) < SWUNG).tolist():
-            return f"springs.{self.names[angle]}: its axis has swung half round, where its angle is not defined"
+            return f"{self.names[angle]}: its axis has swung half round, where its angle is not defined"
         for angle, group, number, sign in self.driven:
             wanted = sign * float(loading.loads[group][number, 0])
             if abs(found[angle] - wanted) > SAME:
-                stands = f"springs.{self.names[angle]} stands at {found[angle]:g} rad"
+                stands = f"{self.names[angle]} stands at {found[angle]:g} rad"
                 return f"{stands} where its joint is driven to {wanted:g}"
         return None
 
 
-def winding_of(connections: tuple[Group, ...], rotations: Rotations, space: bool) -> Winding:
+def winding_of(terms: tuple[Group, ...], space: bool) -> Winding:
     """The angles of a model that count turns; none in the plane."""
     sides: list[tuple[int, int]] = []
     axis: list[Array] = []
     across: list[Array] = []
     parts: list[slice | None] = []
     names: list[str] = []
-    for group in connections:
+    for group in terms:
         if not space or not isinstance(group.kind, Turning):
             parts.append(None)
             continue
         parts.append(slice(len(sides), len(sides) + len(group.names)))
-        names += group.names
+        names += group.names if group.kind.is_load else [f"springs.{name}" for name in group.names]
         for pair, data in zip(group.turns.tolist(), group.data, strict=True):
             sides.append((pair[0], pair[1]))
             axis.append(data[:3])
             across.append(data[3:6] if group.kind.crossed else np.zeros(3))
-    held = np.flatnonzero(rotations.kind == Turn.AXIS).tolist() if space else []
-    about = {number: len(sides) + i for i, number in enumerate(held)}
-    sides += [(GROUND, number) for number in held]
-    axis += [rotations.axis[number] for number in held]
-    across += [np.zeros(3) for _ in held]
     pairs = np.array(sides, dtype=np.intp).reshape(-1, 2)
     lines = np.array(axis).reshape(-1, 3)
     return Winding(
@@ -180,9 +172,8 @@ def winding_of(connections: tuple[Group, ...], rotations: Rotations, space: bool
         axis=lines,
         across=np.array(across).reshape(-1, 3),
         parts=tuple(parts),
-        about=about,
-        driven=tuple(_driven(connections, pairs[: len(names)], lines)) if space else (),
-        names=(*names, *(f"rotation {number}" for number in held)),
+        driven=tuple(_driven(terms[1:], pairs, lines)) if space else (),
+        names=tuple(names),
     )
 
 

@@ -6,6 +6,7 @@ points: both as accurate as the positions.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,12 +18,13 @@ from ..errors import SceneError
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.constants import constant, times
-from ..mechanics.connections import GROUND
 from ..mechanics.joints import LineSpring, Spring, TurnSpring, Universal
+from ..mechanics.load_terms import spread_of
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
 from ..mechanics.singles import turned_vector
 from ..mechanics.stationarity import Stationarity
+from ..mechanics.terms import GROUND
 from ..solvers.program import Program
 
 __all__ = ["Result", "Results", "default_motion_results", "default_results"]
@@ -358,8 +360,8 @@ class _Told:
     def _shares(self, *, moments: bool) -> ca.MX:
         """What is not in balance in full coordinates, on what the ground holds; universal supports are ground."""
         expressions, found = self._expressions, self._found
-        total = ca.densify(ca.vertcat(found.turning, found.on_places))
-        for group, (sides, values) in zip(self._model.connections, found.shares, strict=True):
+        total = ca.densify(ca.vertcat(ca.MX(expressions.of_places, 1), found.on_places))
+        for group, (sides, values) in zip(self._model.terms, found.shares, strict=True):
             ground = isinstance(group.kind, Universal) & (group.turns == GROUND).any(axis=1) & moments
             cells = np.where(ground[:, None], -1, sides).ravel()
             used = np.flatnonzero(cells >= 0)
@@ -482,27 +484,22 @@ class _Told:
         found = [one / ca.norm_2(one) for one in found] if model.space else found
         return ca.horzcat(*found).T
 
-    @property
-    def _spread(self) -> ca.MX:
-        """Distributed forces at the points of all elements, what follows as it is there, (axes, points)."""
-        expressions, given = self._expressions, self._program.given
-        spread = ca.reshape(given.spread, expressions.axes, -1)
-        if len(self._model.followers.elements):
-            turns = self._model.rotations.turns.ravel().tolist()
-            function = expressions.many(turned_vector(self._model.space), len(turns))
-            spread += function(self._q[:, turns], ca.reshape(given.tangential, expressions.axes, -1))
-        return spread
+    @functools.cached_property
+    def _spread(self) -> tuple[ca.MX, ca.MX]:
+        """Distributed forces at the points of all elements and the whole pull there, (axes, points)."""
+        spread, pull = spread_of(self._expressions, self._q, self._program.given)
+        return spread, self._found.pull + pull
 
     def _force(self, member: str) -> ca.MX:
         """Internal force at the places, (3, places)."""
         element = self._model.element
         e, _, to_x = self._located(member)
-        pull = ca.reshape(self._found.pull, self._expressions.axes, -1)
+        spread, pull = self._spread
         first = np.zeros(self._expressions.points)
         first[0] = 1.0
         # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
         beyond = element.to_points[:, 0] / element.weights[0]
-        from_spread = self._points(self._spread, member, self._within(member, 1.0 - beyond - to_x))
+        from_spread = self._points(spread, member, self._within(member, 1.0 - beyond - to_x))
         return self._three(from_spread - self._points(pull, member, self._within(member, np.tile(first, (len(e), 1)))))
 
     def _moment(self, member: str) -> ca.MX:
@@ -511,9 +508,8 @@ class _Told:
         e, _, to_x = self._located(member)
         width = expressions.points * expressions.turns
         starts = (model.elements_of(member).start + e) * width
-        moments = ca.reshape(self._found.moments, expressions.turns, -1)
-        own = moments[:, (starts // expressions.turns).tolist()]
-        pull = ca.reshape(self._found.pull, expressions.axes, -1)
+        pull = self._spread[1]
+        own = self._found.moments(starts // expressions.turns)
         if model.space:
             crossed = ca.cross(self._tangents, pull, 1)
         else:
@@ -526,8 +522,8 @@ class _Told:
     def _spring(self, spring: str, key: str) -> ca.MX:
         model, scales = self._model, self._model.scales
         kinds = (TurnSpring, LineSpring, Spring)
-        number = next(i for i, g in enumerate(model.connections) if spring in g.names and isinstance(g.kind, kinds))
-        group = model.connections[number]
+        number = next(i for i, g in enumerate(model.terms) if spring in g.names and isinstance(g.kind, kinds))
+        group = model.terms[number]
         i, axes = group.names.index(spring), self._expressions.axes
         turned, moved = self._expressions.sides(group, self._q, ca.vec(self._places))
         data = self._expressions.data(number, self._program.given, self._near)[:, i]

@@ -215,7 +215,7 @@ class Curve:
 
         turning, nodal = self._steady if self._linear else _kind(rate)
         if turning == 0.0 and nodal:
-            return self.equations.slope(point, rate)
+            return self.equations.slope(state, point, rate)
         if turning == 0.0:
             return np.asarray((residual(self.unit) - point.residual) / self.unit)
         h = min(self.unit, HELD / turning)

@@ -290,7 +290,7 @@ class Globalised:
         if not np.isfinite(given).all() or (start is not None and not np.isfinite(start).all()):
             return Outcome(Code.BAD_ARGUMENT, np.full(program.states, np.nan), np.inf, NOT_DEFINED, 0)
         self._left = rules.iterations
-        self._free = not given[program.slice_of("moment")].any()
+        self._free = not given[program.slice_of_moments].any()
         whole = ca.DM(given)
         found = self._from(program.begin(whole) if start is None else program.hold(start, whole), whole)
         if found.code not in (Code.SOLVED, Code.UNSTABLE) and self._left:

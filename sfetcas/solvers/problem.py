@@ -1,159 +1,36 @@
 """The equilibrium of a model as a nonlinear program that a user can extend.
 
 Unknowns are the components of the quaternions (angles in the plane) of all rotations that are not held, and the
-displacements kept as unknowns; rows are the norms of the quaternions, the closings and the joints.  Each element
-function is derived once for its type, mapped over the elements and scattered by constant matrices, so the
-effort of building does not grow with the number of elements.
+displacements kept as unknowns; rows are the norms of the quaternions, the closings and the joints.  The terms are those
+of Newton's method, differentiated by components: each function once for its kind, mapped over all terms of the kind and
+scattered by constant matrices, so the effort of building does not grow with their number.
 """
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ..mathematics import interpolation, quaternion
-from ..mathematics.arrays import Array
-from ..mathematics.constants import constant, times
-from ..mathematics.kernels import Kernels, chosen
-from ..mathematics.linear import SparseMap
+from ..mathematics.arrays import Array, Index
+from ..mathematics.constants import constant, picked, sparse, times
+from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import NLP
 from ..mathematics.quaternion import product
-from ..mechanics.connections import Group
 from ..mechanics.equations import State
-from ..mechanics.joints import by_components
+from ..mechanics.expressions import Given, SymbolicTerms, data_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
-from .program import Program
+from ..mechanics.tables import Places, Tables
+from ..mechanics.terms import curvatures_of, slopes_of
 
 __all__ = ["EquilibriumProblem"]
 
-
-def _matrix(rows: Array, columns: Array, values: Array, shape: tuple[int, int]) -> ca.DM:
-    """Constant sparse matrix; entries at the same place are added."""
-    rows, columns, values = (np.asarray(a).ravel() for a in (rows, columns, values))
-    keep = values != 0.0
-    rows, columns, values = rows[keep], columns[keep], values[keep]
-    place, inverse = np.unique(columns.astype(np.int64) * shape[0] + rows, return_inverse=True)
-    summed = np.bincount(inverse, weights=values, minlength=len(place))
-    pointers = np.searchsorted(place // shape[0], np.arange(shape[1] + 1)).tolist()
-    return ca.DM(ca.Sparsity(shape[0], shape[1], pointers, (place % shape[0]).tolist()), summed)
-
-
-def _dm(matrix: SparseMap) -> ca.DM:
-    return _matrix(matrix.row, matrix.column, matrix.value, matrix.shape)
-
-
-@dataclass(frozen=True)
-class _Reduction:
-    """Components of all rotations as held values plus a constant matrix times the unknowns.
-
-    ``index`` and ``weight`` (rotations * components, 2) give the at most two unknowns of each component: in
-    space a rotation about a held axis is ``(c, s axis)`` with two unknowns.
-    """
-
-    index: Array
-    weight: Array
-    unknowns: int
-    first: Array
-
-
-def _reduction(model: Model) -> _Reduction:
-    components, widths = model.element.components, model.widths
-    first = np.cumsum(widths) - widths
-    index = np.zeros((len(widths), components, 2), dtype=np.intp)
-    weight = np.zeros((len(widths), components, 2))
-    free = np.flatnonzero(widths == components)
-    for c in range(components):
-        index[free, c, 0], weight[free, c, 0] = first[free] + c, 1.0
-    for i in np.flatnonzero((model.rotations.kind == Turn.AXIS) & (widths == 2)):
-        index[i, 0, 0], weight[i, 0, 0] = first[i], 1.0
-        index[i, 1:, 0], weight[i, 1:, 0] = first[i] + 1, model.rotations.axis[i]
-    return _Reduction(index.reshape(-1, 2), weight.reshape(-1, 2), int(widths.sum()), first)
-
-
-def _pairs(index: Array, weight: Array) -> tuple[Array, Array, Array]:
-    """Rows, columns and weights of dense symmetric blocks over the unknowns behind components (n, width, 2)."""
-    n, width = index.shape[:2]
-    # Rotations about a held axis are the only ones with a second unknown a component.
-    used = 2 if (weight[..., 1] != 0.0).any() else 1
-    index, weight = index[..., :used], weight[..., :used]
-    shape = (n, width, width, used, used)
-    r = np.broadcast_to(index[:, None, :, :, None], shape)
-    c = np.broadcast_to(index[:, :, None, None, :], shape)
-    return r, c, weight[:, None, :, :, None] * weight[:, :, None, None, :]
-
-
-class _Link:
-    """The connections of one group in the unknowns of the program.
-
-    Attributes
-    ----------
-    index, weight : ndarray (n, width, 2)
-        Unknowns behind the components of the rotations, then of the displacements, of each connection.
-    collect : DM
-        Takes derivatives by these components to derivatives by the unknowns.
-    """
-
-    def __init__(self, problem: EquilibriumProblem, number: int, group: Group) -> None:
-        self.group = group
-        model, reduction = problem.model, problem._reduction
-        n, (turns, places, self._rows, _, loads) = len(group.names), group.kind.sizes
-        components, axes = model.element.components, model.element.axes
-        ground = (len(model.rotations.kind), len(model.segments.places))
-        turn, place = (np.where(a < 0, last, a) for a, last in zip((group.turns, group.places), ground, strict=True))
-        turning, moving = _with_ground(problem, reduction)
-        cells = turn[..., None] * components + np.arange(components), place[..., None] * axes + np.arange(axes)
-        flat = [cell.reshape(n, -1) for cell in cells]
-        self.index = np.concatenate([turning[0][flat[0]], moving[0][flat[1]]], axis=1)
-        self.weight = np.concatenate([turning[1][flat[0]], moving[1][flat[1]]], axis=1)
-        self.cells = np.concatenate(flat, axis=1)
-        q = ca.vertcat(problem._q, ca.DM([1.0, 0.0, 0.0, 0.0] if components == 4 else [0.0]))
-        u = ca.vertcat(problem.kept_displacements, ca.DM.zeros(axes))
-        self._arguments = [
-            ca.reshape(q[flat[0].ravel().tolist()], components, turns * n) if turns else ca.MX(components, 0),
-            ca.reshape(u[flat[1].ravel().tolist()], axes, places * n) if places else ca.MX(axes, 0),
-            _with_near(ca.MX(ca.DM(group.data.T)), problem._near, model.winding.parts[number]),
-            ca.reshape(problem._loads[number], loads, n),
-        ]
-        self._function = by_components(group.kind).map(n)
-        energy, rows, gradient, jacobian, _ = self._call(ca.MX.zeros(self._rows, n), ca.MX.ones(1, n))
-        self.energy, self.rows, self.gradient, self.jacobian = ca.sum2(energy), rows, gradient, jacobian
-        columns = np.broadcast_to(np.arange(self.cells.size)[:, None], (self.cells.size, 2))
-        shape = (problem.x.numel(), self.cells.size)
-        self.collect = _matrix(self.index.reshape(-1, 2), columns, self.weight.reshape(-1, 2), shape)
-
-    def _call(self, lam: ca.MX, weight: ca.MX) -> Any:
-        return self._function(*self._arguments, lam, weight)
-
-    def hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
-        """Hessian of the Lagrangian's share by the components."""
-        n = len(self.group.names)
-        hessian: ca.MX = self._call(ca.reshape(lam_g, self._rows, n), ca.repmat(lam_f, 1, n))[4]
-        return hessian
-
-
-def _with_ground(problem: EquilibriumProblem, reduction: _Reduction) -> list[tuple[Array, Array]]:
-    """Index and weight of the components of rotations and of displacements, those of the ground last."""
-    model = problem.model
-    kept = model.positions.kept.ravel()
-    index = np.stack([np.where(kept < 0, 0, reduction.unknowns + kept), np.zeros_like(kept)], axis=1)
-    weight = np.stack([(kept >= 0).astype(float), np.zeros(len(kept))], axis=1)
-    nothing = [np.zeros((size, 2)) for size in (model.element.components, model.element.axes)]
-    pairs = ((reduction.index, reduction.weight), (index, weight))
-    return [
-        (np.vstack([i, none.astype(np.intp)]), np.vstack([w, none]))
-        for (i, w), none in zip(pairs, nothing, strict=True)
-    ]
-
-
-def _with_near(data: ca.MX, near: ca.MX, angles: slice | None) -> ca.MX:
-    """Data of a group, those of angles that count turns with the values near which they are counted."""
-    return data if angles is None else ca.vertcat(data[:-1, :], near[angles].T)
+CALLS = 12.0
+"""How often functions of terms are called until IPOPT has found an equilibrium."""
 
 
 class EquilibriumProblem:
@@ -163,21 +40,22 @@ class EquilibriumProblem:
     ----------
     nlp : NLP
         The program of a loading; its objective is the potential energy over ``model.scales.moment``.
-    kernels : str
-        As of :class:`~sfetcas.solvers.prepared.Prepared`; only interpreted ones can be differentiated again by CasADi.
+    x, p : MX
+        Unknowns and parameters.
     """
 
     def __init__(self, model: Model, loading: Loading, guess: State, *, kernels: Kernels = "auto") -> None:
         self.model = model
         self._wound = guess.wound
-        self._kernels: Kernels = kernels
-        self._reduction = _reduction(model)
+        self.terms = SymbolicTerms(Tables(model, components=True), kernels, CALLS)
+        self._tables = self.terms.tables
         self._symbols()
+        gaps = self.terms.gaps(self._q, self._y, self._given, self._near)
         self.nlp = NLP(
             x=self.x,
             p=self.p,
             f=self._objective(),
-            g=ca.vertcat(self._norms(), self._closings(), self._linked_rows()),
+            g=ca.vertcat(self._norms(), gaps),
             lower=np.zeros(len(self.row_names)),
             upper=np.zeros(len(self.row_names)),
             x_lower=np.full(self.x.numel(), -np.inf),
@@ -193,248 +71,136 @@ class EquilibriumProblem:
     # -- symbols --------------------------------------------------------------------------------
 
     def _symbols(self) -> None:
-        model, element, positions = self.model, self.model.element, self.model.positions
-        n, points = model.beams.weight.shape
-        turning = self._reduction.unknowns
-        self.x = ca.MX.sym("x", turning + positions.Y.shape[1])
+        model, element, tables = self.model, self.model.element, self._tables
+        self.x = ca.MX.sym("x", tables.unknowns)
+        _, self._y = ca.vertsplit(self.x, [0, tables.turning_unknowns, tables.unknowns])
+        points = model.beams.weight.size
         sizes = (
-            n * points * element.axes,
-            len(model.rotations.kind) * element.components,
-            len(positions.rows),
-            self.x.numel(),
-            positions.B.shape[1],
+            points * element.axes,
+            tables.of_places,
+            model.positions.B.shape[1],
+            model.positions.B.shape[1],
             model.winding.count,
-            *(len(group.names) * group.kind.sizes[4] for group in model.connections),
+            *(len(group.data) * group.kind.sizes[4] for group in model.connections),
         )
         self.p = ca.MX.sym("p", sum(sizes))
-        pull, held, offset, force, shift, self._near, *self._loads = ca.vertsplit(
-            self.p, np.cumsum([0, *sizes]).tolist()
+        pull, held, force, shift, self._near, *loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
+        self._given = Given(
+            **data_of(model),
+            pull=pull,
+            force=force,
+            shift=shift,
+            turn=ca.MX(),
+            spread=ca.MX(),
+            loads=tuple(loads),
         )
-        self._pull = ca.reshape(pull, element.axes, n * points)
-        self._offset, self._force, self._b = offset, force, shift
-        index, weight = self._reduction.index, self._reduction.weight
-        rows = np.broadcast_to(np.arange(len(index))[:, None], index.shape)
-        self._spread = _matrix(rows, index, weight, (len(index), self.x.numel()))
-        self._q = held + ca.mtimes(self._spread, self.x)
-        components = element.components
-        of_elements = (model.rotations.turns.ravel()[:, None] * components + np.arange(components)).ravel()
-        self._cells = of_elements
-        self._q_elements = ca.reshape(self._q[of_elements.tolist()], components, n * points)
-        self._stiffness = ca.MX(ca.DM(model.beams.stiffness.reshape(n * points, element.stiffnesses).T))
-        self._tangent = ca.MX(ca.DM(model.beams.tangent.reshape(n * points, element.axes).T))
+        turned = held + times(self._spread, self.x) if tables.of_places else held
+        self._q = ca.reshape(turned, element.components, len(model.rotations.kind))
+        self._places = self.terms.kept_places(self._y, self._given)
         norms = [f"norm of rotation {i}" for i in self._unit]
-        self.row_names = (*norms, *positions.rows, *(row for group in model.connections for row in group.rows))
-        self._links = [_Link(self, i, group) for i, group in enumerate(model.connections)]
+        self.row_names = (*norms, *model.row_names)
+
+    @functools.cached_property
+    def _spread(self) -> ca.DM:
+        """What takes the unknowns to the components of all rotations that are not held."""
+        unknown = self._tables.unknown[: self._tables.of_places]
+        used = np.flatnonzero(unknown >= 0)
+        shape = (self._tables.of_places, self._tables.unknowns)
+        return sparse(used, unknown[used], self._tables.weight[used], shape)
 
     @functools.cached_property
     def _unit(self) -> list[int]:
         """Rotations with a norm to hold."""
-        return np.flatnonzero(self.model.widths >= 2).tolist() if self.model.space else []
+        return np.flatnonzero(self.model.rotations.kind != Turn.HELD).tolist() if self.model.space else []
 
     @functools.cached_property
-    def _norm_parts(self) -> tuple[Array, Array]:
+    def _norm_parts(self) -> tuple[Index, Index]:
         """Row and unknown of each component in the norms."""
-        widths, first = self.model.widths, self._reduction.first
-        pairs = [(r, first[i] + c) for r, i in enumerate(self._unit) for c in range(widths[i])]
-        rows, columns = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-        return rows, columns
+        numbers = self._tables.number[self._unit]
+        rows = np.broadcast_to(np.arange(len(numbers))[:, None], numbers.shape)
+        return rows[numbers >= 0], numbers[numbers >= 0]
 
-    def _map(self, name: str, calls: float = 12.0) -> ca.Function:
-        n, function = len(self.model.rotations.turns), getattr(self.model.element, name)
-        return chosen(function, calls * n, self._kernels).map(n)
-
-    @property
-    def _data(self) -> tuple[ca.MX, ca.MX, ca.MX]:
-        return self._stiffness, self._tangent, self._pull
+    def _arguments(self, number: int) -> list[ca.MX]:
+        return self.terms.arguments(number, self._q, self._places, self._given, self._near)
 
     # -- functions and first derivatives ---------------------------------------------------------
 
     def _objective(self) -> ca.MX:
-        energy = ca.MX(0)
-        if len(self.model.rotations.turns):
-            energy = ca.sum2(self._map("energy")(self._q_elements, *self._data))
-        for link in self._links:
-            energy += link.energy
-        return energy - ca.dot(self._force, self.x)
+        energy, _ = self.terms.energies(self._q, self._places, self._given, self._near)
+        return energy - ca.dot(self._given.force, self._places)
 
     @functools.cached_property
-    def _collect(self) -> ca.DM:
-        """Takes derivatives by the components at the nodes of the elements to derivatives by the unknowns."""
-        index, weight = self._reduction.index[self._cells], self._reduction.weight[self._cells]
-        columns = np.broadcast_to(np.arange(len(index))[:, None], index.shape)
-        return _matrix(index, columns, weight, (self.x.numel(), len(index)))
+    def _slopes(self) -> list[tuple[ca.MX, ca.MX]]:
+        """Gradients of the energy and derivatives of the rows, group by group."""
+        found = []
+        for number, group in enumerate(self.model.terms):
+            slopes = (ca.MX(0, 1), ca.MX(0, 1))
+            if len(group.data):
+                gradient, rows = self.terms.many(slopes_of(group.kind), len(group.data)).call(self._arguments(number))
+                slopes = gradient, rows
+            found.append(slopes)
+        return found
 
     def _gradient(self) -> ca.MX:
-        total = -self._force
-        if len(self.model.rotations.turns):
-            gradient = self._map("gradient")(self._q_elements, *self._data)[1]
-            total += ca.mtimes(self._collect, ca.vec(gradient))
-        for link in self._links:
-            total += ca.mtimes(link.collect, ca.vec(link.gradient))
-        return ca.densify(total)
-
-    @functools.cached_property
-    def _to_rows(self) -> ca.DM:
-        """Takes the reaches of the elements to the closing rows."""
-        return self._by_elements(self.model.positions.Z)
-
-    def _by_elements(self, z: SparseMap) -> ca.DM:
-        """A map of the reaches of segments as one of the reaches of their elements."""
-        axes, parts = self.model.element.axes, self.model.segments.parts
-        start = np.array([part.elements.start for part in parts], dtype=np.intp)[z.column // axes]
-        count = np.array([part.elements.stop for part in parts], dtype=np.intp)[z.column // axes] - start
-        element = np.concatenate([np.zeros(0, np.intp), *(a + np.arange(n) for a, n in zip(start, count, strict=True))])
-        column = element * axes + np.repeat(z.column % axes, count)
-        shape = (z.shape[0], len(self.model.segments.owner) * axes)
-        return _matrix(np.repeat(z.row, count), column, np.repeat(z.value, count), shape)
-
-    def _closings(self) -> ca.MX:
-        if not self.model.positions.rows:
-            return ca.MX(0, 1)
-        return self._by_reaches(self.model.positions.Z) + self._by_kept(self.model.positions.W) + self._offset
-
-    def _by_reaches(self, z: SparseMap) -> ca.MX:
-        """A map of the reaches of segments times these."""
-        if not len(self.model.rotations.turns):
-            return ca.MX.zeros(z.shape[0])
-        reach = self._map("reach")(self._q_elements, self._tangent)
-        return ca.mtimes(self._by_elements(z), ca.vec(reach))
-
-    def _by_kept(self, w: SparseMap) -> ca.MX:
-        """A map of the displacements kept as unknowns times these; without any of them x has no such slice."""
-        if not w.shape[1]:
-            return ca.MX.zeros(w.shape[0])
-        return ca.mtimes(_dm(w), self.x[self._reduction.unknowns :])
+        tables = self._tables
+        total = ca.MX.zeros(tables.total)
+        for sides, (gradient, _) in zip(tables.sides, self._slopes, strict=True):
+            total += times(self.terms.onto_unknowns(sides), ca.vec(gradient))
+        loads = times(constant(self.model.positions.Y).T, self._given.force)
+        return ca.densify(total[: tables.unknowns] - ca.vertcat(ca.MX.zeros(tables.turning_unknowns), loads))
 
     def _norms(self) -> ca.MX:
         rows, columns = self._norm_parts
-        adder = _matrix(rows, columns, np.ones(len(rows)), (len(self._unit), self.x.numel()))
-        return ca.mtimes(adder, self.x**2) - 1.0 if self._unit else ca.MX(0, 1)
-
-    def _linked_rows(self) -> ca.MX:
-        return ca.vertcat(ca.MX(0, 1), *(ca.vec(link.rows) for link in self._links if link.group.rows))
-
-    def _scattered(self, parts: list[tuple[Array, Array, Array, ca.MX]], shape: tuple[int, int]) -> ca.MX:
-        """Sparse matrix from (row, column, weight, values) with several entries (…, k) for each value."""
-        places = np.concatenate([(c.astype(np.int64) * shape[0] + r).ravel() for r, c, _, _ in parts])
-        weights = np.concatenate([w.ravel() for _, _, w, _ in parts])
-        sources, offset = [], 0
-        for r, _, _, values in parts:
-            count = values.numel()
-            sources.append(offset + np.repeat(np.arange(count), r.size // max(count, 1)))
-            offset += count
-        source = np.concatenate(sources)
-        keep = weights != 0.0
-        unique, inverse = np.unique(places[keep], return_inverse=True)
-        adder = _matrix(inverse, source[keep], weights[keep], (len(unique), offset))
-        pointers = np.searchsorted(unique // shape[0], np.arange(shape[1] + 1)).tolist()
-        sparsity = ca.Sparsity(shape[0], shape[1], pointers, (unique % shape[0]).tolist())
-        return ca.MX(sparsity, ca.mtimes(adder, ca.vertcat(*[ca.vec(v) for _, _, _, v in parts])))
+        adder = sparse(rows, columns, np.ones(len(rows)), (len(self._unit), self.x.numel()))
+        return times(adder, self.x**2) - 1.0 if self._unit else ca.MX(0, 1)
 
     def _jacobian(self) -> ca.MX:
-        positions = self.model.positions
-        blocks, width = [], self.x.numel()
-        if self._unit:
-            rows, columns = self._norm_parts
-            norm = [(rows, columns, np.full(len(rows), 2.0), self.x[columns.tolist()])]
-            blocks.append(self._scattered(norm, (len(self._unit), width)))
-        if positions.rows:
-            blocks.append(self._closing_jacobian())
-        for link in self._links:
-            (n, components), count = link.cells.shape, link.group.kind.sizes[2]
-            if count:
-                labels = np.arange(n * count).reshape(n, 1, count, 1)
-                shape = (n, components, count, 2)
-                r = np.broadcast_to(labels, shape)
-                c, w = (np.broadcast_to(a[:, :, None, :], shape) for a in (link.index, link.weight))
-                blocks.append(self._scattered([(r, c, w, link.jacobian)], (n * count, width)))
-        return ca.vertcat(*blocks) if blocks else ca.MX(0, width)
-
-    def _closing_jacobian(self) -> ca.MX:
-        model, positions = self.model, self.model.positions
-        turning = self._reduction.unknowns
-        parts: list[tuple[Array, Array, Array, ca.MX]] = []
-        if len(model.rotations.turns):
-            parts.append(self._reach_jacobian())
-        w_map = positions.W
-        if len(w_map.row):
-            parts.append((w_map.row, turning + w_map.column, w_map.value, ca.MX.ones(len(w_map.row))))
-        return self._scattered(parts, (len(positions.rows), self.x.numel()))
-
-    def _reach_jacobian(self) -> tuple[Array, Array, Array, ca.MX]:
-        """Rows, unknowns, weights and values of the closings' derivative through the reaches."""
-        model, positions, axes = self.model, self.model.positions, self.model.element.axes
-        jacobian = self._map("reach_jacobian")(self._q_elements, self._tangent)[1]
-        n, width = model.rotations.turns.shape[0], model.rotations.turns.shape[1] * model.element.components
-        cells = self._cells.reshape(n, width)
-        index, weight = self._reduction.index[cells], self._reduction.weight[cells]
-        # Each reach component goes to at most `most` rows: padded lists of rows and weights.
-        by_column = positions.Z.T
-        counts = np.bincount(by_column.row, minlength=by_column.shape[0])
-        most = max(1, int(counts.max(initial=0)))
-        rank = np.arange(len(by_column.row)) - np.repeat(np.cumsum(counts) - counts, counts)
-        order, value = (np.zeros((by_column.shape[0], most), kind) for kind in (np.intp, float))
-        order[by_column.row, rank], value[by_column.row, rank] = by_column.column, by_column.value
-        owner = model.segments.owner
-        rows, values = order.reshape(-1, axes, most)[owner], value.reshape(-1, axes, most)[owner]
-        shape = (n, width, axes, most, 2)
-        r = np.broadcast_to(rows[:, None, :, :, None], shape)
-        c = np.broadcast_to(index[:, :, None, None, :], shape)
-        w = values[:, None, :, :, None] * weight[:, :, None, None, :]
-        return r, c, w, jacobian
+        tables, w = self._tables, self.model.positions.W
+        closed = tables.closed
+        chords = ca.vec(self._slopes[0][1])
+        values = [picked(chords, closed.entry) * ca.DM(closed.value)]
+        values += [ca.vec(rows) for _, rows in self._slopes[1:]]
+        row, column, weight, entry = tables.first.places
+        count, norms = tables.first.count, len(self._unit)
+        norm_rows, norm_columns = self._norm_parts
+        places = (
+            np.concatenate([norms + row - tables.unknowns, norms + w.row, norm_rows]),
+            np.concatenate([column, tables.turning_unknowns + w.column, norm_columns]),
+            np.concatenate([weight, w.value, np.full(len(norm_rows), 2.0)]),
+            np.concatenate([entry, np.full(len(w.row), count), count + 1 + np.arange(len(norm_rows))]),
+        )
+        given = ca.vertcat(*values, ca.MX(1), picked(self.x, norm_columns))
+        return _matrix(places, given, (norms + tables.rows, tables.unknowns))
 
     def _hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
-        model, element = self.model, self.model.element
-        n, points = model.beams.weight.shape
-        norms, closings = len(self._unit), len(model.positions.rows)
-        pull = lam_f * self._pull
-        if closings and n:
-            constant = ca.mtimes(self._to_rows.T, lam_g[norms : norms + closings])
-            spread = np.repeat(np.arange(n), points)
-            pull += ca.reshape(constant, element.axes, n)[:, spread.tolist()]
-        parts: list[tuple[Array, Array, Array, ca.MX]] = []
-        if n:
-            hessian = self._map("hessian")(self._q_elements, lam_f * self._stiffness, self._tangent, pull)
-            cells = self._cells.reshape(n, -1)
-            parts.append((*_pairs(self._reduction.index[cells], self._reduction.weight[cells]), hessian))
-        if norms:
-            rows, columns = self._norm_parts
-            parts.append((columns, columns, np.full(len(rows), 2.0), lam_g[rows.tolist()]))
-        first = norms + closings
-        for link in self._links:
-            own = link.hessian(lam_f, lam_g[first : first + len(link.group.rows)])
-            parts.append((*_pairs(link.index, link.weight), own))
-            first += len(link.group.rows)
-        return self._scattered(parts, (self.x.numel(), self.x.numel()))
-
-    @functools.cached_property
-    def kept_displacements(self) -> ca.MX:
-        """Displacements of all places whose components are unknowns or prescribed, (places * axes,); others wrong."""
-        positions = self.model.positions
-        return self._by_kept(positions.Y) + ca.mtimes(_dm(positions.B), self._b)
+        tables, norms = self._tables, len(self._unit)
+        lam, values = lam_g[norms:, :], []
+        for number, group in enumerate(self.model.terms):
+            n = len(group.data)
+            if n:
+                arguments = [*self._arguments(number), self.terms.multipliers(number, lam), ca.repmat(lam_f, 1, n)]
+                values.append(ca.vec(self.terms.many(curvatures_of(group.kind), n)(*arguments)))
+        row, column, weight, entry = tables.second.places
+        norm_rows, norm_columns = self._norm_parts
+        places = (
+            np.concatenate([row, norm_columns]),
+            np.concatenate([column, norm_columns]),
+            np.concatenate([weight, np.full(len(norm_rows), 2.0)]),
+            np.concatenate([entry, tables.second.count + norm_rows]),
+        )
+        return _matrix(places, ca.vertcat(ca.MX(0, 1), *values, lam_g[:norms, :]), (tables.unknowns,) * 2)
 
     # -- expressions by place ---------------------------------------------------------------------
 
     def displacement(self, node: int) -> ca.MX:
         """Displacement of a node, dimensionless."""
-        positions, axes = self.model.positions, self.model.element.axes
-        rows = np.arange(node * axes, (node + 1) * axes)
-        e = positions.E.rows(rows)
-        constant = ca.DM(-(e @ self._rest)) + ca.mtimes(_dm(positions.B.rows(rows)), self._b)
-        return ca.densify(self._by_reaches(e) + self._by_kept(positions.Y.rows(rows)) + constant)
-
-    @functools.cached_property
-    def _rest(self) -> Array:
-        """Reaches of the segments in the undeformed scene, (segments * axes,)."""
-        model = self.model
-        rest = np.zeros((len(model.segments.parts), model.element.axes))
-        np.add.at(rest, model.segments.owner, model.beams.tangent.sum(axis=1))
-        return rest.ravel()
+        axes = self.model.element.axes
+        moved = self.terms.displacements(self._q, self._y, self._given)
+        return ca.densify(moved[node * axes : (node + 1) * axes])
 
     def rotation(self, number: int) -> ca.MX:
         """Components of a rotation."""
-        components = self.model.element.components
-        return self._q[number * components : (number + 1) * components]
+        return self._q[:, number]
 
     def strain(self, member: str, at: float) -> ca.MX:
         """Curvature minus that of the unloaded member, dimensionless, about the section's axes."""
@@ -443,9 +209,7 @@ class EquilibriumProblem:
         e = int(np.clip(np.searchsorted(cuts, at, side="right") - 1, 0, len(cuts) - 2))
         length = model.beams.weight[model.elements_of(member)][e].sum()
         xi = np.array([(at - cuts[e]) / (cuts[e + 1] - cuts[e])])
-        points = len(element.nodes)
-        number = model.elements_of(member).start + e
-        q = self._q_elements[:, number * points : (number + 1) * points]
+        q = self._q[:, model.rotations.turns[model.elements_of(member).start + e].tolist()]
         here = ca.mtimes(q, ca.DM(interpolation.evaluation(element.nodes, xi).T))
         slope = ca.mtimes(q, ca.DM(interpolation.differentiation(element.nodes, xi).T)) / length
         if not model.space:
@@ -461,71 +225,44 @@ class EquilibriumProblem:
         """Values of the parameters for a loading; angles that count turns are counted near those of a state."""
         model, positions = self.model, self.model.positions
         held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
-        offset = positions.BZ @ loading.shift - positions.Z @ self._rest
-        constant = -(positions.E.T @ loading.force.ravel()).reshape(-1, model.element.axes)
-        pull = loading.pull + constant[model.segments.owner][:, None, :]
-        force = np.zeros(self.x.numel())
-        if not model.space:
-            free = np.flatnonzero(model.widths)
-            force[self._reduction.first[free]] = loading.moment[free, 2]
-        force[self._reduction.unknowns :] = positions.Y.T @ loading.force.ravel()
-        loads = [load.ravel() for load in loading.loads]
+        hanging = (positions.E.T @ loading.force.ravel()).reshape(-1, model.element.axes)
+        pull = loading.pull - hanging[model.segments.owner][:, None, :]
         wound = self._wound if near is None else near.wound
-        return np.concatenate([pull.ravel(), held.ravel(), offset, force, loading.shift, wound, *loads])
+        loads = [load.ravel() for load in loading.loads]
+        parts = [pull.ravel(), held.ravel(), loading.force.ravel(), loading.shift, wound, *loads]
+        return np.concatenate(parts)
 
-    def parameters_by(self, program: Program, near: Array) -> ca.MX:
+    def parameters_by(self, given: Given, near: Array) -> ca.MX:
         """The same as an expression of what is given; data are those of the model."""
-        model, positions, given = self.model, self.model.positions, program.given
-        still = ca.MX(model.element.components, len(model.rotations.kind))
-        held = program.expressions.held(ca.densify(still), given)
-        moments = [ca.MX(0)] * self.x.numel()
-        if not model.space:
-            for i in np.flatnonzero(model.widths).tolist():
-                moments[self._reduction.first[i]] = given.moment[i]
-        force = ca.vertcat(ca.MX(0, 1), *moments)
-        kept = times(constant(positions.Y).T, given.force)
-        force += ca.vertcat(ca.MX.zeros(self._reduction.unknowns), kept)
-        offset = times(constant(positions.BZ), given.shift) - ca.DM(positions.Z @ self._rest)
-        whole = [ca.vec(self._only_held(held)), offset, force, given.shift, ca.MX(ca.DM(near))]
-        return ca.vertcat(given.pull, *whole, *given.loads)
-
-    def _only_held(self, q: ca.MX) -> ca.MX:
-        """Rotations that are held; all others zero."""
-        model = self.model
-        flags = np.repeat((model.rotations.kind == Turn.HELD)[None, :], model.element.components, axis=0)
-        rest = np.zeros(flags.shape)
-        if model.space:
+        still = np.zeros((self.model.element.components, len(self.model.rotations.kind)))
+        held = (self.model.rotations.kind == Turn.HELD).astype(float)
+        if self.model.space:
             # What no motion turns stands as it stood.
-            rest[0] = (model.rotations.kind == Turn.HELD) & ~self._driven
-        return q * ca.DM(flags.astype(float)) + ca.DM(rest)
-
-    @property
-    def _driven(self) -> Array:
-        """Which rotations motions prescribe."""
-        return np.any([group.turn.any(axis=1) for group in self.model.groups.values()], axis=0)
+            still[0] = held
+        turned = self.terms.held(ca.MX(ca.DM(still)), given)
+        return ca.vertcat(given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(near)), *given.loads)
 
     def unknowns(self, state: State) -> Array:
         """The unknowns of the program at a state."""
-        q = state.q.ravel()
-        x = np.zeros(self.x.numel())
-        index, weight = self._reduction.index, self._reduction.weight
-        np.add.at(x, index.ravel(), (weight * q[:, None]).ravel())
-        x[self._reduction.unknowns :] = state.y
+        x, tables = np.zeros(self._tables.unknowns), self._tables
+        unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
+        used = unknown >= 0
+        np.add.at(x, unknown[used], (weight * state.q.ravel())[used])
+        x[tables.turning_unknowns :] = state.y
         return x
 
     def state(self, x: Array, lam: Array, loading: Loading, near: State | None = None) -> State:
         """The state of a solution; quaternions are made exactly unit, turns counted near those of another state."""
-        model = self.model
-        held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0).ravel()
-        weight, index = self._reduction.weight, self._reduction.index
-        q = (held + (weight * x[index]).sum(axis=1)).reshape(len(model.rotations.kind), -1)
+        model, tables = self.model, self._tables
+        held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
+        unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
+        q = held + (weight * np.append(x, 0.0)[unknown]).reshape(held.shape)
         if model.space:
             # A quaternion that is zero has no direction: what is not finite is no solution.
             with np.errstate(divide="ignore", invalid="ignore"):
                 q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-        rows = self.rows_of_equations
         wound = model.winding.angles(q, self._wound if near is None else near.wound)
-        return State(q, x[self._reduction.unknowns :].copy(), lam[rows], wound)
+        return State(q, x[tables.turning_unknowns :].copy(), lam[self.rows_of_equations], wound)
 
     @property
     def rows_of_equations(self) -> slice:
@@ -535,3 +272,12 @@ class EquilibriumProblem:
     def multipliers(self, state: State) -> Array:
         """Multipliers of all rows at a state, those of the norms zero."""
         return np.concatenate([np.zeros(len(self._unit)), state.lam])
+
+
+def _matrix(places: Places, values: ca.MX, shape: tuple[int, int]) -> ca.MX:
+    """Sparse matrix of values by their rows, columns, weights and numbers."""
+    row, column, weight, entry = places
+    cells, inverse = np.unique(column * shape[0] + row, return_inverse=True)
+    sums = sparse(inverse.ravel(), entry, weight, (len(cells), values.shape[0]))
+    starts = np.searchsorted(cells // shape[0], np.arange(shape[1] + 1)).tolist()
+    return ca.MX(ca.Sparsity(*shape, starts, (cells % shape[0]).tolist()), times(sums, values))

@@ -9,7 +9,7 @@ numbers come out of Python and of C.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
@@ -18,15 +18,14 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.constants import constant, sparse, times
 from ..mathematics.linear import pattern
-from ..mechanics.connections import GROUND
 from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
-from ..mechanics.joints import by_turning
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
 from ..mechanics.singles import counted_angle, turned_vector
-from ..mechanics.stationarity import Stationarity, StationarityPlaces, summed
+from ..mechanics.stationarity import Stationarity, summed
+from ..mechanics.terms import GROUND
 from .newton import TINY
 
 __all__ = ["Program", "data_of", "is_data"]
@@ -61,19 +60,13 @@ class Program:
         n = expressions.layout
         self.states = n.components * n.rotations + n.y + n.lam + n.near
         self._bounds = np.cumsum([0, n.components * n.rotations, n.y, n.lam, n.near]).tolist()
-        self._loads = len(self.model.connections)
         still = expressions.given(ca.MX.zeros(n.factors))
         parts = self._parts(still)
-        varying = varying if varying is not None else self._loaded()
+        varying = varying if varying is not None else expressions.loaded()
         self.sizes = {name: part.numel() for name, part in parts.items() if varying.get(name)}
         self.symbol = ca.MX.sym("given", sum(self.sizes.values()))
         self._all = parts
         self.given = self.given_by(self.symbol)
-
-    def _loaded(self) -> dict[str, bool]:
-        expressions = self.expressions
-        found = {name: expressions.acts(name) for name in LOADS}
-        return found | {f"loads_{i}": any(g.loads[i].any() for g in expressions.loadings) for i in range(self._loads)}
 
     @staticmethod
     def _parts(given: Given) -> dict[str, ca.MX]:
@@ -106,8 +99,6 @@ class Program:
     def _load(self, name: str, loading: Loading) -> Array:
         base, _, number = name.partition("_")
         part = loading.loads[int(number)] if number else getattr(loading, base)
-        if base in ("moment", "twist"):
-            part = part[:, 3 - self.expressions.turns :]
         part = part.ravel()
         if base == "pull" and self.expressions.reaching.nnz():
             part = part - (self.expressions.reaching.T @ ca.DM(loading.force.ravel())).full().ravel()
@@ -156,29 +147,14 @@ class Program:
         return self._matrix(self.stationarity.entries)
 
     @functools.cached_property
-    def strain(self) -> ca.MX:
-        """Elastic energy of elements and connections."""
-        expressions, given, model = self.expressions, self.given, self.model
+    def _energies(self) -> tuple[ca.MX, ca.MX]:
         q, y, _, near = self.parts
-        total = ca.MX(0)
-        if expressions.elements:
-            turns = model.rotations.turns.ravel().tolist()
-            nothing = ca.MX.zeros(expressions.axes, expressions.elements * expressions.points)
-            energy = expressions.many(model.element.energy, expressions.elements)
-            total += ca.sum2(energy(q[:, turns], given.stiffness, given.tangent, nothing))
-        for found in self._linked(y, q, near):
-            total += ca.sum2(found[1])
-        return total
+        return self.expressions.energies(q, self.expressions.kept_places(y, self.given), self.given, near)
 
-    def _linked(self, y: ca.MX, q: ca.MX, near: ca.MX) -> Iterator[Sequence[ca.MX]]:
-        """Results of connections without multipliers, group by group."""
-        expressions, given = self.expressions, self.given
-        places = expressions.displacements(q, y, given)
-        for number, group in enumerate(self.model.connections):
-            n, count = len(group.data), group.kind.sizes[2]
-            data = *expressions.sides(group, q, places), expressions.data(number, given, near)
-            function = expressions.many(by_turning(group.kind), n)
-            yield function.call([*data, expressions.link_load(number, given), ca.MX.zeros(count, n)])
+    @property
+    def strain(self) -> ca.MX:
+        """Elastic energy of all terms."""
+        return self._energies[1]
 
     def _function(self, name: str, arguments: Mapping[str, ca.MX], results: Mapping[str, ca.MX]) -> ca.Function:
         return ca.Function(
@@ -293,51 +269,18 @@ class Program:
 
     def _stationarity(self, *, entries: bool) -> Stationarity:
         _, (q, y, lam, near) = self._symbols
-        places = self.expressions.displacements(q, y, self.given)
-        return Stationarity(self.expressions, q, y, lam, places, self.given, near, entries=entries)
-
-    @functools.cached_property
-    def places(self) -> StationarityPlaces:
-        """Where the entries of the matrix go."""
-        return StationarityPlaces(self.expressions)
+        return Stationarity(self.expressions, q, y, lam, self.given, near, entries=entries)
 
     def _matrix(self, entries: list[ca.MX]) -> ca.MX:
         """The matrix with its whole diagonal, which regularisation and shifts are put on."""
-        row, column, weight, entry = self.places.tied
-        count, every = self.places.static.count, np.arange(self.expressions.total)
-        whole = (
-            np.concatenate([row, every]),
-            np.concatenate([column, every]),
-            np.concatenate([weight, np.ones(len(every))]),
-            np.concatenate([entry, np.full(len(every), count + 1)]),
-        )
-        return summed(self.expressions.total, whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
+        tables = self.expressions.tables
+        return summed(self.expressions.total, tables.whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
 
     @functools.cached_property
     def potential(self) -> ca.MX:
         """Potential energy, zero of the undeformed, unloaded scene; without that of what has none."""
-        expressions, given, model = self.expressions, self.given, self.model
-        _, (q, y, _, near) = self._symbols
-        total = ca.MX(0)
-        if expressions.elements:
-            turns = model.rotations.turns.ravel().tolist()
-            pull = ca.reshape(given.pull, expressions.axes, expressions.elements * expressions.points)
-            energy = expressions.many(model.element.energy, expressions.elements)
-            total += ca.sum2(energy(q[:, turns], given.stiffness, given.tangent, pull))
-            total -= ca.dot(pull, given.tangent)
-        positions = model.positions
-        fixed = times(constant(positions.Y), y) + times(constant(positions.B), given.shift)
-        total -= ca.dot(given.force, fixed)
-        for found in self._linked(y, q, near):
-            total += ca.sum2(found[0])
-        if not model.space:
-            total -= ca.dot(given.moment, ca.vec(q))
-        elif model.winding.about:
-            angles = self.counted(q, near)
-            for turn, angle in model.winding.about.items():
-                moment = given.moment[3 * turn : 3 * turn + 3]
-                total -= ca.dot(moment, ca.DM(model.winding.axis[angle])) * angles[angle]
-        return total
+        y = self.parts[1]
+        return self._energies[0] - ca.dot(self.given.force, self.expressions.kept_places(y, self.given))
 
     @functools.cached_property
     def _gaps(self) -> ca.MX:
@@ -377,11 +320,13 @@ class Program:
         data = sum(size for name, size in self.sizes.items() if is_data(name))
         return slice(data, self.symbol.shape[0])
 
-    def slice_of(self, part: str) -> slice:
-        """Where a part stands in what is given; empty where it does not vary."""
-        names, bounds = list(self.sizes), np.cumsum([0, *self.sizes.values()]).tolist()
-        at = names.index(part) if part in names else None
-        return slice(0, 0) if at is None else slice(bounds[at], bounds[at + 1])
+    @property
+    def slice_of_moments(self) -> slice:
+        """Where moments stand in what is given; empty where there are none."""
+        couples = [f"loads_{i}" for i, group in enumerate(self.model.connections) if group.kind.is_couple]
+        bounds = np.cumsum([0, *self.sizes.values()]).tolist()
+        found = [i for i, name in enumerate(self.sizes) if name in couples]
+        return slice(bounds[found[0]], bounds[found[-1] + 1]) if found else slice(0, 0)
 
     @functools.cached_property
     def convex(self) -> ca.Function:
@@ -390,19 +335,18 @@ class Program:
         state, (q, _, _, _) = self._symbols
         entries = list(self.stationarity.entries)
         if expressions.elements:
-            pull = ca.reshape(self.stationarity.pull, expressions.axes, expressions.elements * expressions.points)
+            places = expressions.kept_places(self.parts[1], self.given)
+            arguments = expressions.arguments(0, q, places, self.given, self.parts[3])
             function = expressions.many(model.element.convex, expressions.elements)
-            turns = model.rotations.turns.ravel().tolist()
-            entries[0] = ca.vec(function(q[:, turns], self.given.stiffness, self.given.tangent, pull))
+            entries[0] = ca.vec(function(*arguments, expressions.multipliers(0, self.parts[2])))
         matrix = self._matrix(entries).nz[:]
         return self._function("convex", {"state": state, "given": self.symbol}, {"entries": matrix})
 
     @functools.cached_property
     def sparsity(self) -> ca.Sparsity:
         """Pattern of the matrix."""
-        row, column, _, _ = self.places.tied
-        every = np.arange(self.expressions.total)
-        cells = np.unique(np.concatenate([column, every]) * self.expressions.total + np.concatenate([row, every]))
+        row, column, _, _ = self.expressions.tables.whole
+        cells = np.unique(column * self.expressions.total + row)
         return pattern(self.expressions.total, cells % self.expressions.total, cells // self.expressions.total)
 
     @functools.cached_property
@@ -427,19 +371,14 @@ class Program:
         found = self.stationarity
         _, (_, _, lam, _) = self._symbols
         total = ca.MX(equations.noise)
-        absolute = ca.fabs(expressions.gather)
-        sums = ca.MX.zeros(expressions.of_places)
-        if expressions.elements:
-            pull = ca.reshape(ca.fabs(found.pull), expressions.axes * expressions.points, expressions.elements)
-            weights = np.repeat(model.beams.weight, expressions.axes, axis=1).T
-            carried = ca.sum1(pull * ca.DM(weights))
-            width = expressions.points * expressions.turns
-            moments = ca.fabs(found.moments) + ca.vec(ca.repmat(carried, width, 1))
-            sums += times(ca.fabs(expressions.onto_rotations), moments)
-        sums += ca.fabs(found.couples)
-        total += ca.mtimes(absolute[:, : expressions.of_places], sums)
-        for sides, values in found.shares:
-            total += times(ca.fabs(expressions.onto_unknowns(sides)), ca.fabs(ca.vec(values)))
+        for number, (sides, values) in enumerate(found.shares):
+            sizes = ca.fabs(values)
+            if number == 0 and expressions.elements:
+                # What forces do along an element, beside the moments on its nodes.
+                pull = ca.reshape(ca.fabs(found.pull), expressions.axes * expressions.points, expressions.elements)
+                weights = ca.DM(np.repeat(model.beams.weight, expressions.axes, axis=1).T)
+                sizes += ca.repmat(ca.sum1(pull * weights), sides.shape[1], 1)
+            total += times(expressions.sizes_onto_unknowns(sides), ca.vec(sizes))
         if equations.displacement_unknowns:
             closings = len(model.positions.rows)
             acting = times(constant(model.positions.W.T.absolute), ca.fabs(lam[:closings]))

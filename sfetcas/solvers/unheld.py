@@ -65,9 +65,9 @@ def refuse_unheld(prepared: Prepared, factor: float) -> None:
 
 def _known(prepared: Prepared, loading: Loading) -> bool:
     """Whether a round tells of the loads: they drive it, and bend nothing on the way that could hold them."""
-    drive = loading.moment.any() or loading.follows
+    drive = loading.of(lambda kind: kind.is_couple or kind.follows)
     flexible = any(member.type != "rigid" for member in prepared.model.scene.members.values())
-    dead = loading.force.any() or loading.pull.any() or any(load.any() for load in loading.loads)
+    dead = loading.force.any() or loading.pull.any() or loading.of(lambda kind: not kind.is_couple and not kind.follows)
     return bool(drive and not (flexible and dead))
 
 
@@ -79,7 +79,7 @@ def _pull(prepared: Prepared, state: State, loading: Loading) -> Array:
 
 def _acting(loading: Loading) -> float:
     """Largest load: what is next to nothing beside it is what rounding of directions leaves."""
-    parts = (loading.force, loading.pull, loading.moment, *loading.loads)
+    parts = (loading.force, loading.pull, *loading.loads)
     return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
 

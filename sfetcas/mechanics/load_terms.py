@@ -1,0 +1,399 @@
+"""Loads as terms: moments on rotations, and forces and moments that turn with what they act on.
+
+A force that follows gives a generalised force ``R(q) f`` on its place and nothing on the rotation that it turns with;
+along an element the forces at its points are carried to its first place, and their levers are moments on its nodes.  A
+moment has a potential in the plane and about an axis that holds a rotation; in space, on what is free to turn, a moment
+that is fixed and one that follows have none.
+
+Source: Barraco and Munteanu, Part 1, section 4 (virtual work).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, final
+
+import casadi as ca
+import numpy as np
+
+from ..description.loads import Load
+from ..description.scene import Scene
+from ..errors import SceneError
+from ..mathematics import interpolation, quaternion
+from ..mathematics.arrays import Array
+from .elements import Element
+from .joints import Turning
+from .mesh import Mesh
+from .rotations import Rotations, Turn
+from .segments import Segments
+from .singles import turned_vector
+from .terms import GROUND, Group, Side, Term
+
+__all__ = [
+    "AxisMoment",
+    "Follower",
+    "FollowingMoment",
+    "FollowingSpread",
+    "Moment",
+    "carried",
+    "cut_of",
+    "elements_of",
+    "followed_elements",
+    "inner_cut",
+    "load_groups",
+    "present",
+    "spread_of",
+]
+
+
+@final
+@dataclass(frozen=True)
+class Follower(Term):
+    """A force on a place that turns with a rotation; load: the force in the undeformed scene."""
+
+    is_load: ClassVar[bool] = True
+    follows: ClassVar[bool] = True
+
+    @property
+    def has_potential(self) -> bool:
+        """None."""
+        return False
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """A rotation and a place."""
+        return 1, 1, 0, 0, self.axes
+
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Minus the turned force on the place."""
+        nothing = [ca.SX(0)] * self.turns
+        return [*nothing, *[-f for f in self.forth(q[0], ca.vertsplit(load))]]
+
+
+@final
+@dataclass(frozen=True)
+class FollowingSpread(Term):
+    """Forces at the nodes of an element that turn with them.
+
+    Data: tangents of the nodes, load: forces there, both of the undeformed scene.
+
+    Attributes
+    ----------
+    nodes : int
+        Nodes of the element, which integrates at them.
+    """
+
+    is_load: ClassVar[bool] = True
+    follows: ClassVar[bool] = True
+
+    nodes: int
+
+    @property
+    def has_potential(self) -> bool:
+        """None."""
+        return False
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The rotations of the element, and the place at its start."""
+        return self.nodes, 1, 0, self.nodes * self.axes, self.nodes * self.axes
+
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Moments of what acts beyond each node, and minus the sum of the forces on the place."""
+        nodes, weights = interpolation.lobatto(self.nodes)
+        beyond = interpolation.integration(nodes, nodes)
+        n = self.axes
+        tangents, forces = (
+            [ca.vertcat(*self.forth(side, ca.vertsplit(part[n * k : n * k + n]))) for k, side in enumerate(q)]
+            for part in (data, load)
+        )
+        moments = []
+        for k, tangent in enumerate(tangents):
+            carried = sum((float(beyond[j, k]) * force for j, force in enumerate(forces)), ca.SX.zeros(n))
+            arm = tangent / float(weights[k])
+            levers = ca.cross(arm, carried) if self.space else arm[0] * carried[1] - arm[1] * carried[0]
+            moments += [-m for m in ca.vertsplit(levers)]
+        total = sum(forces[1:], forces[0])
+        return [*moments, *[-f for f in ca.vertsplit(total)]]
+
+
+@final
+@dataclass(frozen=True)
+class Moment(Term):
+    """A moment on a rotation, about z in the plane, fixed in space; load: its components."""
+
+    is_load: ClassVar[bool] = True
+    is_couple: ClassVar[bool] = True
+
+    @property
+    def has_potential(self) -> bool:
+        """In the plane."""
+        return not self.space
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """A rotation."""
+        return 1, 0, 0, 0, self.turns
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """In the plane the angle times minus the moment."""
+        return ca.SX(0) if self.space else -load * q[0][0]
+
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Minus the moment in space."""
+        return [-m for m in ca.vertsplit(load)]
+
+
+@final
+@dataclass(frozen=True)
+class FollowingMoment(Term):
+    """A moment that turns with the rotation that it acts on, in space; load: its components in the undeformed scene."""
+
+    is_load: ClassVar[bool] = True
+    follows: ClassVar[bool] = True
+
+    @property
+    def has_potential(self) -> bool:
+        """None."""
+        return False
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """A rotation."""
+        return 1, 0, 0, 0, 3
+
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Minus the turned moment."""
+        return [-m for m in self.forth(q[0], ca.vertsplit(load))]
+
+
+@final
+@dataclass(frozen=True)
+class AxisMoment(Turning):
+    """A moment on a rotation that is held to an axis in space; it works on the counted angle.  Load: its components."""
+
+    is_load: ClassVar[bool] = True
+    is_couple: ClassVar[bool] = True
+
+    @property
+    def own(self) -> int:
+        """None."""
+        return 0
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """The ground and the rotation."""
+        turns, places, rows, data, _ = super().sizes
+        return turns, places, rows, data, 3
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """The angle times minus the moment about the axis."""
+        return -ca.dot(data[:3], load) * self.angle(q, data)
+
+
+# -- of a scene -------------------------------------------------------------------------------------
+
+
+def _turning_of(rotations: Rotations, name: str, node: str) -> int:
+    """Rotation of a node that a load acts on.
+
+    Raises
+    ------
+    SceneError
+        There is none.
+    """
+    number = rotations.node_turn[node]
+    if number is None:
+        raise SceneError(f"nothing turns with node {node!r}, so no moment or follower can act on it", ("loads", name))
+    return number
+
+
+def cut_of(mesh: Mesh, load: Load) -> int:
+    """Number of the cut of its member at which a load acts."""
+    return mesh.cut_at(str(load.member), load.at or 0.0)
+
+
+def load_groups(
+    scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations, tangent: Array
+) -> tuple[Group, ...]:
+    """The groups of the loads of a scene that are terms, each load by the name ``loads.NAME``.
+
+    Parameters
+    ----------
+    tangent : ndarray (elements, points, axes)
+        As of :class:`~sfetcas.mechanics.beams.Beams`.
+
+    Raises
+    ------
+    SceneError
+        Nothing turns with the node that a load acts on.
+    """
+    found: dict[Term, list[tuple[str, str, list[int], list[int], Array]]] = {}
+
+    def add(kind: Term, name: str, node: str, turns: list[int], places: list[int], data: Array | None = None) -> None:
+        found.setdefault(kind, []).append((name, node, turns, places, np.zeros(0) if data is None else data))
+
+    space = element.space
+    for name, load in scene.loads.items():
+        follows = load.frame == "follower" and (space or load.type != "moment")
+        if load.type == "distributed" or not (follows or load.type == "moment"):
+            continue
+        number = _rotation(scene, mesh, element, segments, rotations, name, load)
+        where = f"loads.{name}", load.node or ""
+        if load.type == "force":
+            add(Follower(space), *where, [number], [_place(mesh, segments, load)])
+        elif follows:
+            add(FollowingMoment(space), *where, [number], [])
+        elif space and rotations.kind[number] == Turn.AXIS:
+            add(AxisMoment(space), *where, [GROUND, number], [], np.append(rotations.axis[number], 0.0))
+        else:
+            add(Moment(space), *where, [number], [])
+    for e in followed_elements(scene, segments):
+        if element.gauss:
+            raise SceneError("distributed followers need integration at the nodes, found Gauss integration")
+        part = segments.parts[segments.owner[e]]
+        turns, start = rotations.turns[e].tolist(), segments.place(part.start)
+        add(FollowingSpread(space, element.order + 1), f"element {e}", "", turns, [start], tangent[e].ravel())
+    # Generated code looks for moments in one run of numbers.
+    return tuple(_group(kind, found[kind]) for kind in sorted(found, key=lambda kind: kind.is_couple))
+
+
+def _group(kind: Term, ones: list[tuple[str, str, list[int], list[int], Array]]) -> Group:
+    names, nodes, turns, places, data = zip(*ones, strict=True)
+    n = len(ones)
+    return Group(
+        kind=kind,
+        turns=np.array(turns, dtype=np.intp).reshape(n, kind.sizes[0]),
+        places=np.array(places, dtype=np.intp).reshape(n, kind.sizes[1]),
+        data=np.array(data, dtype=float).reshape(n, kind.sizes[3]),
+        rows=(),
+        names=names,
+        nodes=nodes,
+    )
+
+
+def followed_elements(scene: Scene, segments: Segments) -> list[int]:
+    """Elements along which forces act that turn with the sections; each is a segment."""
+    members = {load.member for load in scene.loads.values() if load.type == "distributed" and load.follows}
+    return sorted(part.elements.start for part in segments.parts if part.member in members)
+
+
+def _rotation(
+    scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations, name: str, load: Load
+) -> int:
+    """Rotation that a load acts on or turns with."""
+    if load.node is not None:
+        return _turning_of(rotations, name, load.node)
+    parts = [part for part in segments.parts if part.member == load.member]
+    chain = rotations.chain(slice(parts[0].elements.start, parts[-1].elements.stop))
+    return int(chain[cut_of(mesh, load) * element.order])
+
+
+def _place(mesh: Mesh, segments: Segments, load: Load) -> int:
+    """Place that a force which follows acts on."""
+    if load.node is not None:
+        return segments.place(load.node)
+    parts = [part for part in segments.parts if part.member == load.member]
+    at = parts[0].elements.start + cut_of(mesh, load)
+    return segments.place(next((part.start for part in parts if part.elements.start == at), parts[-1].end))
+
+
+def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array, Array]:
+    """Pull (elements, points, axes) and forces on places (places, axes) of forces along the elements.
+
+    The pull at a point is minus the load beyond it up to the end of its segment; within an element "beyond" is
+    the transpose of the matrix that integrates the turned tangents, so that the discrete potential has exactly
+    this gradient.
+    """
+    on_element = forces.sum(axis=1)
+    pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
+    on_places = np.zeros((len(segments.places), element.axes))
+    alone, starts = segments.single
+    np.add.at(on_places, starts, on_element[alone])
+    for part in segments.longer:
+        here = part.elements
+        if not forces[here].any():
+            continue
+        beyond = np.cumsum(on_element[here][::-1], axis=0)[::-1]
+        pull[here] -= (beyond - on_element[here])[:, None, :]
+        on_places[segments.place(part.start)] += beyond[0]
+    return pull, on_places
+
+
+# -- what they are at a state -----------------------------------------------------------------------
+
+
+def present(model: Any, q: Array, loading: Any) -> Any:
+    """The loading (:class:`~sfetcas.mechanics.loading.Loading`) with what follows as it is at rotations (rotations, n).
+
+    For answers: what follows is turned and put to the loads that do not, and nothing is left that follows.
+    """
+    if not loading.follows:
+        return loading
+    found = {name: getattr(loading, name).copy() for name in ("force", "own", "spread", "moment", "couple", "jump")}
+    along, loads = np.zeros_like(loading.spread), list(loading.loads)
+    for i, (group, load) in enumerate(zip(model.connections, loading.loads, strict=True)):
+        if not group.kind.follows:
+            continue
+        loads[i] = np.zeros_like(load)
+        width = model.element.axes if group.places.shape[1] else 3
+        turned = quaternion.turned_by(q[group.turns], load.reshape(len(load), -1, width))
+        if isinstance(group.kind, FollowingSpread):
+            along[elements_of(group)] = turned
+        elif isinstance(group.kind, Follower):
+            for part in ("force", "own"):
+                np.add.at(found[part], group.places[:, 0], turned[:, 0])
+        else:
+            np.add.at(found["moment"], group.turns[:, 0], turned[:, 0])
+            _put(model, group, turned[:, 0], found)
+    pull, on_places = carried(along, model.segments, model.element)
+    found["spread"] += along
+    found["force"] += on_places
+    return replace(loading, **found, pull=loading.pull + pull, loads=tuple(loads))
+
+
+def _put(model: Any, group: Group, moments: Array, found: Mapping[str, Array]) -> None:
+    """Add moments to those on nodes, and to those at cuts within members."""
+    for name, node, moment in zip(group.names, group.nodes, moments, strict=True):
+        if node:
+            found["couple"][model.segments.place(node)] += moment
+            continue
+        element = inner_cut(model.mesh, model.beams.first, model.scene.loads[name.removeprefix("loads.")])
+        if element is not None:
+            found["jump"][element] += moment
+
+
+def inner_cut(mesh: Mesh, first: Mapping[str, int], load: Load) -> int | None:
+    """Element that begins where a load acts within its member, None where it acts at an end of it."""
+    member, cut = str(load.member), cut_of(mesh, load)
+    return first[member] + cut if 0 < cut < len(mesh.cuts[member]) - 1 else None
+
+
+def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
+    """Distributed forces (axes, points of all elements) as they are at rotations, and minus what they do beyond.
+
+    Of :class:`~sfetcas.mechanics.expressions.Expressions`; the second is the pull of what follows, which is no load of
+    the elements.
+    """
+    model, axes, n = expressions.model, expressions.axes, expressions.points
+    spread = ca.reshape(given.spread, axes, -1)
+    pull = ca.MX(*spread.shape)
+    for number, group in enumerate(model.terms):
+        if not isinstance(group.kind, FollowingSpread):
+            continue
+        points = (elements_of(group)[:, None] * n + np.arange(n)).ravel()
+        forces = ca.reshape(expressions.load(number, given), axes, len(points))
+        turned = expressions.many(turned_vector(model.space), len(points))(q[:, group.turns.ravel().tolist()], forces)
+        beyond = ca.DM(-model.element.to_points / model.element.weights)
+        onto = ca.DM.triplet(
+            list(range(len(points))), points.tolist(), ca.DM.ones(len(points)), len(points), spread.shape[1]
+        )
+        spread += ca.mtimes(turned, onto)
+        pull += ca.mtimes(ca.mtimes(turned, ca.kron(ca.DM.eye(len(group.data)), beyond)), onto)
+    return spread, pull
+
+
+def elements_of(group: Group) -> Array:
+    """Elements that the terms of a group of :class:`FollowingSpread` act along."""
+    return np.array([int(name.rpartition(" ")[2]) for name in group.names], dtype=np.intp)

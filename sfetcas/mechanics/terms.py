@@ -1,0 +1,312 @@
+"""Terms of the Lagrangian: what every kind of term says, its derivatives in two charts of rotations, and where it acts.
+
+For statics the Lagrangian of a model is a sum over terms,
+
+    L(q, u, lam) = sum energy(q_1..q_k, u_1..u_m; data, loads) + lam . rows(q_1..q_k, u_1..u_m; data, loads),
+
+of the rotations ``q`` and displacements ``u`` of its *sides*.  The rows of a joint have to vanish and its multipliers
+are unknowns; the row of an element is the chord that it gains, and its multiplier the internal force, which is linear
+in the multipliers of the loop closures.  What has no potential gives generalised forces instead of an energy.
+
+A kind of term is one class that says these functions.  Their derivatives follow from the one expression, once a process
+and kind, in either chart: components of rotations, of which norms are rows of their own (IPOPT's program), or rotation
+vectors about the fixed axes, ``dq = 1/2 (0, phi) q`` on unit quaternions (Newton's method and all that stands on it).
+"""
+
+from __future__ import annotations
+
+import abc
+import functools
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import casadi as ca
+import numpy as np
+
+from ..mathematics.arrays import Array, Index
+from ..mathematics.quaternion import Components, product, turned
+
+__all__ = [
+    "ARGUMENTS",
+    "GROUND",
+    "Group",
+    "Side",
+    "Term",
+    "by_turning",
+    "curvatures_of",
+    "energies_of",
+    "forces_by_turning",
+    "name_of",
+    "rows_of",
+    "slopes_of",
+]
+
+Side = list[ca.SX]
+"""Components of a rotation or of a vector."""
+
+GROUND = -1
+"""Number of a side that is the ground: it neither turns nor moves."""
+
+
+@dataclass(frozen=True)
+class Term(Components, abc.ABC):
+    """A kind of term; what it says stands in the methods that a new kind gives.
+
+    Attributes
+    ----------
+    space : bool
+        Quaternions and three axes, or angles and two.
+    """
+
+    space: bool
+
+    follows: ClassVar[bool] = False
+    """Whether it is a load that turns with what it acts on."""
+
+    is_load: ClassVar[bool] = False
+    """Whether what it does to its sides is a load, not what a joint or a spring does."""
+
+    is_couple: ClassVar[bool] = False
+    """Whether it is a load that is a moment and does not turn."""
+
+    is_driven: ClassVar[bool] = False
+    """Whether its loads are what a motion prescribes."""
+
+    @property
+    def has_potential(self) -> bool:
+        """Whether what it does is the derivative of its energy; else of :meth:`forces`."""
+        return True
+
+    @property
+    @abc.abstractmethod
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """Rotations, places, rows, data and loads (data that grow with the load factor)."""
+
+    def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Potential energy, dimensionless."""
+        return ca.SX(0)
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """What has to be zero: angles (rad) and displacements, dimensionless."""
+        return []
+
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Generalised forces without potential, as a residual: moments on the rotations, then forces on the places."""
+        return []
+
+    # -- what the sides say to each other --------------------------------------------------------
+
+    def back(self, q: Side, v: Side) -> Side:
+        """The vector seen from the turned side, ``R(q)^T v``."""
+        if self.space:
+            return turned([q[0], -q[1], -q[2], -q[3]], v)
+        c, s = ca.cos(q[0]), ca.sin(q[0])
+        return [c * v[0] + s * v[1], c * v[1] - s * v[0]]
+
+    def turned_back(self, q: Side, v: Side) -> Side:
+        """What turning back changes, ``R(q)^T v - v``, also of small rotations to full precision."""
+        if self.space:
+            spin = [-a for a in q[1:]]
+            once = ca.cross(ca.vertcat(*spin), ca.vertcat(*v))
+            return ca.vertsplit(2.0 * (q[0] * once + ca.cross(ca.vertcat(*spin), once)))
+        s, versine = ca.sin(q[0]), 2.0 * ca.sin(0.5 * q[0]) ** 2
+        return [s * v[1] - versine * v[0], -s * v[0] - versine * v[1]]
+
+    def forth(self, q: Side, v: Side) -> Side:
+        """The vector turned with the side, ``R(q) v``."""
+        return self.back([-q[0]] if not self.space else [q[0], -q[1], -q[2], -q[3]], v)
+
+    def relative(self, a: Side, b: Side) -> Side:
+        """Rotation of side b against side a, seen from the undeformed scene."""
+        return product([a[0], -a[1], -a[2], -a[3]], b) if self.space else [b[0] - a[0]]
+
+    # -- derivatives, where a kind has a shorter way to them than the whole expression ---------------
+
+    def turning(self) -> ca.Function:
+        """What :func:`by_turning` gives."""
+        return _by_turning(self)
+
+    def turning_forces(self) -> ca.Function:
+        """What :func:`forces_by_turning` gives."""
+        whole = by_turning(self)
+        symbols = whole.sx_in()
+        found = whole.call(symbols)
+        names = whole.name_in()
+        return ca.Function(f"forces_{name_of(self)}", symbols, [found[2], found[3]], names, ["rows", "gradient"])
+
+    def slopes(self) -> ca.Function:
+        """What :func:`slopes_of` gives."""
+        return _slopes(self)
+
+    def curvatures(self) -> ca.Function:
+        """What :func:`curvatures_of` gives."""
+        return _curvatures(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """All terms of one kind: where they act, and their data.
+
+    Attributes
+    ----------
+    kind : Term
+    turns, places : ndarray (n, rotations | places)
+        Numbers of the sides.
+    data : ndarray (n, data)
+    rows : tuple of str
+        Names of the rows that have multipliers of their own, those of the first term first.
+    names : tuple of str
+        What each term is: a spring, a member, a motion, a load, or a joint.
+    nodes : tuple of str
+        The node at which it is; of a small member its first.
+    """
+
+    kind: Term
+    turns: Index
+    places: Index
+    data: Array
+    rows: tuple[str, ...]
+    names: tuple[str, ...]
+    nodes: tuple[str, ...]
+
+
+def name_of(kind: Term) -> str:
+    """A name for functions of a kind, of its own for each kind."""
+    extra = ""
+    for item in fields(kind):
+        value = getattr(kind, item.name)
+        if item.name != "space" and value is not False:
+            extra += "_" + (name_of(value) if isinstance(value, Term) else item.name if value is True else str(value))
+    return f"{type(kind).__name__.lower()}_{'space' if kind.space else 'plane'}{extra}"
+
+
+ARGUMENTS = ("q", "u", "data", "load", "lam")
+"""Names of the arguments of functions of a term."""
+
+
+def _symbols(kind: Term) -> tuple[list[ca.SX], tuple[list[Side], list[Side]]]:
+    """Arguments q, u, data, load, lam; the sides as lists."""
+    turns, places, rows, data, load = kind.sizes
+    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
+    arguments = [q, u, ca.SX.sym("data", data), ca.SX.sym("load", load), ca.SX.sym("lam", rows)]
+    return arguments, ([ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)])
+
+
+def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
+    """Arguments, energy, rows and generalised forces of a kind."""
+    arguments, sides = _symbols(kind)
+    energy = kind.energy(*sides, arguments[2], arguments[3])
+    rows = ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, arguments[2], arguments[3]))
+    forces = ca.vertcat(ca.SX(0, 1), *kind.forces(*sides, arguments[2], arguments[3]))
+    return arguments, energy, rows, forces
+
+
+@functools.cache
+def by_turning(kind: Term) -> ca.Function:
+    """(q, u, data, load, lam) -> energy, its share without loads, rows, gradient, stiffness, and the rows' derivative.
+
+    Derivatives of the Lagrangian ``energy + lam.rows`` by rotations about the fixed axes of all sides, then by all
+    displacements, on unit quaternions: with ``E`` from ``dq = 1/2 (0, phi) q`` the gradient is ``E^T g`` and the
+    stiffness ``E^T H E - 1/4 (q.g) I``, the symmetric second derivative along ``exp(phi/2) q`` (its second part keeps
+    the quaternion on the unit sphere, as the multiplier of the norm does).
+
+    Generalised forces ``f`` are added to the gradient, and to the stiffness ``df/dphi + 1/2 [m x]`` with the moment
+    ``m`` of ``f`` on a rotation: the derivative in the same symmetric form, from which half the commutator of two
+    rotations is left out; these halves cancel in balance.
+
+    Source: Barraco and Munteanu, Part 1, section 4 (virtual work); Argyris 1982 (moments that are not conservative).
+    """
+    return kind.turning()
+
+
+def _by_turning(kind: Term) -> ca.Function:
+    arguments, energy, rows, forces = _said(kind)
+    q, u = arguments[0], arguments[1]
+    x = ca.vertcat(ca.vec(q), ca.vec(u))
+    hessian, gradient = ca.hessian(energy + ca.dot(arguments[4], rows), x)
+    spin, radial = [ca.SX.eye(q.numel())], ca.SX.zeros(u.numel(), 1)
+    if kind.space:
+        sides = [ca.vertsplit(q[:, i]) for i in range(q.shape[1])]
+        columns = [[ca.vertcat(*product([0.0, *a], side)) for a in np.eye(3).tolist()] for side in sides]
+        spin = [0.5 * ca.horzcat(*c) for c in columns]
+        parts = [ca.dot(q[:, i], gradient[4 * i : 4 * i + 4]) for i in range(q.shape[1])]
+        radial = ca.vertcat(*[part for part in parts for _ in range(3)], radial)
+    else:
+        radial = ca.SX.zeros(x.numel(), 1)
+    basis = ca.diagcat(*spin, ca.SX.eye(u.numel()))
+    stiffness = ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * ca.diag(radial)
+    gradient = ca.mtimes(basis.T, gradient)
+    if not kind.has_potential:
+        gradient += forces
+        stiffness += ca.mtimes(ca.jacobian(forces, x), basis) + _halves(forces, q.shape[1], kind.space)
+    results = [
+        energy,
+        ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape)),
+        ca.densify(rows),
+        ca.densify(gradient),
+        ca.densify(stiffness),
+        ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
+    ]
+    names = ["energy", "stored", "rows", "gradient", "stiffness", "spin"]
+    return ca.Function(f"turning_{name_of(kind)}", arguments, results, [*ARGUMENTS], names)
+
+
+def _halves(forces: ca.SX, rotations: int, space: bool) -> ca.SX:
+    """Half the matrices of ``m x`` of the moments on the rotations."""
+    found = ca.SX(forces.numel(), forces.numel())
+    for i in range(rotations if space else 0):
+        part = slice(3 * i, 3 * i + 3)
+        found[part, part] = 0.5 * ca.skew(forces[part])
+    return found
+
+
+@functools.cache
+def forces_by_turning(kind: Term) -> ca.Function:
+    """(q, u, data, load, lam) -> rows and gradient of :func:`by_turning` alone, of which derivatives are short."""
+    return kind.turning_forces()
+
+
+@functools.cache
+def slopes_of(kind: Term) -> ca.Function:
+    """(q, u, data, load) -> gradient of the energy and jacobian of the rows of a kind.
+
+    By the components of all rotations, then of all displacements; of what has a potential.
+    """
+    return kind.slopes()
+
+
+def _slopes(kind: Term) -> ca.Function:
+    arguments, energy, rows, _ = _said(kind)
+    x = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1]))
+    results = [ca.densify(ca.gradient(energy, x)), ca.densify(ca.jacobian(rows, x))]
+    return ca.Function(f"slopes_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
+
+
+@functools.cache
+def curvatures_of(kind: Term) -> ca.Function:
+    """(q, u, data, load, lam, weight) -> Hessian of ``weight energy + lam.rows`` of a kind by the same components."""
+    return kind.curvatures()
+
+
+def _curvatures(kind: Term) -> ca.Function:
+    arguments, energy, rows, _ = _said(kind)
+    x, weight = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1])), ca.SX.sym("weight")
+    hessian = ca.densify(ca.hessian(weight * energy + ca.dot(arguments[4], rows), x)[0])
+    given = [*ARGUMENTS, "weight"]
+    return ca.Function(f"curvatures_{name_of(kind)}", [*arguments, weight], [hessian], given, ["hessian"])
+
+
+@functools.cache
+def energies_of(kind: Term) -> ca.Function:
+    """(q, u, data, load) -> energy of a kind, and its share without loads."""
+    (q, u, data, load, _), energy, _, _ = _said(kind)
+    stored = ca.substitute(energy, load, ca.SX.zeros(load.shape))
+    name, names = f"energies_{name_of(kind)}", ["energy", "stored"]
+    return ca.Function(name, [q, u, data, load], [energy, stored], [*ARGUMENTS[:4]], names, {"cse": True})
+
+
+@functools.cache
+def rows_of(kind: Term) -> ca.Function:
+    """(q, u, data, load) -> rows of a kind."""
+    arguments, _, rows, _ = _said(kind)
+    return ca.Function(f"rows_{name_of(kind)}", arguments[:4], [ca.densify(rows)], [*ARGUMENTS[:4]], ["rows"])
