@@ -314,9 +314,10 @@ def _between(kind: Term) -> ca.Function:
         energy, found = values(q, u, given)
         x, basis = ca.vertcat(ca.vec(q), ca.vec(u)), ca.diagcat(_basis(q), ca.SX.eye(u.numel()))
         gradient = ca.mtimes(basis.T, ca.gradient(energy, x))
-        if not kind.has_potential:
+        forces = kind.forces(*_sides(q, u), data, given)
+        if forces:
             # Moments that are dead do not change when what they act on turns.
-            gradient += ca.vertcat(*kind.forces(*_sides(q, u), data, given))
+            gradient += ca.vertcat(*forces)
         return gradient, ca.mtimes(ca.jacobian(found, x), basis)
 
     q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)

@@ -131,7 +131,7 @@ class Inertia:
         spread = np.zeros_like(loading.spread)
         spread[self._inside] = inner
         pull, carried_to = carried(spread, model.segments, model.element)
-        moment, own = loading.moment.copy(), on_places.copy()
+        moment, own = np.zeros_like(loading.moment), on_places.copy()
         couple, jump = loading.couple.copy(), loading.jump.copy()
         places = equations.places(state, loading)
         for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
@@ -155,7 +155,8 @@ class Inertia:
             own=loading.own + own,
             spread=loading.spread + spread,
             pull=loading.pull + pull,
-            moment=moment,
+            moment=loading.moment + moment,
+            further=loading.further + moment,
             couple=couple,
             jump=jump,
         )

@@ -39,53 +39,25 @@ from .joints import (
     Universal,
 )
 from .mesh import Cushion, Mesh, Touch
+from .parts import Parts
 from .positions import normals
 from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
 from .segments import Segments, cushioned
-from .terms import GROUND, Group, Term
+from .terms import GROUND, One
 
-__all__ = ["anchored", "body_numbers", "connect", "freedoms"]
-
-
-@dataclass(frozen=True)
-class _One:
-    """One connection before it is put to its group."""
-
-    kind: Term
-    name: str
-    node: str
-    data: Array
-    turns: tuple[int, ...] = ()
-    places: tuple[int, ...] = ()
-    row: str = ""
+__all__ = ["anchored", "body_numbers", "connections_of", "freedoms", "touches_of"]
 
 
-def connect(
-    scene: Scene, mesh: Mesh, segments: Segments, rotations: Rotations, element: Element, scales: Scales
-) -> tuple[Group, ...]:
-    """The groups of a scene; those of a kind in the order of the scene."""
-    maker = _Maker(scene, segments, rotations, element.space, scales)
-    by_kind: dict[Term, list[_One]] = {}
-    ones = [*maker.all(), *maker.stops(mesh), *_Toucher(scene, mesh, segments, rotations, element, scales).all()]
-    for one in ones:
-        by_kind.setdefault(one.kind, []).append(one)
-    return tuple(_grouped(kind, ones) for kind, ones in by_kind.items())
+def connections_of(parts: Parts) -> Iterator[One]:
+    """Joints, driven joints, springs, small members and springs that stand at a stop."""
+    maker = _Maker(parts.scene, parts.segments, parts.rotations, parts.element.space, parts.scales)
+    yield from maker.all()
+    yield from maker.stops(parts.mesh)
 
 
-def _grouped(kind: Term, ones: list[_One]) -> Group:
-    turns, places, rows, data, _ = kind.sizes
-    n = len(ones)
-    return Group(
-        kind=kind,
-        turns=np.array([one.turns for one in ones], dtype=np.intp).reshape(n, turns),
-        places=np.array([one.places for one in ones], dtype=np.intp).reshape(n, places),
-        data=np.array([one.data for one in ones], dtype=float).reshape(n, data),
-        rows=tuple(
-            f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
-        ),
-        names=tuple(one.name for one in ones),
-        nodes=tuple(one.node for one in ones),
-    )
+def touches_of(parts: Parts) -> Iterator[One]:
+    """What touches obstacles."""
+    yield from _Toucher(parts.scene, parts.mesh, parts.segments, parts.rotations, parts.element, parts.scales).all()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +72,7 @@ class _Maker:
     def axes(self) -> int:
         return 3 if self.space else 2
 
-    def all(self) -> Iterator[_One]:
+    def all(self) -> Iterator[One]:
         """Every connection of the scene."""
         for pin in self.rotations.pins:
             yield from self._pin(pin)
@@ -115,7 +87,7 @@ class _Maker:
             if member.type == "small":
                 yield self._body(name)
 
-    def _pin(self, pin: Pin) -> Iterator[_One]:
+    def _pin(self, pin: Pin) -> Iterator[One]:
         node = self.scene.nodes[pin.node]
         sides = (GROUND if pin.base is None else pin.base, pin.turn)
         name = f"{pin.joint} of {pin.name} at {pin.node}" if pin.name != pin.node else f"{pin.joint} at {pin.node}"
@@ -123,16 +95,16 @@ class _Maker:
             return
         if pin.joint in ("hinge", "cylindrical"):
             axis = node.axis if pin.joint == "hinge" else node.direction
-            yield _One(Hinge(True), name, pin.node, normals(np.asarray(axis), 3).ravel(), sides, row=name)
+            yield One(Hinge(True), name, pin.node, normals(np.asarray(axis), 3).ravel(), sides, row=name)
         elif pin.joint == "universal":
             axes = [_unit(a) for a in (node.axis, node.axis2)]
-            yield _One(Universal(True), name, pin.node, np.concatenate(axes), sides, row=name)
+            yield One(Universal(True), name, pin.node, np.concatenate(axes), sides, row=name)
 
-    def _slide(self, member: str, i: int, node: str) -> _One:
+    def _slide(self, member: str, i: int, node: str) -> One:
         direction = np.asarray(self.scene.nodes[node].direction, dtype=float)
         places = self.segments.place(node), self.segments.place(self.segments.ends[member, i])
         name = f"slide of {member} at {node}"
-        return _One(
+        return One(
             Slide(self.space), name, node, normals(direction, self.axes).ravel(), (self._base(node),), places, name
         )
 
@@ -145,7 +117,7 @@ class _Maker:
         i = self.scene.members[member].nodes.index(node)
         return self.rotations.ends[member][i]
 
-    def _motions(self) -> Iterator[_One]:
+    def _motions(self) -> Iterator[One]:
         for name, motion in self.scene.motions.items():
             if motion.between is None:
                 continue
@@ -154,30 +126,30 @@ class _Maker:
             if motion.rotation is not None:
                 axis = turned_about(motion, node, self.scene.members)
                 sides = self._end(first, motion.node), self._end(second, motion.node)
-                yield _One(DrivenTurn(self.space), name, motion.node, _unit(axis), sides, row=row)
+                yield One(DrivenTurn(self.space), name, motion.node, _unit(axis), sides, row=row)
             if motion.displacement is not None:
                 i = self.scene.members[second].nodes.index(motion.node)
                 places = self.segments.place(motion.node), self.segments.place(self.segments.ends[second, i])
                 along = _unit(node.direction)[: self.axes]
-                yield _One(DrivenSlide(self.space), name, motion.node, along, (self._base(motion.node),), places, row)
+                yield One(DrivenSlide(self.space), name, motion.node, along, (self._base(motion.node),), places, row)
 
-    def _spring(self, name: str) -> _One:
+    def _spring(self, name: str) -> One:
         spring, scales = self.scene.springs[name], self.scales
         if spring.type == "rotational":
             crossed, sides, head = self._measured(name)
             data = np.array([*head, spring.stiffness / scales.moment, spring.rest, *self._near])
-            return _One(TurnSpring(self.space, crossed), name, spring.node, data, sides)
+            return One(TurnSpring(self.space, crossed), name, spring.node, data, sides)
         other, places = spring.to, self._ends_of(name)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
         if spring.direction is not None:
             data = np.array([*_unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
-            return _One(LineSpring(self.space), name, spring.node, data, (), places)
+            return One(LineSpring(self.space), name, spring.node, data, (), places)
         start = self.scene.nodes[spring.node].position
         anchor = self.scene.nodes[other].position if other is not None else spring.anchor or start
         gap = np.asarray(start, dtype=float) - np.asarray(anchor, dtype=float)
         length = float(np.linalg.norm(gap)) if spring.length is None else spring.length
         data = np.array([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
-        return _One(Spring(self.space), name, spring.node, data, (), places)
+        return One(Spring(self.space), name, spring.node, data, (), places)
 
     def _ends_of(self, name: str) -> tuple[int, int]:
         """Places between which a translational spring acts."""
@@ -185,7 +157,7 @@ class _Maker:
         first = GROUND if spring.to is None else self.segments.place(spring.to)
         return first, self.segments.place(spring.node)
 
-    def stops(self, mesh: Mesh) -> Iterator[_One]:
+    def stops(self, mesh: Mesh) -> Iterator[One]:
         """Springs that stand at a stop."""
         for name, side in mesh.stops:
             spring, row = self.scene.springs[name], f"springs.{name}.stop"
@@ -195,10 +167,10 @@ class _Maker:
                 crossed, sides, head = self._measured(name)
                 data = np.array([*head, at, *self._near])
                 stop = TurnStop(self.space, crossed)
-                yield _One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
+                yield One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
                 continue
             data = np.array([*_unit(spring.direction)[: self.axes], at / self.scales.length])
-            yield _One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
+            yield One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
 
     @property
     def _near(self) -> tuple[float, ...]:
@@ -235,12 +207,12 @@ class _Maker:
                 found.append(self._end(party, spring.node))
         return found[0], found[1]
 
-    def _body(self, name: str) -> _One:
+    def _body(self, name: str) -> One:
         member, body = self.scene.members[name], body_of(self.scene, name)
         data, stiff = body_numbers(body, self.space, self.scales)
         places = tuple(self.segments.place(self.segments.ends[name, i]) for i in range(len(member.nodes)))
         kind = Body(self.space, len(member.nodes), stiff)
-        return _One(
+        return One(
             kind, name, member.nodes[0], data, self.rotations.ends[name], places, f"member {name} does not stretch"
         )
 
@@ -256,7 +228,7 @@ class _Toucher:
     element: Element
     scales: Scales
 
-    def all(self) -> Iterator[_One]:
+    def all(self) -> Iterator[One]:
         """Every touch of the mesh; what is held or lies there already needs no row."""
         touched = {touch.contact for touch in self.mesh.touches}
         obstacles = {name: obstacle(self.scene.contacts[name], self.element.space) for name in touched}
@@ -281,21 +253,21 @@ class _Toucher:
             return self.segments.place(self.segments.ends[touch.member, int(at)])
         return self.segments.place(touch.name)
 
-    def _on(self, touch: Touch, stop: Obstacle) -> _One:
+    def _on(self, touch: Touch, stop: Obstacle) -> One:
         axes, unit = self.element.axes, self.scales.length
         start = self.scene.center_lines[touch.member].positions(np.array([touch.at]))[0] - stop.place
         places = (self.place(touch, touch.at),)
         if stop.kind == "flat":
             data = self._flat(stop, start, touch.offset)
-            return _One(OnPlane(axes == 3), touch.name, "", data, (), places, touch.name)
+            return One(OnPlane(axes == 3), touch.name, "", data, (), places, touch.name)
         if stop.kind == "round":
             data = self._round(stop, start, touch.offset)
-            return _One(OnRound(axes == 3), touch.name, "", data, (), places, touch.name)
+            return One(OnRound(axes == 3), touch.name, "", data, (), places, touch.name)
         turns, _ = self._chain(touch)
         tangent = self.scene.center_lines[touch.member].tangents(np.array([touch.at]))[0]
         start = start + touch.offset * stop.side / np.linalg.norm(stop.side) if stop.side is not None else start
         data = np.concatenate([stop.normal, tangent, start[:axes] / unit, [touch.way]])
-        return _One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
+        return One(OnEdge(axes == 3), touch.name, "", data, (int(turns[0]),), places, touch.name)
 
     def _flat(self, stop: Obstacle, start: Array, offset: float) -> Array:
         """Data of a place on a plane; ``start`` is where it begins, from the obstacle's place, m."""
@@ -307,7 +279,7 @@ class _Toucher:
         across = stop.across[:axes, :axes].T.ravel()
         return np.concatenate([across, start[:axes] / unit, [(stop.radius - stop.sign * offset) / unit, stop.sign]])
 
-    def _cushioned(self, cushion: Cushion) -> _One:
+    def _cushioned(self, cushion: Cushion) -> One:
         """A place that is pushed softly; an edge is rounded for that."""
         space, unit = self.element.space, self.scales.length
         stop = rounded(obstacle(self.scene.contacts[cushion.contact], space), cushion.edge)
@@ -319,7 +291,7 @@ class _Toucher:
         else:
             place = self.segments.place(cushioned(cushion.member, cushion.at))
         kind = CushionedPlane(space) if stop.kind == "flat" else CushionedRound(space)
-        return _One(
+        return One(
             kind,
             f"cushion of {cushion.contact}",
             "",
@@ -328,7 +300,7 @@ class _Toucher:
             (place,),
         )
 
-    def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[_One]:
+    def _lying(self, touch: Touch, stop: Obstacle, covered: set[tuple[str, int]]) -> Iterator[One]:
         """Sections along a stretch; ``covered`` collects, by negative numbers, rotations that are done."""
         axes, name = self.element.axes, f"{touch.name} along"
         turns, x = self._chain(touch)
@@ -340,17 +312,17 @@ class _Toucher:
                 if self.rotations.kind[turn] != Turn.HELD and key not in covered:
                     covered.add(key)
                     data = np.concatenate([stop.normal[:axes], tangent])
-                    yield _One(Along(axes == 3), name, "", data, (turn,), row=name)
+                    yield One(Along(axes == 3), name, "", data, (turn,), row=name)
             return
         start = (line.positions(x[:1])[0] - stop.place)[:axes] / self.scales.length
         if self.rotations.kind[turns[0]] != Turn.HELD:
             data = np.concatenate([start, tangents[0]])
-            yield _One(AlongRound(False), name, "", data, (int(turns[0]),), (self.place(touch, touch.at),), name)
+            yield One(AlongRound(False), name, "", data, (int(turns[0]),), (self.place(touch, touch.at),), name)
         rest = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0]))
         radius = stop.radius - stop.sign * touch.offset
         angles = touch.way / radius * (x - x[0]) * line.length - (rest - rest[0])
         for turn, angle in zip(turns[1:].tolist(), angles[1:], strict=True):
-            yield _One(Bent(False), name, "", np.array([angle]), (int(turns[0]), turn), row=name)
+            yield One(Bent(False), name, "", np.array([angle]), (int(turns[0]), turn), row=name)
 
     def _chain(self, touch: Touch) -> tuple[Index, Array]:
         """Rotations along a stretch, and the fractions at which they stand."""

@@ -261,6 +261,8 @@ class Equations:
         stored = sum(float(part[1].sum()) for part in found)
         residual = self._gathered([part[3] for part in found])
         scale = self._gathered_sizes([part[3] for part in found], state, loading) + self.noise
+        if loading.further.any():
+            residual -= self._of_moments(loading.further)
         lam = state.lam[: len(positions.rows)]
         if self.displacement_unknowns:
             displacement = slice(turning, self.unknowns)
@@ -275,6 +277,14 @@ class Equations:
         values = [group.entries(part, convex=convex) for group, part in zip(self._terms, found, strict=True)]
         spin = found[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
         return Point(potential, stored, residual, scale, self._matrix(values), spin)
+
+    def _of_moments(self, moments: Array) -> Array:
+        """Moments about the fixed axes (rotations, 3) on the unknowns."""
+        tables = self.tables
+        unknown = tables.unknown[: tables.of_places]
+        used, given = unknown >= 0, moments[:, 3 - tables.width :].ravel() * tables.weight[: tables.of_places]
+        found = np.bincount(unknown[used], weights=given[used], minlength=self.total)
+        return found.astype(float, copy=False)
 
     def _gathered_sizes(self, gradients: list[Array], state: State, loading: Loading) -> Array:
         """What a node adds up: moments of its terms, and within elements the forces times the length they act on."""

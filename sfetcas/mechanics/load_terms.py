@@ -10,7 +10,7 @@ Source: Barraco and Munteanu, Part 1, section 4 (virtual work).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
 
@@ -25,10 +25,11 @@ from ..mathematics.arrays import Array
 from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
+from .parts import Parts
 from .rotations import Rotations, Turn
 from .segments import Segments
 from .singles import turned_vector
-from .terms import GROUND, Group, Side, Term
+from .terms import GROUND, Group, One, Side, Term
 
 __all__ = [
     "AxisMoment",
@@ -41,7 +42,7 @@ __all__ = [
     "elements_of",
     "followed_elements",
     "inner_cut",
-    "load_groups",
+    "loads_of",
     "present",
     "spread_of",
 ]
@@ -142,7 +143,7 @@ class Moment(Term):
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Minus the moment in space."""
-        return [-m for m in ca.vertsplit(load)]
+        return [-m for m in ca.vertsplit(load)] if self.space else []
 
 
 @final
@@ -191,6 +192,11 @@ class AxisMoment(Turning):
         """The angle times minus the moment about the axis."""
         return -ca.dot(data[:3], load) * self.angle(q, data)
 
+    def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """Minus the moment across the axis, which the support takes."""
+        across = load - ca.dot(data[:3], load) * data[:3]
+        return [*ca.vertsplit(across), *ca.vertsplit(-across)]
+
 
 # -- of a scene -------------------------------------------------------------------------------------
 
@@ -214,63 +220,37 @@ def cut_of(mesh: Mesh, load: Load) -> int:
     return mesh.cut_at(str(load.member), load.at or 0.0)
 
 
-def load_groups(
-    scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations, tangent: Array
-) -> tuple[Group, ...]:
-    """The groups of the loads of a scene that are terms, each load by the name ``loads.NAME``.
-
-    Parameters
-    ----------
-    tangent : ndarray (elements, points, axes)
-        As of :class:`~sfetcas.mechanics.beams.Beams`.
+def loads_of(parts: Parts) -> Iterator[One]:
+    """The loads of a scene that are terms, each by the name ``loads.NAME``.
 
     Raises
     ------
     SceneError
         Nothing turns with the node that a load acts on.
     """
-    found: dict[Term, list[tuple[str, str, list[int], list[int], Array]]] = {}
-
-    def add(kind: Term, name: str, node: str, turns: list[int], places: list[int], data: Array | None = None) -> None:
-        found.setdefault(kind, []).append((name, node, turns, places, np.zeros(0) if data is None else data))
-
-    space = element.space
+    scene, rotations, space, nothing = parts.scene, parts.rotations, parts.element.space, np.zeros(0)
     for name, load in scene.loads.items():
         follows = load.frame == "follower" and (space or load.type != "moment")
         if load.type == "distributed" or not (follows or load.type == "moment"):
             continue
-        number = _rotation(scene, mesh, element, segments, rotations, name, load)
-        where = f"loads.{name}", load.node or ""
+        number, where = _rotation(parts, name, load), (f"loads.{name}", load.node or "")
         if load.type == "force":
-            add(Follower(space), *where, [number], [_place(mesh, segments, load)])
+            place = _place(parts.mesh, parts.segments, load)
+            yield One(Follower(space), *where, nothing, (number,), (place,))
         elif follows:
-            add(FollowingMoment(space), *where, [number], [])
+            yield One(FollowingMoment(space), *where, nothing, (number,))
         elif space and rotations.kind[number] == Turn.AXIS:
-            add(AxisMoment(space), *where, [GROUND, number], [], np.append(rotations.axis[number], 0.0))
+            axis = np.append(rotations.axis[number], 0.0)
+            yield One(AxisMoment(space), *where, axis, (GROUND, number))
         else:
-            add(Moment(space), *where, [number], [])
-    for e in followed_elements(scene, segments):
-        if element.gauss:
+            yield One(Moment(space), *where, nothing, (number,))
+    for e in followed_elements(scene, parts.segments):
+        if parts.element.gauss:
             raise SceneError("distributed followers need integration at the nodes, found Gauss integration")
-        part = segments.parts[segments.owner[e]]
-        turns, start = rotations.turns[e].tolist(), segments.place(part.start)
-        add(FollowingSpread(space, element.order + 1), f"element {e}", "", turns, [start], tangent[e].ravel())
-    # Generated code looks for moments in one run of numbers.
-    return tuple(_group(kind, found[kind]) for kind in sorted(found, key=lambda kind: kind.is_couple))
-
-
-def _group(kind: Term, ones: list[tuple[str, str, list[int], list[int], Array]]) -> Group:
-    names, nodes, turns, places, data = zip(*ones, strict=True)
-    n = len(ones)
-    return Group(
-        kind=kind,
-        turns=np.array(turns, dtype=np.intp).reshape(n, kind.sizes[0]),
-        places=np.array(places, dtype=np.intp).reshape(n, kind.sizes[1]),
-        data=np.array(data, dtype=float).reshape(n, kind.sizes[3]),
-        rows=(),
-        names=names,
-        nodes=nodes,
-    )
+        kind = FollowingSpread(space, parts.element.order + 1)
+        start = parts.segments.place(parts.segments.parts[parts.segments.owner[e]].start)
+        turns = tuple(rotations.turns[e].tolist())
+        yield One(kind, f"element {e}", "", parts.beams.tangent[e].ravel(), turns, (start,))
 
 
 def followed_elements(scene: Scene, segments: Segments) -> list[int]:
@@ -279,15 +259,13 @@ def followed_elements(scene: Scene, segments: Segments) -> list[int]:
     return sorted(part.elements.start for part in segments.parts if part.member in members)
 
 
-def _rotation(
-    scene: Scene, mesh: Mesh, element: Element, segments: Segments, rotations: Rotations, name: str, load: Load
-) -> int:
+def _rotation(parts: Parts, name: str, load: Load) -> int:
     """Rotation that a load acts on or turns with."""
     if load.node is not None:
-        return _turning_of(rotations, name, load.node)
-    parts = [part for part in segments.parts if part.member == load.member]
-    chain = rotations.chain(slice(parts[0].elements.start, parts[-1].elements.stop))
-    return int(chain[cut_of(mesh, load) * element.order])
+        return _turning_of(parts.rotations, name, load.node)
+    runs = [part.elements for part in parts.segments.parts if part.member == load.member]
+    chain = parts.rotations.chain(slice(runs[0].start, runs[-1].stop))
+    return int(chain[cut_of(parts.mesh, load) * parts.element.order])
 
 
 def _place(mesh: Mesh, segments: Segments, load: Load) -> int:
@@ -331,7 +309,7 @@ def present(model: Any, q: Array, loading: Any) -> Any:
     """
     if not loading.follows:
         return loading
-    found = {name: getattr(loading, name).copy() for name in ("force", "own", "spread", "moment", "couple", "jump")}
+    found = {name: getattr(loading, name).copy() for name in ("force", "own", "spread", "moment", "further", "couple", "jump")}
     along, loads = np.zeros_like(loading.spread), list(loading.loads)
     for i, (group, load) in enumerate(zip(model.connections, loading.loads, strict=True)):
         if not group.kind.follows:
@@ -345,7 +323,8 @@ def present(model: Any, q: Array, loading: Any) -> Any:
             for part in ("force", "own"):
                 np.add.at(found[part], group.places[:, 0], turned[:, 0])
         else:
-            np.add.at(found["moment"], group.turns[:, 0], turned[:, 0])
+            for part in ("moment", "further"):
+                np.add.at(found[part], group.turns[:, 0], turned[:, 0])
             _put(model, group, turned[:, 0], found)
     pull, on_places = carried(along, model.segments, model.element)
     found["spread"] += along

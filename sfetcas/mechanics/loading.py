@@ -25,6 +25,7 @@ from .elements import Element
 from .joints import Body, DrivenTurn
 from .load_terms import FollowingSpread, carried, cut_of, followed_elements, inner_cut
 from .mesh import Mesh
+from .parts import Parts
 from .rotations import Rotations
 from .segments import Segments
 from .terms import Group, Term
@@ -44,6 +45,8 @@ class Loading:
         The share of ``force`` that acts on the places themselves.
     moment : ndarray (rotations, 3)
         Moments on rotations, about the fixed axes.
+    further : ndarray (rotations, 3)
+        The share of ``moment`` that is in no term: of what follows as it is at a state, and of inertia.
     jump : ndarray (elements, 3)
         The share of ``moment`` that acts at the start of an element, within a member.
     couple : ndarray (places, 3)
@@ -65,6 +68,7 @@ class Loading:
     force: Array
     own: Array
     moment: Array
+    further: Array
     jump: Array
     couple: Array
     pull: Array
@@ -117,6 +121,7 @@ LOADS = (
     "force",
     "own",
     "moment",
+    "further",
     "jump",
     "couple",
     "pull",
@@ -146,6 +151,7 @@ class _Writer:
             force=np.zeros((places, self.element.axes)),
             own=np.zeros((places, self.element.axes)),
             moment=np.zeros((turns, 3)),
+            further=np.zeros((turns, 3)),
             jump=np.zeros((len(self.beams.weight), 3)),
             couple=np.zeros((places, 3)),
             pull=np.zeros(along),
@@ -343,16 +349,7 @@ class _Writer:
         return np.asarray(motion.rotation * axis / np.linalg.norm(axis))
 
 
-def unit_loadings(
-    scene: Scene,
-    mesh: Mesh,
-    element: Element,
-    scales: Scales,
-    segments: Segments,
-    rotations: Rotations,
-    beams: Beams,
-    connections: tuple[Group, ...],
-) -> dict[str | None, Loading]:
+def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | None, Loading]:
     """Loadings of factor 1, by the history that multiplies them; None is the load factor itself.
 
     Raises
@@ -360,7 +357,7 @@ def unit_loadings(
     SceneError
         A moment on a node that nothing turns with.
     """
-    writer = _Writer(scene, mesh, element, scales, segments, rotations, beams, connections)
+    scene, writer = parts.scene, _Writer(connections=connections, **vars(parts))
     groups: dict[str | None, Loading] = {None: writer.empty()}
     for name, load in scene.loads.items():
         writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)
@@ -371,4 +368,7 @@ def unit_loadings(
             writer.add_mass(groups[None], node)
     for name, motion in scene.motions.items():
         writer.add_motion(groups.setdefault(motion.history, writer.empty()), name, motion)
+    for i, terms in enumerate(connections):
+        for history, more in terms.loads.items():
+            groups.setdefault(history, writer.empty()).loads[i][:] += more
     return groups

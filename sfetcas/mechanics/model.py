@@ -8,7 +8,7 @@ scene.  A model holds only what its scene requires; :attr:`Model.blocks` says wh
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,20 +20,25 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from .beams import Beams, Scales, beams_of, scales_of
-from .connections import connect
+from .connections import connections_of, touches_of
 from .elements import Element, element_by_name
-from .load_terms import load_groups
+from .load_terms import loads_of
 from .loading import Loading, unit_loadings
 from .mesh import Mesh
+from .parts import Parts
 from .positions import Positions, entries, place_nodes
 from .pressure import is_pressure
 from .rotations import Rotations, Turn, number_rotations
 from .segments import Segments, cut_members
 from .spinning import Spinning, with_spinning
-from .terms import Group
+from .terms import Group, One, grouped
 from .winding import Winding, winding_of
 
-__all__ = ["Block", "Model", "assemble"]
+__all__ = ["SOURCES", "Block", "Model", "assemble"]
+
+
+SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_of, touches_of, loads_of]
+"""Where the terms beside the elements come from; a further kind of energy is one more source."""
 
 
 @dataclass(frozen=True)
@@ -223,8 +228,8 @@ class Model:
         """What one motion prescribes, without its factor."""
         motions = {name: self.scene.motions[name]}
         scene = self.scene.model_copy(update={"motions": motions, "loads": {}, "gravity": None})
-        parts = self.mesh, self.element, self.scales, self.segments, self.rotations, self.beams
-        return unit_loadings(scene, *parts, self.connections)[motions[name].history]
+        parts = Parts(scene, self.mesh, self.element, self.scales, self.beams, self.segments, self.rotations)
+        return unit_loadings(parts, self.connections)[motions[name].history].unloaded()
 
     def held(self, loading: Loading) -> Array:
         """Rotations with the held ones at their prescribed values and all others at rest, (rotations, comps)."""
@@ -279,8 +284,8 @@ def assemble(
             closing, nodal = (entries(both[name], segments, mesh) for name in ("closing", "nodal"))
             assembly = "closing" if closing <= nodal else "nodal"
         positions = both[assembly]
-    connections = connect(scene, mesh, segments, rotations, element, scales)
-    connections += load_groups(scene, mesh, element, segments, rotations, beams.tangent)
+    parts = Parts(scene, mesh, element, scales, beams, segments, rotations)
+    connections = grouped(one for source in SOURCES for one in source(parts))
     model = Model(
         scene=scene,
         mesh=mesh,
@@ -292,7 +297,7 @@ def assemble(
         rotations=rotations,
         positions=positions,
         connections=connections,
-        groups=unit_loadings(scene, mesh, element, scales, segments, rotations, beams, connections),
+        groups=unit_loadings(parts, connections),
     )
     return model if scene.rotating is None else with_spinning(model)
 

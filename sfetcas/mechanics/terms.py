@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import abc
 import functools
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 import casadi as ca
@@ -30,12 +31,14 @@ __all__ = [
     "ARGUMENTS",
     "GROUND",
     "Group",
+    "One",
     "Side",
     "Term",
     "by_turning",
     "curvatures_of",
     "energies_of",
     "forces_by_turning",
+    "grouped",
     "name_of",
     "rows_of",
     "slopes_of",
@@ -91,7 +94,10 @@ class Term(Components, abc.ABC):
         return []
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Generalised forces without potential, as a residual: moments on the rotations, then forces on the places."""
+        """Generalised forces beside those of the energy, as a residual: moments on rotations, then forces on places.
+
+        What has a potential has none, or such as do no work on anything that its sides may do.
+        """
         return []
 
     # -- what the sides say to each other --------------------------------------------------------
@@ -143,6 +149,36 @@ class Term(Components, abc.ABC):
         return _curvatures(self)
 
 
+@dataclass(frozen=True)
+class One:
+    """One term before it is put to those of its kind.
+
+    Attributes
+    ----------
+    kind : Term
+    name : str
+        What it is: a spring, a member, a motion, a load, or a joint.
+    node : str
+        The node at which it is; empty where there is none.
+    data : ndarray
+    turns, places : tuple of int
+        Numbers of its sides.
+    row : str
+        Name of its rows.
+    loads : mapping of str or None to ndarray
+        What grows with a history, or with the load factor (None), at the factor 1, beside the loads of the scene.
+    """
+
+    kind: Term
+    name: str
+    node: str
+    data: Array
+    turns: tuple[int, ...] = ()
+    places: tuple[int, ...] = ()
+    row: str = ""
+    loads: Mapping[str | None, Array] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """All terms of one kind: where they act, and their data.
@@ -159,6 +195,8 @@ class Group:
         What each term is: a spring, a member, a motion, a load, or a joint.
     nodes : tuple of str
         The node at which it is; of a small member its first.
+    loads : mapping of str or None to ndarray (n, loads)
+        What grows with a history, or with the load factor (None), at the factor 1, beside the loads of the scene.
     """
 
     kind: Term
@@ -168,6 +206,33 @@ class Group:
     rows: tuple[str, ...]
     names: tuple[str, ...]
     nodes: tuple[str, ...]
+    loads: Mapping[str | None, Array] = field(default_factory=dict)
+
+
+def grouped(ones: Iterable[One]) -> tuple[Group, ...]:
+    """Terms by their kinds, in the order in which these come first; moments, which C looks for in one run, last."""
+    found: dict[Term, list[One]] = {}
+    for one in ones:
+        found.setdefault(one.kind, []).append(one)
+    return tuple(_group(kind, found[kind]) for kind in sorted(found, key=lambda kind: kind.is_couple))
+
+
+def _group(kind: Term, ones: list[One]) -> Group:
+    turns, places, rows, data, loads = kind.sizes
+    n, histories = len(ones), dict.fromkeys(history for one in ones for history in one.loads)
+    nothing = np.zeros(loads)
+    return Group(
+        kind=kind,
+        turns=np.array([one.turns for one in ones], dtype=np.intp).reshape(n, turns),
+        places=np.array([one.places for one in ones], dtype=np.intp).reshape(n, places),
+        data=np.array([one.data for one in ones], dtype=float).reshape(n, data),
+        rows=tuple(
+            f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
+        ),
+        names=tuple(one.name for one in ones),
+        nodes=tuple(one.node for one in ones),
+        loads={history: np.array([one.loads.get(history, nothing) for one in ones]) for history in histories},
+    )
 
 
 def name_of(kind: Term) -> str:
@@ -236,7 +301,7 @@ def _by_turning(kind: Term) -> ca.Function:
     basis = ca.diagcat(*spin, ca.SX.eye(u.numel()))
     stiffness = ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * ca.diag(radial)
     gradient = ca.mtimes(basis.T, gradient)
-    if not kind.has_potential:
+    if forces.numel():
         gradient += forces
         stiffness += ca.mtimes(ca.jacobian(forces, x), basis) + _halves(forces, q.shape[1], kind.space)
     results = [
