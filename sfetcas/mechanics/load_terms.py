@@ -309,7 +309,10 @@ def present(model: Any, q: Array, loading: Any) -> Any:
     """
     if not loading.follows:
         return loading
-    found = {name: getattr(loading, name).copy() for name in ("force", "own", "spread", "moment", "further", "couple", "jump")}
+    found = {
+        name: getattr(loading, name).copy()
+        for name in ("force", "own", "spread", "moment", "further", "couple", "jump")
+    }
     along, loads = np.zeros_like(loading.spread), list(loading.loads)
     for i, (group, load) in enumerate(zip(model.connections, loading.loads, strict=True)):
         if not group.kind.follows:
