@@ -1,7 +1,6 @@
 """Quaternions against rotation matrices, Rodrigues' formula and the matrices G of the source."""
 
 import numpy as np
-import pytest
 
 from sfetcas.mathematics import quaternion as quat
 
@@ -72,10 +71,3 @@ def test_small_and_large_rotation_vectors():
     np.testing.assert_allclose(quat.from_rotation_vector([0, 0, 2 * np.pi]), [-1, 0, 0, 0], atol=ROUNDING)
     field = quat.from_rotation_vector(np.linspace(0, 20, 400)[:, None] * np.array([0.6, 0.0, 0.8]))
     assert np.linalg.norm(np.diff(field, axis=0), axis=1).max() < 0.5 * 20 / 399 * 1.001
-
-
-@pytest.mark.parametrize("angle", [-6.0, -3.0, -0.1, 0.0, 2.0, 3.2, 6.2])
-def test_angle_about_reads_the_angle_back(angle):
-    axis = np.array([2.0, -1.0, 2.0]) / 3.0
-    q = quat.from_rotation_vector(angle * axis)
-    assert quat.angle_about(q, axis) == pytest.approx(angle, abs=1e-14)

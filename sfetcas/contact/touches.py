@@ -217,16 +217,6 @@ class Touched:
         """Force of a touch along the normal, N: below zero the obstacle would have to pull."""
         return float(self.force(touch) @ self.normal(touch, touch.at))
 
-    def end_pushes(self, touch: Touch) -> list[float]:
-        """Concentrated forces at the inner ends of a stretch along the normals there, N."""
-        found = []
-        for at, way in ((touch.at, -1.0), (float(touch.to or 0.0), 1.0)):
-            if 0.0 < at < 1.0:
-                inside = self.fields.along(touch.member, np.array([at]))["force"][0]
-                jump = way * (inside - self._beside(touch, at, way))
-                found.append(float(jump @ self.normal(touch, at)))
-        return found
-
     def pressures(self, touch: Touch, x: Array) -> Array:
         """Forces (n - 1,) of an obstacle between places of a stretch along the normals in their middles, N."""
         forces = self.fields.along(touch.member, x)["force"]

@@ -20,7 +20,6 @@ from .arrays import Array
 
 __all__ = [
     "Components",
-    "angle_about",
     "conjugate",
     "from_rotation_vector",
     "matrix",
@@ -111,9 +110,3 @@ def from_rotation_vector(phi: ArrayLike) -> Array:
     phi = np.asarray(phi, dtype=float)
     half = 0.5 * np.linalg.norm(phi, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * phi * np.sinc(half / np.pi)], axis=-1)
-
-
-def angle_about(q: ArrayLike, axis: ArrayLike) -> Array:
-    """Angle in (-2 pi, 2 pi] of the part of ``q`` that turns about the unit vector ``axis``."""
-    q = np.asarray(q, dtype=float)
-    return np.asarray(2.0 * np.arctan2(q[..., 1:] @ np.asarray(axis, dtype=float), q[..., 0]))

@@ -73,7 +73,7 @@ class Balance:
 
     # -- shares of connections ------------------------------------------------------------------
 
-    def _moment_of(self, group: Group, links: Array, number: int, side: int) -> Array:
+    def _moment_of(self, links: Array, number: int, side: int) -> Array:
         moment = np.zeros(3)
         moment[3 - self._turns :] = links[number, side * self._turns : (side + 1) * self._turns]
         return moment
@@ -93,7 +93,7 @@ class Balance:
             for side in range(group.turns.shape[1]):
                 for number, turn in enumerate(group.turns[:, side]):
                     if turn != GROUND and not self._is_ground(group, number):
-                        totals[turn] += self._moment_of(group, links, number, side)
+                        totals[turn] += self._moment_of(links, number, side)
         return totals
 
     @staticmethod
@@ -252,7 +252,7 @@ class Balance:
             for number, side in np.argwhere(group.turns != GROUND):
                 mine = isinstance(group.kind, ONE_SIDED) if turn is None else group.turns[number, side] == turn
                 if mine and group.nodes[number] == node:
-                    moment = moment + self._moment_of(group, links, number, side)
+                    moment = moment + self._moment_of(links, number, side)
         return moment
 
     def spring_moment(self, node: str) -> Array:
@@ -346,7 +346,7 @@ class Balance:
             if isinstance(group.kind, Body) and member in group.names:
                 i = group.names.index(member)
                 sides = range(group.kind.nodes)
-                return [(self._force_of(group, links, i, k), self._moment_of(group, links, i, k)) for k in sides]
+                return [(self._force_of(group, links, i, k), self._moment_of(links, i, k)) for k in sides]
         raise KeyError(member)
 
 

@@ -23,7 +23,6 @@ from ..dynamics.methods import RADAU
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index
 from ..mathematics.interpolation import differentiation, integration
-from ..mathematics.kernels import Kernels
 from ..mathematics.pieces import Pieces, Unknown
 from ..mathematics.relations import Relation
 from .controlled import ControlledSystem
@@ -69,16 +68,13 @@ class Transcription:
     statement : Statement
     system : ControlledSystem
     guess : Course
-    kernels : str
     """
 
-    def __init__(
-        self, statement: Statement, system: ControlledSystem, guess: Course, kernels: Kernels = "auto"
-    ) -> None:
+    def __init__(self, statement: Statement, system: ControlledSystem, guess: Course) -> None:
         self.statement, self.system, self.guess = statement, system, guess
         self.places = RADAU[statement.stages]
         self.intervals, self.stages = len(statement.shares), statement.stages
-        self.pieces = Pieces(kernels)
+        self.pieces = Pieces()
         self._lifted: dict[str, Unknown] = {}
         self.resting: dict[str, Unknown] = {}
         self._unknowns()
