@@ -18,7 +18,7 @@ import numpy as np
 
 from ..description.obstacles import Obstacle, members_of, nearest, obstacle, takes_part
 from ..description.scene import Scene
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
@@ -369,7 +369,7 @@ class Touched:
         stop = self.obstacles[touch.contact]
         out = self.fields.positions(touch.member, np.array([touch.at]))[0] - stop.place
         if stop.side is not None:
-            out = out + touch.offset * stop.side / np.linalg.norm(stop.side)
+            out = out + touch.offset * unit(stop.side)
         return np.asarray(out @ stop.across / self.model.scales.length)
 
     def _moment_jumps(self, touch: Touch) -> list[float]:

@@ -64,7 +64,7 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     equations.solver.factor(entries)
 
     def apply(block: Array) -> Array:
-        return np.asarray(equations.solver.solve(-np.column_stack([change @ column for column in block.T])))
+        return np.asarray(equations.solver.solve(-(change @ block)))
 
     inverse, _ = largest(apply, equations.total, BESIDE * count)
     sizes = np.abs(inverse)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
 from .integrating import Taken
 
@@ -153,8 +153,7 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
 def _turned(q: Array, turn: Array) -> Array:
     if q.shape[1] == 1:
         return q + turn
-    moved = quaternion.multiply(quaternion.from_rotation_vector(turn), q)
-    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+    return unit(quaternion.multiply(quaternion.from_rotation_vector(turn), q))
 
 
 def _from(q: Array, there: Array) -> Array:

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.constants import sparse, times
-from ..mathematics.linear import pattern
+from ..mathematics.linear import pattern, places_of
 from ..mechanics.entries import Entries, Pattern
 from ..mechanics.expressions import Given, moved_by
 from ..mechanics.joints import by_turning
@@ -153,7 +153,7 @@ class Places(StationarityPlaces):
         coupled.add(own[:, :, None], at[:, None, :])
         coupled.add(at[:, None, :], own[:, :, None])
         for matrix in (system.place_mass, system.place_drag):
-            row, column = (np.array(part, dtype=np.intp) for part in matrix.sparsity().get_triplet())
+            row, column = places_of(matrix.sparsity())
             coupled.add(system.of_places + row, system.of_places + column)
         if system.crossing is None:
             return

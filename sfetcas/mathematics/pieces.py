@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from .arrays import Array, Index
 from .constants import sparse, times
 from .kernels import Kernels, chosen
+from .linear import places_of
 from .nlp import NLP
 
 __all__ = ["Pieces", "Unknown"]
@@ -427,8 +428,7 @@ class _Derived:
     @functools.cached_property
     def pattern(self) -> tuple[Index, Index]:
         """Rows and columns of the first derivatives that are not zero."""
-        row, column = self._jacobian.sparsity().get_triplet()
-        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
+        return places_of(self._jacobian.sparsity())
 
     @functools.cached_property
     def _first(self) -> ca.Function:
@@ -449,8 +449,7 @@ class _Derived:
     @functools.cached_property
     def bends(self) -> tuple[Index, Index]:
         """Rows and columns of the second derivatives that are not zero, upper triangle."""
-        row, column = self._second[1].sparsity().get_triplet()
-        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
+        return places_of(self._second[1].sparsity())
 
     @functools.cached_property
     def _bend(self) -> ca.Function:

@@ -21,6 +21,7 @@ from .arrays import Array
 __all__ = [
     "Components",
     "conjugate",
+    "cross_matrix",
     "from_rotation_vector",
     "matrix",
     "multiply",
@@ -110,3 +111,8 @@ def from_rotation_vector(phi: ArrayLike) -> Array:
     phi = np.asarray(phi, dtype=float)
     half = 0.5 * np.linalg.norm(phi, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * phi * np.sinc(half / np.pi)], axis=-1)
+
+
+def cross_matrix(v: ArrayLike) -> Array:
+    """Matrices (..., 3, 3) of the cross product ``v x`` with vectors (..., 3)."""
+    return np.cross(np.eye(3), np.asarray(v, dtype=float)[..., None, :])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mathematics.linear import SparseMap, smallest
 from .connections import GROUND, Group
 from .equations import Equations, State
@@ -127,7 +127,7 @@ class Balance:
         if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
             return None
         along = np.asarray(record.direction, dtype=float)
-        return np.asarray(along / np.linalg.norm(along))
+        return unit(along)
 
     def _moment(self, node: str) -> Array:
         number = self.model.rotations.node_turn[node]
@@ -199,11 +199,11 @@ class Balance:
                     balances.append(self._at_pin(columns, name, i))
         rows = [({3 * i + k: gain for i, gain in row.items()}, right[k]) for row, right in balances for k in range(3)]
         for n, (row, right) in hinged:
-            along = np.asarray(scene.nodes[n].axis) / np.linalg.norm(scene.nodes[n].axis)
+            along = unit(scene.nodes[n].axis)
             rows.append(({3 * i + k: gain * along[k] for i, gain in row.items() for k in range(3)}, right @ along))
         for n in filter(self._turns_freely, held):
             first, axis = 3 * columns["node", n], np.asarray(scene.nodes[n].turn_axis)
-            rows.append(({first + k: part for k, part in enumerate(axis / np.linalg.norm(axis))}, 0.0))
+            rows.append(({first + k: part for k, part in enumerate(unit(axis))}, 0.0))
         weights = np.repeat([INSIDE, 1.0], [3 * len(names), 3 * len(held)])
         solved = _smallest(rows, weights).reshape(-1, 3)
         starts = {name: solved[i] for (kind, name), i in columns.items() if kind == "member"}

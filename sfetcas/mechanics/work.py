@@ -18,18 +18,11 @@ import numpy as np
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
+from ..mathematics.quaternion import cross_matrix
 from .loading import Loading, carried
 from .model import Model
 
 __all__ = ["Work"]
-
-
-def _cross_matrix(v: Array) -> Array:
-    """Matrices of ``v x``, (..., 3, 3)."""
-    zero = np.zeros(v.shape[:-1])
-    x, y, z = (v[..., i] for i in range(3))
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 class Work:
@@ -125,7 +118,7 @@ class Work:
     def _derivative(self, forces: Array) -> Array:
         """Minus the derivative of turned vectors by the rotation, (..., axes, turns)."""
         if self._model.space:
-            return _cross_matrix(forces)
+            return cross_matrix(forces)
         return np.stack([forces[..., 1], -forces[..., 0]], axis=-1)[..., None]
 
     def _on_bases(self, matrices: Array, turns: Index) -> Array:
@@ -148,7 +141,7 @@ class Work:
         turned = self._turned(state_q[model.rotations.turns[elements]], model.beams.tangent[elements])
         arms = turned / element.weights[:, None]
         if model.space:
-            moments = np.einsum("ij,ejab,eibc->ejaic", element.to_points, _cross_matrix(arms), change)
+            moments = np.einsum("ij,ejab,eibc->ejaic", element.to_points, cross_matrix(arms), change)
         else:
             crossed = np.stack([-arms[..., 1], arms[..., 0]], axis=-1)
             moments = np.einsum("ij,ejb,eibc->ejic", element.to_points, crossed, change)
@@ -164,7 +157,7 @@ class Work:
         return result
 
     def _of_moments(self, state_q: Array, loading: Loading) -> Array:
-        halves = 0.5 * (_cross_matrix(self._turned(state_q, loading.twist)) - _cross_matrix(loading.moment))
+        halves = 0.5 * (cross_matrix(self._turned(state_q, loading.twist)) - cross_matrix(loading.moment))
         for turn, basis in self._basis.items():
             halves[turn] = basis.T @ halves[turn] @ basis
         return halves
