@@ -71,3 +71,18 @@ def test_small_and_large_rotation_vectors():
     np.testing.assert_allclose(quat.from_rotation_vector([0, 0, 2 * np.pi]), [-1, 0, 0, 0], atol=ROUNDING)
     field = quat.from_rotation_vector(np.linspace(0, 20, 400)[:, None] * np.array([0.6, 0.0, 0.8]))
     assert np.linalg.norm(np.diff(field, axis=0), axis=1).max() < 0.5 * 20 / 399 * 1.001
+
+
+def test_rotation_vectors_are_read_back():
+    rng = np.random.default_rng(5)
+    phi = rng.normal(size=(40, 3))
+    phi *= rng.uniform(0.0, 3.1, 40)[:, None] / np.linalg.norm(phi, axis=1, keepdims=True)
+    phi[:3] *= [[0.0], [1e-9], [1e-200]]
+    q = quat.from_rotation_vector(phi)
+    for sign in (1.0, -1.0):
+        np.testing.assert_allclose(quat.rotation_vector(sign * q), phi, rtol=1e-14, atol=4 * ROUNDING)
+
+
+def test_cross_matrices_multiply_as_cross_products():
+    v, w = np.random.default_rng(6).normal(size=(2, 5, 3))
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", quat.cross_matrix(v), w), np.cross(v, w), atol=4 * ROUNDING)

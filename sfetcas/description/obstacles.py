@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import SceneError
-from ..mathematics.arrays import Array, unit
+from ..mathematics.arrays import TINY, Array, unit
 from .contacts import Contact
 from .loads import Motion
 from .structure import Node
@@ -76,9 +76,9 @@ class Obstacle:
             return np.broadcast_to(self.normal, points.shape)
         if self.kind == "round":
             out = (points - self.place) @ self.across
-            return self.sign * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
+            return self.sign * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), TINY)
         normals = way * np.cross(self.normal, tangents)
-        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY))
 
     def curvature(self, point: Array, tangent: Array) -> float:
         """Signed curvature of the section of the obstacle in the plane, 1/m: counter-clockwise along the tangent."""

@@ -157,11 +157,7 @@ def _turned(q: Array, turn: Array) -> Array:
 
 
 def _from(q: Array, there: Array) -> Array:
-    """Rotation vectors (rotations, turns) from rotations to others, shorter than a turn."""
+    """Rotation vectors (rotations, turns) from rotations to others."""
     if q.shape[1] == 1:
         return there - q
-    r = quaternion.multiply(there, quaternion.conjugate(q))
-    r = np.where(r[:, :1] < 0.0, -r, r)
-    sine = np.linalg.norm(r[:, 1:], axis=1, keepdims=True)
-    share = np.where(sine < 1e-8, 2.0, 2.0 * np.arctan2(sine, r[:, :1]) / np.maximum(sine, 1e-300))
-    return np.asarray(share * r[:, 1:])
+    return quaternion.rotation_vector(quaternion.multiply(there, quaternion.conjugate(q)))

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.constants import sparse
 from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap, SparseSolver, places_of
@@ -79,9 +79,6 @@ MOST_FREE = 40
 
 SAME = 1e-6
 """Shapes of zero exponents that differ by a smaller share, squared, are the same motion."""
-
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Array", "Index", "first_of_largest", "fixed", "unit"]
+__all__ = ["TINY", "Array", "Index", "first_of_largest", "fixed", "unit"]
 
 Array = np.ndarray[Any, np.dtype[Any]]
 """An array of numbers."""
 
 Index = np.ndarray[Any, np.dtype[np.intp]]
 """An array of places in another one."""
+
+TINY = 1e-300
+"""Keeps zero from being divided by; no number that means anything is smaller."""
 
 
 def first_of_largest(values: Array, alike: float = 1e-6) -> int:

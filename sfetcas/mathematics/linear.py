@@ -12,7 +12,7 @@ import io
 import casadi as ca
 import numpy as np
 
-from .arrays import Array, Index
+from .arrays import TINY, Array, Index
 from .keeping import kept
 from .kernels import Batch
 
@@ -269,9 +269,6 @@ ROUNDING = 1e-16
 
 SOLVED = 1e-13
 """The same that is taken for a solution."""
-
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
 
 
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:

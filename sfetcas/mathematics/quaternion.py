@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array
+from .arrays import TINY, Array
 
 __all__ = [
     "Components",
@@ -27,6 +27,7 @@ __all__ = [
     "multiply",
     "product",
     "rotate",
+    "rotation_vector",
     "turned",
 ]
 
@@ -116,3 +117,11 @@ def from_rotation_vector(phi: ArrayLike) -> Array:
 def cross_matrix(v: ArrayLike) -> Array:
     """Matrices (..., 3, 3) of the cross product ``v x`` with vectors (..., 3)."""
     return np.cross(np.eye(3), np.asarray(v, dtype=float)[..., None, :])
+
+
+def rotation_vector(q: ArrayLike) -> Array:
+    """Rotation vectors (..., 3) in rad, of half a turn at most, of unit quaternions (..., 4)."""
+    q = np.asarray(q, dtype=float)
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    return np.asarray(q[..., 1:] * (2.0 * np.arctan2(sine, q[..., :1]) / np.maximum(sine, TINY)))

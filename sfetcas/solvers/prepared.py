@@ -366,6 +366,5 @@ class Prepared:
         """Largest angle between the rotations of two states, rad."""
         if not self.model.space:
             return float(np.abs(a.q - b.q).max(initial=0.0))
-        relative = quaternion.multiply(quaternion.conjugate(a.q), b.q)
-        sine = np.linalg.norm(relative[:, 1:], axis=-1)
-        return float(2.0 * np.arctan2(sine, np.abs(relative[:, 0])).max(initial=0.0))
+        turns = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(a.q), b.q))
+        return float(np.linalg.norm(turns, axis=-1).max(initial=0.0))
