@@ -12,7 +12,7 @@ from sfetcas import SceneError
 from sfetcas.description.matrices import rigid_motions
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics.bodies import body_of, own_axes, quadrature, shapes_along
-from sfetcas.mechanics.body_masses import body_mass, mass_of
+from sfetcas.mechanics.body_masses import body_mass
 from sfetcas.mechanics.body_points import points_of
 from sfetcas.mechanics.connections import freedoms
 from sfetcas.mechanics.masses import masses_of
@@ -23,6 +23,12 @@ THICK = UNLIKE | {"rhoI": [0.02, 0.015, 0.005]}
 TAPERED = THICK | {"rhoA": {"at": [0, 1], "value": [0.3, 0.9]}, "EI2": {"at": [0, 1], "value": [1, 5]}}
 ROUNDING = 1e-11
 """Of the largest: compliances are inverted, which costs four of the sixteen digits."""
+
+
+def mass_of(scene, name):
+    """Mass matrix of a small member in the fixed axes of the undeformed scene, zero without mass."""
+    found = body_mass(scene, name)
+    return np.zeros((6 * len(scene.members[name].nodes),) * 2) if found is None else found.matrix
 
 
 def body(**member):

@@ -216,13 +216,23 @@ CASES = {
 every = pytest.mark.parametrize("name", CASES)
 
 
+def end_pushes(touched, touch):
+    """Concentrated forces at the inner ends of a stretch along the normals there."""
+    found = []
+    for at, way in ((touch.at, -1.0), (touch.to, 1.0)):
+        if 0.0 < at < 1.0:
+            inside = touched.fields.along(touch.member, np.array([at]))["force"][0]
+            found.append(way * (inside - touched._beside(touch, at, way)) @ touched.normal(touch, at))
+    return found
+
+
 def pushes(step):
     """Forces of all touches along the normals."""
     touched = Touched.of(step.fields)
     found = [touched.push(t) for t in step.model.mesh.touches if t.to is None]
     for touch in step.model.mesh.touches:
         if touch.to is not None:
-            found += touched.end_pushes(touch)
+            found += end_pushes(touched, touch)
     return np.array(found)
 
 

@@ -104,10 +104,8 @@ def test_other_constants_and_guesses_need_no_other_program():
     solve = Ipopt().prepare(nlp)
     np.testing.assert_allclose(solve().x, [2.0, 3.0], atol=1e-8)
     pieces.set_constants("cube", np.array([[-64.0], [125.0]]))
-    pieces.set_guess("x", [-3.0, 4.0])
-    np.testing.assert_array_equal(pieces.guess, [-3.0, 4.0])
     # The tolerance of IPOPT.
-    np.testing.assert_allclose(solve(p=pieces.constants(), guess=pieces.guess).x, [-4.0, 5.0], atol=1e-8)
+    np.testing.assert_allclose(solve(p=pieces.constants(), guess=np.array([-3.0, 4.0])).x, [-4.0, 5.0], atol=1e-8)
     shifted = solve(lower=nlp.lower + 12.0, upper=nlp.upper + 12.0)
     np.testing.assert_allclose(shifted.x, np.cbrt([20.0, 39.0]), atol=1e-8)
 

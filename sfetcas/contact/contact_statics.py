@@ -12,7 +12,7 @@ from ..description.obstacles import members_of, nearest
 from ..description.scene import Scene
 from ..description.supports import along
 from ..errors import SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mechanics.accuracy import halving, roughness
 from ..mechanics.balance import three
 from ..mechanics.equations import State
@@ -280,7 +280,7 @@ class ContactRun:
         normals = np.array([stop.normals(np.zeros((1, 3)), np.zeros((1, 3)))[0][:axes] for stop in stops.values()])
         _, sizes, ways = np.linalg.svd(free @ normals.T @ normals @ free.T)
         for way in ways[sizes < PARALLEL]:
-            direction = way @ free / np.linalg.norm(way @ free)
+            direction = unit(way @ free)
             detail = f"nothing holds it along {along(direction)}, not the frictionless {', '.join(self.named(None))}"
             raise SolveError(Status.FAILED, detail)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..description.obstacles import Obstacle, members_of, swept
 from ..description.scene import Scene
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from .settling import Held
 from .touches import Touched
 
@@ -99,7 +99,7 @@ class Passing:
         """
         one, other, there = (self.course(held.touched).tangents for held in (first, before, after))
         on = {name: other[name] + share * (other[name] - one[name]) for name in other}
-        unit = {name: t / np.maximum(np.linalg.norm(t, axis=1, keepdims=True), 1e-300) for name, t in on.items()}
+        unit = {name: t / np.maximum(np.linalg.norm(t, axis=1, keepdims=True), TINY) for name, t in on.items()}
         return Course({}, unit).turned(Course({}, there))
 
     def turned(self, before: Held, after: Held) -> float:
@@ -177,6 +177,6 @@ def _closest(stop: Obstacle, begin: Array, chords: Array) -> Array:
     if stop.kind == "flat" or stop.sign < 0.0:
         return np.asarray(ends)
     out, along = (begin - stop.place) @ stop.across, chords @ stop.across
-    share = -np.einsum("ni,ni->n", out, along) / np.maximum(np.einsum("ni,ni->n", along, along), 1e-300)
+    share = -np.einsum("ni,ni->n", out, along) / np.maximum(np.einsum("ni,ni->n", along, along), TINY)
     nearest = begin + np.clip(share, 0.0, 1.0)[:, None] * chords
     return np.minimum(ends, stop.gaps(nearest, nothing))

@@ -10,7 +10,7 @@ import numpy as np
 from ..description.obstacles import members_of, obstacle, takes_part
 from ..description.scene import Scene
 from ..errors import SolveError, Status
-from ..mathematics.arrays import first_of_largest
+from ..mathematics.arrays import TINY, first_of_largest
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import SAME, Touch
 from ..mechanics.model import Model
@@ -265,7 +265,7 @@ class Reviser:
         push = max((held.touched.push(t) for t in held.mesh.touches if t.to is None), default=0.0) / scales.force
         stiff = held.touched.fields.stiffness(touch.member, touch.at)
         length = self.scene.center_lines[touch.member].length / scales.length
-        reach = float(np.clip(-bent * stiff / max(push, 1e-300) / length, 1e-5, 0.1))
+        reach = float(np.clip(-bent * stiff / max(push, TINY) / length, 1e-5, 0.1))
         low, high = max(0.0, touch.at - reach), min(1.0, touch.at + reach)
         return replace(touch, at=low, to=high, way=self._bend(held, touch))
 

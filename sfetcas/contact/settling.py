@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..description.scene import Scene
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
@@ -286,7 +286,7 @@ class Settler:
                 return ran
             change = there.touched.conditions - here
             taken = _places(there.mesh.touches, free) - _places(held.mesh.touches, free)
-            slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), 1e-300)
+            slopes = slopes + np.outer(change - slopes @ taken, taken) / max(float(taken @ taken), TINY)
             now = float(np.abs(there.touched.conditions).max())
             if now > 0.5 * last:
                 slopes = None

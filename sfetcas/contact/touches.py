@@ -18,7 +18,7 @@ import numpy as np
 
 from ..description.obstacles import Obstacle, members_of, nearest, obstacle, takes_part
 from ..description.scene import Scene
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
@@ -217,16 +217,6 @@ class Touched:
         """Force of a touch along the normal, N: below zero the obstacle would have to pull."""
         return float(self.force(touch) @ self.normal(touch, touch.at))
 
-    def end_pushes(self, touch: Touch) -> list[float]:
-        """Concentrated forces at the inner ends of a stretch along the normals there, N."""
-        found = []
-        for at, way in ((touch.at, -1.0), (float(touch.to or 0.0), 1.0)):
-            if 0.0 < at < 1.0:
-                inside = self.fields.along(touch.member, np.array([at]))["force"][0]
-                jump = way * (inside - self._beside(touch, at, way))
-                found.append(float(jump @ self.normal(touch, at)))
-        return found
-
     def pressures(self, touch: Touch, x: Array) -> Array:
         """Forces (n - 1,) of an obstacle between places of a stretch along the normals in their middles, N."""
         forces = self.fields.along(touch.member, x)["force"]
@@ -379,7 +369,7 @@ class Touched:
         stop = self.obstacles[touch.contact]
         out = self.fields.positions(touch.member, np.array([touch.at]))[0] - stop.place
         if stop.side is not None:
-            out = out + touch.offset * stop.side / np.linalg.norm(stop.side)
+            out = out + touch.offset * unit(stop.side)
         return np.asarray(out @ stop.across / self.model.scales.length)
 
     def _moment_jumps(self, touch: Touch) -> list[float]:

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array, unit
 from .contacts import Contact
 from .loads import Motion
 from .structure import Node
@@ -66,7 +66,7 @@ class Obstacle:
             return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius) + offset
         normals = self.normals(points, tangents, way)
         if self.side is not None:
-            points = points + offset * self.side / np.linalg.norm(self.side)
+            points = points + offset * unit(self.side)
             return np.einsum("ni,ni->n", points - self.place, normals)
         return np.einsum("ni,ni->n", points - self.place, normals) + offset
 
@@ -76,9 +76,9 @@ class Obstacle:
             return np.broadcast_to(self.normal, points.shape)
         if self.kind == "round":
             out = (points - self.place) @ self.across
-            return self.sign * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
+            return self.sign * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), TINY)
         normals = way * np.cross(self.normal, tangents)
-        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY))
 
     def curvature(self, point: Array, tangent: Array) -> float:
         """Signed curvature of the section of the obstacle in the plane, 1/m: counter-clockwise along the tangent."""
@@ -92,29 +92,23 @@ def rounded(stop: Obstacle, radius: float) -> Obstacle:
     """The obstacle itself, or in the place of an edge something thin and round behind it."""
     if stop.side is None:
         return stop
-    side = stop.side / np.linalg.norm(stop.side)
-    return Obstacle("round", stop.place - radius * side, stop.across, np.zeros(3), radius)
-
-
-def _unit(vector: object) -> Array:
-    v = np.asarray(vector, dtype=float)
-    return np.asarray(v / np.linalg.norm(v))
+    return Obstacle("round", stop.place - radius * unit(stop.side), stop.across, np.zeros(3), radius)
 
 
 def obstacle(contact: Contact, space: bool) -> Obstacle:
     """The numbers of an obstacle; in the plane a line along z is a point, one within it a wall."""
     eye = np.eye(3)
-    if contact.type == "plane" or (contact.type == "line" and not space and abs(_unit(contact.direction)[2]) < 0.5):
+    if contact.type == "plane" or (contact.type == "line" and not space and abs(unit(contact.direction)[2]) < 0.5):
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
-        normal = _unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], _unit(contact.direction))
+        normal = unit(contact.normal) if contact.type == "plane" else np.cross([0, 0, 1.0], unit(contact.direction))
         normal = -normal if side is not None and side @ normal < 0.0 else normal
         return Obstacle("flat", np.asarray(contact.point), np.outer(normal, normal), normal)
     if contact.type in ("point", "line"):
         point = contact.position if contact.type == "point" else contact.point
-        edge = eye[2] if contact.type == "point" else _unit(contact.direction)
+        edge = eye[2] if contact.type == "point" else unit(contact.direction)
         side = np.asarray(contact.side, dtype=float)
         return Obstacle("sharp", np.asarray(point, dtype=float), eye - np.outer(edge, edge), edge, side=side)
-    axis = _unit(contact.axis)
+    axis = unit(contact.axis)
     across = eye if contact.type == "sphere" else eye - np.outer(axis, axis)
     sign = -1.0 if contact.side == "inside" else 1.0
     place = np.asarray(contact.center, dtype=float)

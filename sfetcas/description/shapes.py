@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from ..errors import SceneError
-from ..mathematics.arrays import first_of_largest
+from ..mathematics.arrays import first_of_largest, fixed
 from ..mathematics.curves import (
     FORWARD,
     POINTS,
@@ -28,7 +28,6 @@ from ..mathematics.curves import (
     cubic_spline,
     derivatives,
     equal_arcs,
-    fixed,
     refine,
 )
 from ..mathematics.quaternion import matrix, rotate

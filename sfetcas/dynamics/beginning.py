@@ -168,7 +168,7 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
         What is given contradicts the joints, or itself.
     """
     model = equations.model
-    rows, wanted, names = _given(system, equations, state)
+    rows, wanted, names = _given(system, equations)
     rates = np.zeros(equations.unknowns)
     if not len(wanted) or not np.abs(wanted).max():
         return rates, ()
@@ -229,7 +229,7 @@ def _open_row(model: Model, gaps: Array) -> str:
     return f" ({model.row_names[first_of_largest(gaps)]})"
 
 
-def _given(system: StageEquations, equations: Equations, state: State) -> tuple[Array, Array, list[tuple[str, ...]]]:
+def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, list[tuple[str, ...]]]:
     """Rows of the rates of the unknowns that are given, their values, and where they stand in the scene."""
     model, scene, unit = equations.model, equations.model.scene, system.masses.time
     axes, turns = model.element.axes, model.element.turns
@@ -256,7 +256,7 @@ def _given(system: StageEquations, equations: Equations, state: State) -> tuple[
         # Of a small member the nodes, as many as it has, stand for equal parts.
         x = model.along(name) if slender else np.linspace(0.0, 1.0, len(chain))
         chain, first = np.unique(chain, return_index=True)
-        spins = _spins(member.spin, x[first], model.space) * unit
+        spins = _spins(member.spin, x[first]) * unit
         for number, spin in zip(chain.tolist(), spins, strict=True):
             rows.append(turning_of[turns * number : turns * (number + 1)])
             values.append(spin[3 - turns :])
@@ -266,7 +266,7 @@ def _given(system: StageEquations, equations: Equations, state: State) -> tuple[
     return np.concatenate(rows), np.concatenate(values), names
 
 
-def _spins(spin: Any, x: Array, space: bool) -> Array:
+def _spins(spin: Any, x: Array) -> Array:
     """Angular velocities (n, 3) along a member."""
     if isinstance(spin, tuple):
         return np.tile(np.asarray(spin, dtype=float), (len(x), 1))

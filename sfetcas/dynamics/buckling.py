@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mathematics.linear import SparseMap
 from ..mathematics.spectra import largest
 from ..solvers.arclength import Curve, Standing
@@ -64,7 +64,7 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     equations.solver.factor(entries)
 
     def apply(block: Array) -> Array:
-        return np.asarray(equations.solver.solve(-np.column_stack([change @ column for column in block.T])))
+        return np.asarray(equations.solver.solve(-(change @ block)))
 
     inverse, _ = largest(apply, equations.total, BESIDE * count)
     sizes = np.abs(inverse)
@@ -80,7 +80,7 @@ def _change(curve: Curve, start: Standing) -> SparseMap:
     equations = curve.equations
     rate, loads = start.tangent.z / start.tangent.factor, curve.rate(start.factor)
     turned = float(np.abs(rate[: equations.turning_unknowns]).max(initial=0.0))
-    h = 1.0 / max(turned / TURN, float(np.abs(rate).max(initial=0.0)), 1e-300)
+    h = 1.0 / max(turned / TURN, float(np.abs(rate).max(initial=0.0)), TINY)
 
     def entries(w: float) -> Array:
         loading = start.loading.plus(loads.scaled(w))

@@ -49,7 +49,7 @@ class Conserving(Method):
     loaded = np.array([0.5, 1.0])
     polished = True
 
-    def iteration(self, system: StageEquations, linear: str) -> ca.Function:
+    def iteration(self, system: StageEquations) -> ca.Function:
         """One for the end of the step; constants are the begin, h, and the loads in the middle and at the end.
 
         Raises
@@ -76,7 +76,7 @@ class Conserving(Method):
         )
         h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
         found = _Middle(system, begin, h, factors, q, y, lam)
-        step = system.solved(found.entries, [2.0 / h**2], found.residual, linear)
+        step = system.solved(found.entries, [2.0 / h**2], found.residual)
         (there,), shift, more, size = system.moved([q], step)
         constants = [begin.q, begin.y, begin.x, begin.rates, begin.near, h, factors]
         return ca.Function("middle", [q, y, lam, *constants], [there, y + shift, lam + more, size])

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.constants import mapped
 from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
@@ -33,7 +33,7 @@ class Inertia:
         self._inside = tuple(system.inner_nodes.T)
         self._inner = masses.inner[self._inside]
         self._inner_drag = masses.inner_drag[self._inside]
-        self._coriolis = None if system.coriolis is None else _map(system.coriolis)
+        self._coriolis = None if system.coriolis is None else mapped(system.coriolis)
         self._rest = np.zeros((system.linear // axes, axes))
         for name in model.nodes:
             self._rest[model.segments.place(name)] = np.asarray(model.scene.nodes[name].position)[:axes]
@@ -180,9 +180,3 @@ class Inertia:
                 batch.set(i, values)
         batch.set(4, forces.reshape(n, -1))
         return np.asarray(batch()[3].copy())
-
-
-def _map(matrix: ca.DM) -> SparseMap:
-    """A sparse matrix of CasADi for NumPy."""
-    row, column = (np.array(part, dtype=np.intp) for part in matrix.sparsity().get_triplet())
-    return SparseMap(row, column, np.array(matrix.nz[:]).ravel(), matrix.shape)

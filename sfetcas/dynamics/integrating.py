@@ -115,13 +115,11 @@ class Stepper:
     ----------
     system : StageEquations
     method : Method
-    linear : str
-        Linear solver of CasADi.
     """
 
-    def __init__(self, system: StageEquations, method: Method, linear: str = "qr") -> None:
+    def __init__(self, system: StageEquations, method: Method) -> None:
         self.system, self.method = system, method
-        self.function = step_function(system, method, linear)
+        self.function = step_function(system, method)
         self.judged = np.concatenate([np.ones(system.linear), *map(_arms, system.masses.observables)])
         self._batch = Batch(self.function, 1)
         self.time = system.masses.time

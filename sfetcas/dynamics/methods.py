@@ -75,7 +75,7 @@ class Method(abc.ABC):
         return len(self.places)
 
     @abc.abstractmethod
-    def iteration(self, system: StageEquations, linear: str) -> ca.Function:
+    def iteration(self, system: StageEquations) -> ca.Function:
         """One iteration of Newton's method, ``(q, y, lam, constants...) -> (q, y, lam, size)``.
 
         q (components, rotations * stages), y and lam with a column a stage; ``size`` is the largest rotation or
@@ -109,9 +109,9 @@ class StageMethod(Method):
     def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
         """The relations of a step of length h after rates (quantities, kept)."""
 
-    def iteration(self, system: StageEquations, linear: str) -> ca.Function:
+    def iteration(self, system: StageEquations) -> ca.Function:
         """That of the equations at the stages."""
-        return system.iteration(self.stages, linear)
+        return system.iteration(self.stages)
 
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
         """The relations and the loads."""

@@ -22,7 +22,7 @@ from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..equilibria.solution import Equilibrium, heading
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import Array, first_of_largest
+from ..mathematics.arrays import TINY, Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
 from ..mathematics.threads import single_threaded
 from ..mechanics.equations import Equations, State
@@ -316,10 +316,6 @@ def _difference(coarse: Eigenmotions, fine: Eigenmotions) -> float:
         return 1.0
     sizes = np.maximum(np.abs(fine.exponents), TINY)
     return float((np.abs(coarse.exponents - fine.exponents) / sizes).max(initial=0.0))
-
-
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
 
 
 # -- the equilibrium on a mesh with masses -------------------------------------------------------------

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
 from .integrating import Taken
 
@@ -153,16 +153,11 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
 def _turned(q: Array, turn: Array) -> Array:
     if q.shape[1] == 1:
         return q + turn
-    moved = quaternion.multiply(quaternion.from_rotation_vector(turn), q)
-    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+    return unit(quaternion.multiply(quaternion.from_rotation_vector(turn), q))
 
 
 def _from(q: Array, there: Array) -> Array:
-    """Rotation vectors (rotations, turns) from rotations to others, shorter than a turn."""
+    """Rotation vectors (rotations, turns) from rotations to others."""
     if q.shape[1] == 1:
         return there - q
-    r = quaternion.multiply(there, quaternion.conjugate(q))
-    r = np.where(r[:, :1] < 0.0, -r, r)
-    sine = np.linalg.norm(r[:, 1:], axis=1, keepdims=True)
-    share = np.where(sine < 1e-8, 2.0, 2.0 * np.arctan2(sine, r[:, :1]) / np.maximum(sine, 1e-300))
-    return np.asarray(share * r[:, 1:])
+    return quaternion.rotation_vector(quaternion.multiply(there, quaternion.conjugate(q)))

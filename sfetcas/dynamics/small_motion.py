@@ -18,14 +18,15 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import TINY, Array, Index
+from ..mathematics.constants import sparse
 from ..mathematics.kernels import Batch
-from ..mathematics.linear import SparseMap, SparseSolver
+from ..mathematics.linear import SparseMap, SparseSolver, places_of
+from ..mathematics.quaternion import cross_matrix
 from ..mathematics.spectra import largest
 from ..mechanics.equations import Equations, Point, State, turned_tangents
 from ..mechanics.loading import Loading
 from ..mechanics.masses import masses_of
-from ..mechanics.spinning import vectors_of
 from ..mechanics.terms import by_turning
 from .stages import StageEquations
 
@@ -78,9 +79,6 @@ MOST_FREE = 40
 
 SAME = 1e-6
 """Shapes of zero exponents that differ by a smaller share, squared, are the same motion."""
-
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,21 +168,16 @@ class SmallMotion:
         q = self.state.q
         turned = turned_tangents(model, q).reshape(-1, axes)
         # The derivative of a turned vector by a rotation vector is the cross product with it.
-        if model.space:
-            x, y, z = turned.T
-            zero = np.zeros(len(turned))
-            spin = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
-        else:
-            spin = np.stack([-turned[:, 1], turned[:, 0]], axis=1)[:, :, None]
+        spin = -cross_matrix(turned) if model.space else (turned[:, ::-1] * [-1.0, 1.0])[:, :, None]
         turns = model.element.turns
         points = np.arange(len(turned))
         row = np.broadcast_to((points[:, None] * axes + np.arange(axes))[:, :, None], spin.shape)
         cells = model.rotations.turns.ravel()[:, None] * turns + np.arange(turns)
         column = np.broadcast_to(cells[:, None, :], spin.shape)
-        tangents = _sparse(row, column, spin, (len(turned) * axes, system.full))
+        tangents = sparse(row, column, spin, (len(turned) * axes, system.full))
         # Displacements of the places stand after the rotations in full coordinates.
         width = axes * system.places
-        onto = _sparse(np.arange(width), system.of_places + np.arange(width), np.ones(width), (width, system.full))
+        onto = sparse(np.arange(width), system.of_places + np.arange(width), np.ones(width), (width, system.full))
         parts = [ca.mtimes(system.by_place, onto)]
         if system.elements:
             parts[0] += ca.mtimes(system.by_tangent, tangents)
@@ -201,7 +194,7 @@ class SmallMotion:
             r = np.broadcast_to(np.arange(n * rows).reshape(n, 1, rows), slopes.shape)
             c = np.broadcast_to(sides[:, :, None], slopes.shape)
             used = c >= 0
-            parts.append(_sparse(r[used], c[used], slopes[used], (n * rows, system.full)))
+            parts.append(sparse(r[used], c[used], slopes[used], (n * rows, system.full)))
         return ca.mtimes(ca.vertcat(*parts), system.gather.T)[:, : self.unknowns]
 
     @functools.cached_property
@@ -218,21 +211,10 @@ class SmallMotion:
 
     def _gyroscopic(self, jacobian: ca.DM) -> SparseMap:
         """Coriolis forces ``J^T m 2 Omega x J`` by velocities, in turning axes."""
-        spinning = self.model.spinning
-        if spinning is None:
+        coriolis = self._system.coriolis
+        if coriolis is None:
             return SparseMap(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0), (self.unknowns, self.unknowns))
-        x, y, z = 2.0 * spinning.omega
-        axes = self.model.element.axes
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])[:axes, :axes]
-        crosses = [_repeated(cross, self._system.linear // axes)]
-        for group in self.masses.observables:
-            # Behind the vectors there may be numbers, which nothing turns.
-            own = np.zeros((group.kind.sizes[2],) * 2)
-            turning = axes * vectors_of(group)
-            own[:turning, :turning] = np.kron(np.eye(vectors_of(group)), cross)
-            crosses.append(_repeated(own, len(group.data)))
-        weights = ca.mtimes(self._weights("mass"), ca.diagcat(*crosses))
-        return _sandwich(jacobian, weights, -1.0)
+        return _sandwich(jacobian, coriolis, -1.0)
 
     # -- eigenvalues ----------------------------------------------------------------------------
 
@@ -272,9 +254,9 @@ class SmallMotion:
         n = self.unknowns
 
         def apply(block: Array) -> Array:
-            return self._solved(_times(self.mass, block))
+            return self._solved(self.mass @ block)
 
-        inner = functools.partial(_times, self.mass)
+        inner = self.mass.__matmul__
         inverse, shapes = largest(apply, n, wanted, inner if self.symmetric else None)
         exhausted = len(inverse) < wanted
         found = np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0)
@@ -285,7 +267,7 @@ class SmallMotion:
 
     def _missed(self, shapes: Array) -> Array:
         """What shapes miss the rows by."""
-        return _times(self.constraints, shapes)
+        return self.constraints @ shapes
 
     def _quadratic(self, count: int, unstable: int) -> Eigenmotions:
         """The same with damping: exponents nearest to a small number above zero."""
@@ -294,12 +276,7 @@ class SmallMotion:
 
         def apply(block: Array) -> Array:
             f, g = block[:n], block[n:]
-            moved = (
-                _times(self.damping, f)
-                + _times(self.gyroscopic, f)
-                + shift * _times(self.mass, f)
-                + _times(self.mass, g)
-            )
+            moved = self.damping @ f + self.gyroscopic @ f + self.mass @ (shift * f + g)
             x = -self._solved(moved)
             return np.concatenate([x, f + shift * x])
 
@@ -324,8 +301,8 @@ class SmallMotion:
 
     def _solve(self, exponents: Array, shapes: Array) -> Array:
         """Which exponents and shapes solve their own equation: crowds of motions that fade leave others as well."""
-        parts = [_times(part, shapes) for part in (self.stiffness, self.mass)]
-        damped = _times(self.damping, shapes) + _times(self.gyroscopic, shapes)
+        parts = [part @ shapes for part in (self.stiffness, self.mass)]
+        damped = self.damping @ shapes + self.gyroscopic @ shapes
         with np.errstate(over="ignore", invalid="ignore"):
             terms = np.array(
                 [
@@ -339,7 +316,7 @@ class SmallMotion:
     def _independent(self, shapes: Array) -> int:
         """Number of motions among shapes: one without damping has the exponent zero twice."""
         parts = np.hstack([shapes.real, shapes.imag])
-        kinetic = parts.T @ _times(self.mass, parts)
+        kinetic = parts.T @ (self.mass @ parts)
         sizes = np.sqrt(np.maximum(np.diag(kinetic), TINY))
         used = sizes > SAME * sizes.max(initial=0.0)
         values = np.linalg.eigvalsh((kinetic / np.outer(sizes, sizes))[np.ix_(used, used)])
@@ -348,8 +325,8 @@ class SmallMotion:
     def _added(self, shapes: Array) -> Array:
         """What is added up in squares of frequencies of shapes."""
         sizes = np.abs(shapes)
-        added = (sizes * _times(self.stiffness.absolute, sizes)).sum(axis=0)
-        kinetic = (shapes.conj() * _times(self.mass, shapes)).sum(axis=0).real
+        added = (sizes * (self.stiffness.absolute @ sizes)).sum(axis=0)
+        kinetic = (shapes.conj() * (self.mass @ shapes)).sum(axis=0).real
         return np.asarray(3000.0 + added / np.maximum(kinetic, TINY))
 
     def _factor(self, mass: float, damping: float) -> None:
@@ -426,28 +403,8 @@ def _sorted_exponents(exponents: Array, shapes: Array, free: int, rigid: Array, 
     return Eigenmotions(exponents[order], shapes[:, order], free, alone[alone > 0.0])
 
 
-def _times(matrix: SparseMap, block: Array) -> Array:
-    """A product with the columns of a block."""
-    if not len(matrix.value):
-        return np.zeros((matrix.shape[0], block.shape[1]), dtype=block.dtype)
-    rows, starts = np.unique(matrix.row, return_index=True)
-    found = np.zeros((matrix.shape[0], block.shape[1]), dtype=block.dtype)
-    found[rows] = np.add.reduceat(matrix.value[:, None] * block[matrix.column], starts, axis=0)
-    return found
-
-
-def _sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> ca.DM:
-    return ca.DM.triplet(np.ravel(row).tolist(), np.ravel(column).tolist(), ca.DM(np.ravel(value)), *shape)
-
-
-def _repeated(matrix: Array, count: int) -> ca.DM:
-    """A block diagonal matrix of equal blocks."""
-    return ca.kron(ca.DM.eye(count), ca.sparsify(ca.DM(matrix)))
-
-
 def _sandwich(jacobian: ca.DM, weights: ca.DM, sign: float = 1.0) -> SparseMap:
     """``J^T m J``, exactly symmetric, or skew with the sign -1."""
     found = ca.mtimes(jacobian.T, ca.mtimes(weights, jacobian))
-    row, column = (np.array(part, dtype=np.intp) for part in found.sparsity().get_triplet())
-    value = 0.5 * np.array(found.nonzeros())
+    (row, column), value = places_of(found.sparsity()), 0.5 * np.array(found.nonzeros())
     return SparseMap(np.append(row, column), np.append(column, row), np.append(value, sign * value), found.shape)

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.constants import sparse, times
-from ..mathematics.linear import pattern
+from ..mathematics.linear import pattern, places_of
 from ..mechanics.expressions import Given, moved_by
 from ..mechanics.stationarity import Forces, Stationarity, summed
 from ..mechanics.tables import Pattern
@@ -35,7 +35,7 @@ __all__ = ["StageEquations"]
 class StageEquations(System):
     """The equations of motion at stages, and Newton's method for them."""
 
-    def iteration(self, stages: int, linear: str = "qr") -> ca.Function:
+    def iteration(self, stages: int) -> ca.Function:
         """One Newton iteration of all stages of a step.
 
         ``(q, y, lam, x0, v, a, C, B, factors, near) -> (q, y, lam, size)``: q (components, rotations * stages), y, lam,
@@ -59,14 +59,14 @@ class StageEquations(System):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
         # Of the last stage: that of the first of two stages of Radau's vanishes.
         inertia = [b[stages - 1, stages - 1]] * stages
-        step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]), linear)
+        step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]))
         turned, shift, more, size = self.moved(parts, step)
         results = [ca.horzcat(*turned), y + shift, lam + more, size]
         names = ["q", "y", "lam", "x0", "v", "a", "C", "B", "factors", "near"]
         arguments = [q, y, lam, x0, v, a, c, b, factors, near]
         return ca.Function(f"iteration_{stages}", arguments, results, names, ["q_next", "y_next", "lam_next", "size"])
 
-    def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX, linear: str) -> ca.MX:
+    def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX) -> ca.MX:
         """Newton's step of all stages, (total, stages), for entries in the order of their places.
 
         ``inertia`` is what accelerations of each stage are multiplied by: beside the masses over it closings are
@@ -78,8 +78,7 @@ class StageEquations(System):
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *soft)))
         left = ca.vec(residual.T)
         # Entries differ by the square of the step: none is too small to divide by.
-        options = {"eps": 1e-300} if linear == "qr" else {}
-        found = ca.solve(matrix, left[system.order], linear, options)
+        found = ca.solve(matrix, left[system.order], "qr", {"eps": 1e-300})
         return -ca.reshape(found[system.back], stages, self.total).T
 
     def moved(self, q: list[ca.MX], step: ca.MX) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX]:
@@ -155,7 +154,7 @@ class StagePlaces:
         coupled.add(own[:, :, None], at[:, None, :])
         coupled.add(at[:, None, :], own[:, :, None])
         for matrix in (system.place_mass, system.place_drag):
-            row, column = (np.array(part, dtype=np.intp) for part in matrix.sparsity().get_triplet())
+            row, column = places_of(matrix.sparsity())
             coupled.add(system.of_places + row, system.of_places + column)
         if system.crossing is None:
             return

@@ -23,7 +23,7 @@ CONVERGED = 1e-8
 """Change, rad or lengths, below which it ends: convergence is quadratic, so the next one would be below rounding."""
 
 
-def step_function(system: StageEquations, method: Method, linear: str = "qr") -> ca.Function:
+def step_function(system: StageEquations, method: Method) -> ca.Function:
     """A step of a method.
 
     ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, near) -> (q, y, lam, turns, shifts, x, rates, size,
@@ -48,7 +48,7 @@ def step_function(system: StageEquations, method: Method, linear: str = "qr") ->
     begin = [system.held(moved_by(system, q, first[i]), given[i]) for i in range(s)]
     guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
     constants = method.constants(Begin(q, y, x, rates, near), h, loads)
-    newton = _newton(method.iteration(system, linear), polished=method.polished)
+    newton = _newton(method.iteration(system), polished=method.polished)
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
     there = ca.horzcat(*[system.moving(parts[i], moved[:, i], given[i], near) for i in range(s)])

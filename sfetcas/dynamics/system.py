@@ -11,9 +11,10 @@ import numpy as np
 
 from ..description.loads import History
 from ..mathematics.arrays import Array, Index
-from ..mathematics.constants import by_axes, hanging, sparse, times
+from ..mathematics.constants import by_axes, hanging, mapped, sparse, times
 from ..mathematics.kernels import Kernels
 from ..mathematics.linear import SparseMap
+from ..mathematics.quaternion import cross_matrix
 from ..mechanics import expressions
 from ..mechanics.equations import Equations, State
 from ..mechanics.expressions import Expressions, Given, moved_by
@@ -234,8 +235,7 @@ class System(Expressions):
         """Matrix (axes, axes) of ``2 Omega x`` of turning axes; None where they do not turn."""
         if self.model.spinning is None:
             return None
-        x, y, z = 2.0 * self.model.spinning.omega
-        return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])[: self.axes, : self.axes]
+        return cross_matrix(2.0 * self.model.spinning.omega)[: self.axes, : self.axes]
 
     @functools.cached_property
     def coriolis(self) -> ca.DM | None:
@@ -258,6 +258,6 @@ class System(Expressions):
     @functools.cached_property
     def place_weights(self) -> tuple[Index, Index, Array]:
         """Row, column and mass of each pair of places, inner nodes hanging on the first place of their element."""
-        row, column = (np.array(part, dtype=np.intp) for part in self.place_mass.sparsity().get_triplet())
-        first = row % self.axes == 0
-        return row[first] // self.axes, column[first] // self.axes, np.array(self.place_mass.nz[:]).ravel()[first]
+        mass = mapped(self.place_mass)
+        first = mass.row % self.axes == 0
+        return mass.row[first] // self.axes, mass.column[first] // self.axes, mass.value[first]

@@ -23,6 +23,7 @@ from ..mechanics.loading import Loading
 from ..solvers.deflation import deflated
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
+from .several import APART
 from .solution import Equilibrium
 
 __all__ = ["Scan", "scan"]
@@ -127,10 +128,6 @@ def scan(prepared: Prepared, loading: Loading, first: Corrected) -> Scan | None:
         if new and there.converged and prepared.distance(there.state, state) < NEAR:
             found.append(there)
     return Scan(prepared, found, len(roots), shooting.grazing)
-
-
-APART = 1e-4
-"""States that differ by more than this somewhere, rad, are different equilibria."""
 
 
 def _member(prepared: Prepared) -> str | None:

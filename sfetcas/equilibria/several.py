@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from ..description.records import counted
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
@@ -30,7 +30,7 @@ from ..solvers.prepared import Prepared
 from .mirrors import Mirror, mirrored, mirrors
 from .solution import Equilibrium
 
-__all__ = ["Search", "long_elements", "missing", "same", "search"]
+__all__ = ["APART", "Search", "long_elements", "missing", "same", "search"]
 
 RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
 """Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
@@ -362,7 +362,7 @@ def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dic
             continue
         section = model.scene.sections[str(model.scene.members[name].section)]
         softest = float(np.nanmin(section.stiffness(np.linspace(0.0, 1.0, 5))))
-        longest = LAYERS * np.sqrt(softest / max(force, 1e-300)) / model.scene.center_lines[name].length
+        longest = LAYERS * np.sqrt(softest / max(force, TINY)) / model.scene.center_lines[name].length
         marks[name] = np.diff(model.mesh.cuts[name]) > longest
     return marks if model.mesh.elements <= MOST_ELEMENTS else {name: m & False for name, m in marks.items()}
 

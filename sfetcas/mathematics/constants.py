@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 
 from .arrays import Array
-from .linear import SparseMap
+from .linear import SparseMap, places_of
 
-__all__ = ["by_axes", "constant", "hanging", "picked", "sparse", "times"]
+__all__ = ["by_axes", "constant", "hanging", "mapped", "picked", "sparse", "times"]
 
 
 def constant(matrix: SparseMap) -> ca.DM:
@@ -21,7 +21,13 @@ def constant(matrix: SparseMap) -> ca.DM:
 
 def sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> ca.DM:
     """The same from its entries, which may stand at one place more than once."""
-    return constant(SparseMap(np.asarray(row, np.intp), np.asarray(column, np.intp), value, shape))
+    row, column = np.broadcast_arrays(np.asarray(row, np.intp), column)
+    return constant(SparseMap(row.ravel(), column.ravel(), np.ravel(value), shape))
+
+
+def mapped(matrix: ca.DM) -> SparseMap:
+    """A constant matrix for NumPy."""
+    return SparseMap(*places_of(matrix.sparsity()), np.array(matrix.nonzeros()), matrix.shape)
 
 
 def by_axes(matrix: SparseMap, axes: int) -> SparseMap:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from .arrays import fixed, unit
 from .interpolation import gauss
 from .quaternion import conjugate, multiply, product, rotate
 
@@ -30,19 +31,12 @@ __all__ = [
     "cubic_spline",
     "derivatives",
     "equal_arcs",
-    "fixed",
     "refine",
 ]
 
 Floats = NDArray[np.float64]
 
 FORWARD = np.array([1.0, 0.0, 0.0])
-
-
-def fixed(array: Floats) -> Floats:
-    """The array itself, read-only from now on."""
-    array.setflags(write=False)
-    return array
 
 
 class Curve(abc.ABC):
@@ -179,8 +173,7 @@ class Panels(Curve):
         return self._at(self.places, x)
 
     def quaternions(self, x: Floats) -> Floats:
-        q = self._at(self.rotations, x)
-        return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
+        return unit(self._at(self.rotations, x))
 
     def curvatures(self, x: Floats) -> Floats:
         return self._at(self.bending, x)

@@ -13,21 +13,16 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-from .arrays import Array
+from .arrays import Array, fixed
 
 __all__ = ["differentiation", "evaluation", "gauss", "integration", "legendre_tail", "lobatto", "pieces"]
-
-
-def _fixed(array: Array) -> Array:
-    array.setflags(write=False)
-    return array
 
 
 @functools.cache
 def gauss(n: int) -> tuple[Array, Array]:
     """The n Gauss points of [0, 1] and their weights (sum 1); exact to degree 2n - 1."""
     x, w = legendre.leggauss(n)
-    return _fixed(0.5 * (x + 1.0)), _fixed(0.5 * w)
+    return fixed(0.5 * (x + 1.0)), fixed(0.5 * w)
 
 
 @functools.cache
@@ -42,7 +37,7 @@ def lobatto(n: int) -> tuple[Array, Array]:
         x[1:-1] = inner - legendre.legval(inner, slope) / legendre.legval(inner, legendre.legder(slope))
     x = 0.5 * (x - x[::-1])
     w = 2.0 / (n * (n - 1) * legendre.legval(x, top) ** 2)
-    return _fixed(0.5 * (x + 1.0)), _fixed(0.5 * w)
+    return fixed(0.5 * (x + 1.0)), fixed(0.5 * w)
 
 
 def pieces(breaks: Sequence[float], n: int) -> tuple[Array, Array]:

@@ -12,18 +12,18 @@ import io
 import casadi as ca
 import numpy as np
 
-from .arrays import Array
+from .arrays import TINY, Array, Index
 from .keeping import kept
 from .kernels import Batch
 
-__all__ = ["InertiaSolver", "Product", "SparseMap", "SparseSolver", "blurred", "pattern", "smallest"]
+__all__ = ["InertiaSolver", "Product", "SparseMap", "SparseSolver", "blurred", "pattern", "places_of", "smallest"]
 
 DENSE = 150
 """Up to this size LAPACK on the full matrix is faster than a sparse factorisation (measured)."""
 
 
 class SparseMap:
-    """A constant matrix by its entries that are not zero; products with vectors by ``@``.
+    """A constant matrix by its entries that are not zero; products by ``@``.
 
     Attributes
     ----------
@@ -52,10 +52,17 @@ class SparseMap:
         """The matrix of the absolute values."""
         return SparseMap(self.row, self.column, np.abs(self.value), self.shape)
 
-    def __matmul__(self, vector: Array) -> Array:
+    def __matmul__(self, x: Array) -> Array:
+        """The product with a vector (columns,) or a block of them (columns, k)."""
         if self._full is not None:
-            return np.asarray(self._full @ vector)
-        return np.bincount(self.row, weights=self.value * vector[self.column], minlength=self.shape[0])
+            return np.asarray(self._full @ x)
+        if x.ndim == 1:
+            return np.bincount(self.row, weights=self.value * x[self.column], minlength=self.shape[0])
+        found = np.zeros((self.shape[0], x.shape[1]), dtype=x.dtype)
+        rows, starts = np.unique(self.row, return_index=True)
+        if len(rows):
+            found[rows] = np.add.reduceat(self.value[:, None] * x[self.column], starts, axis=0)
+        return found
 
     def full(self) -> Array:
         """The matrix with its zeros."""
@@ -263,13 +270,16 @@ ROUNDING = 1e-16
 SOLVED = 1e-13
 """The same that is taken for a solution."""
 
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
-
 
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:
     """Sparsity of a square matrix by the places of its entries, column by column."""
     return ca.Sparsity(n, n, np.searchsorted(column, np.arange(n + 1)).tolist(), row.tolist())
+
+
+def places_of(sparsity: ca.Sparsity) -> tuple[Index, Index]:
+    """Rows and columns of the entries of a sparsity, column by column."""
+    row, column = sparsity.get_triplet()
+    return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
 
 
 def blurred(row: Array, column: Array, entries: Array, vectors: Array) -> Array:

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from .arrays import Array, Index
 from .constants import sparse, times
 from .kernels import Kernels, chosen
+from .linear import places_of
 from .nlp import NLP
 
 __all__ = ["Pieces", "Unknown"]
@@ -82,12 +83,10 @@ class Pieces:
     ----------
     kernels : str
         ``auto``, ``compiled`` or ``interpreted`` derivatives.
-    calls : float
-        Iterations that are expected, for ``auto``.
     """
 
-    def __init__(self, kernels: Kernels = "auto", calls: float = 50.0) -> None:
-        self._kernels, self._calls = kernels, calls
+    def __init__(self, kernels: Kernels = "auto") -> None:
+        self._kernels: Kernels = kernels
         self.blocks: dict[str, Unknown] = {}
         self._guesses: list[Array] = []
         self._pieces: list[_Piece] = []
@@ -221,12 +220,6 @@ class Pieces:
         at = next(i for i, piece in enumerate(self._pieces) if piece.name == name)
         self._pieces[at] = replace(self._pieces[at], constants=np.asarray(constants, dtype=float))
 
-    def set_guess(self, name: str, guess: ArrayLike) -> None:
-        """Where the unknowns of a name begin, in the shape of the block."""
-        at = list(self.blocks).index(name)
-        shape = self.blocks[name].index.shape
-        self._guesses[at] = np.broadcast_to(np.asarray(guess, dtype=float), shape).ravel().copy()
-
     # -- what stands where --------------------------------------------------------------------------
 
     @property
@@ -290,7 +283,7 @@ class Pieces:
     def nlp(self) -> NLP:
         """The program as it stands; unknowns over their units, rows over theirs."""
         x, p = ca.MX.sym("x", self._size), ca.MX.sym("p", len(self.constants()))
-        units, made = self.units, [_Derived(piece, self._kernels, self._calls) for piece in self._pieces]
+        units, made = self.units, [_Derived(piece, self._kernels) for piece in self._pieces]
         bounds = np.cumsum([0, *(piece.constants.size for piece in self._pieces)]).tolist()
         parts = ca.vertsplit(p, bounds) if self._pieces else []
         arguments = []
@@ -390,6 +383,9 @@ class Pieces:
         return ca.triu2symm(upper)
 
 
+ITERATIONS = 50.0
+"""Iterations that are expected, by which ``auto`` chooses kernels."""
+
 FEASIBLE = 1e-8
 """By how much rows may miss their bounds, over their units."""
 
@@ -406,8 +402,8 @@ def _summed(shape: tuple[int, int], row: Index, column: Index, weight: Array, en
 class _Derived:
     """Derivatives of a piece, mapped over its instances."""
 
-    def __init__(self, piece: _Piece, kernels: Kernels, calls: float) -> None:
-        self._piece, self._kernels, self._calls = piece, kernels, calls
+    def __init__(self, piece: _Piece, kernels: Kernels) -> None:
+        self._piece, self._kernels = piece, kernels
         function = piece.function
         try:
             function = function.expand()
@@ -423,7 +419,7 @@ class _Derived:
     def _mapped(self, name: str, arguments: list[Any], results: list[Any]) -> ca.Function:
         function = ca.Function(name, arguments, results)
         # Names of compiled functions tell their content only.
-        return chosen(function, self._calls * self._piece.instances, self._kernels).map(self._piece.instances)
+        return chosen(function, ITERATIONS * self._piece.instances, self._kernels).map(self._piece.instances)
 
     @functools.cached_property
     def _jacobian(self) -> Any:
@@ -432,8 +428,7 @@ class _Derived:
     @functools.cached_property
     def pattern(self) -> tuple[Index, Index]:
         """Rows and columns of the first derivatives that are not zero."""
-        row, column = self._jacobian.sparsity().get_triplet()
-        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
+        return places_of(self._jacobian.sparsity())
 
     @functools.cached_property
     def _first(self) -> ca.Function:
@@ -454,8 +449,7 @@ class _Derived:
     @functools.cached_property
     def bends(self) -> tuple[Index, Index]:
         """Rows and columns of the second derivatives that are not zero, upper triangle."""
-        row, column = self._second[1].sparsity().get_triplet()
-        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
+        return places_of(self._second[1].sparsity())
 
     @functools.cached_property
     def _bend(self) -> ca.Function:

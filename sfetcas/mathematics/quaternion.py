@@ -16,17 +16,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array
+from .arrays import TINY, Array
 
 __all__ = [
     "Components",
-    "angle_about",
     "conjugate",
+    "cross_matrix",
     "from_rotation_vector",
     "matrix",
     "multiply",
     "product",
     "rotate",
+    "rotation_vector",
     "turned",
     "turned_by",
 ]
@@ -122,7 +123,14 @@ def from_rotation_vector(phi: ArrayLike) -> Array:
     return np.concatenate([np.cos(half), 0.5 * phi * np.sinc(half / np.pi)], axis=-1)
 
 
-def angle_about(q: ArrayLike, axis: ArrayLike) -> Array:
-    """Angle in (-2 pi, 2 pi] of the part of ``q`` that turns about the unit vector ``axis``."""
+def cross_matrix(v: ArrayLike) -> Array:
+    """Matrices (..., 3, 3) of the cross product ``v x`` with vectors (..., 3)."""
+    return np.cross(np.eye(3), np.asarray(v, dtype=float)[..., None, :])
+
+
+def rotation_vector(q: ArrayLike) -> Array:
+    """Rotation vectors (..., 3) in rad, of half a turn at most, of unit quaternions (..., 4)."""
     q = np.asarray(q, dtype=float)
-    return np.asarray(2.0 * np.arctan2(q[..., 1:] @ np.asarray(axis, dtype=float), q[..., 0]))
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    return np.asarray(q[..., 1:] * (2.0 * np.arctan2(sine, q[..., :1]) / np.maximum(sine, TINY)))

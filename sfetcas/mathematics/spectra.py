@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .arrays import Array, Index
+from .arrays import TINY, Array, Index
 
 __all__ = ["Operator", "Pick", "largest"]
 
@@ -35,9 +35,6 @@ STALLED = 4
 
 SMALL = 1e-5
 """What small is, over the eigenvalue."""
-
-TINY = 1e-300
-"""Keeps zero by zero from being asked for."""
 
 DROPPED = 1e-11
 """What is left of a column by orthogonalisation, over the column, below which it is rounding."""

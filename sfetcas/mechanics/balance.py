@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, unit
 from ..mathematics.linear import SparseMap, smallest
 from .equations import Equations, State
 from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
@@ -73,7 +73,7 @@ class Balance:
 
     # -- shares of connections ------------------------------------------------------------------
 
-    def _moment_of(self, group: Group, links: Array, number: int, side: int) -> Array:
+    def _moment_of(self, links: Array, number: int, side: int) -> Array:
         moment = np.zeros(3)
         moment[3 - self._turns :] = links[number, side * self._turns : (side + 1) * self._turns]
         return moment
@@ -93,7 +93,7 @@ class Balance:
             for side in range(group.turns.shape[1]):
                 for number, turn in enumerate(group.turns[:, side]):
                     if turn != GROUND and not self._is_ground(group, number):
-                        totals[turn] += self._moment_of(group, links, number, side)
+                        totals[turn] += self._moment_of(links, number, side)
         return totals
 
     @staticmethod
@@ -127,7 +127,7 @@ class Balance:
         if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
             return None
         along = np.asarray(record.direction, dtype=float)
-        return np.asarray(along / np.linalg.norm(along))
+        return unit(along)
 
     def _moment(self, node: str) -> Array:
         number = self.model.rotations.node_turn[node]
@@ -199,11 +199,11 @@ class Balance:
                     balances.append(self._at_pin(columns, name, i))
         rows = [({3 * i + k: gain for i, gain in row.items()}, right[k]) for row, right in balances for k in range(3)]
         for n, (row, right) in hinged:
-            along = np.asarray(scene.nodes[n].axis) / np.linalg.norm(scene.nodes[n].axis)
+            along = unit(scene.nodes[n].axis)
             rows.append(({3 * i + k: gain * along[k] for i, gain in row.items() for k in range(3)}, right @ along))
         for n in filter(self._turns_freely, held):
             first, axis = 3 * columns["node", n], np.asarray(scene.nodes[n].turn_axis)
-            rows.append(({first + k: part for k, part in enumerate(axis / np.linalg.norm(axis))}, 0.0))
+            rows.append(({first + k: part for k, part in enumerate(unit(axis))}, 0.0))
         weights = np.repeat([INSIDE, 1.0], [3 * len(names), 3 * len(held)])
         solved = _smallest(rows, weights).reshape(-1, 3)
         starts = {name: solved[i] for (kind, name), i in columns.items() if kind == "member"}
@@ -252,7 +252,7 @@ class Balance:
             for number, side in np.argwhere(group.turns != GROUND):
                 mine = isinstance(group.kind, ONE_SIDED) if turn is None else group.turns[number, side] == turn
                 if mine and group.nodes[number] == node:
-                    moment = moment + self._moment_of(group, links, number, side)
+                    moment = moment + self._moment_of(links, number, side)
         return moment
 
     def spring_moment(self, node: str) -> Array:
@@ -346,7 +346,7 @@ class Balance:
             if isinstance(group.kind, Body) and member in group.names:
                 i = group.names.index(member)
                 sides = range(group.kind.nodes)
-                return [(self._force_of(group, links, i, k), self._moment_of(group, links, i, k)) for k in sides]
+                return [(self._force_of(group, links, i, k), self._moment_of(links, i, k)) for k in sides]
         raise KeyError(member)
 
 

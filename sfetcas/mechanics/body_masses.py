@@ -24,7 +24,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .bodies import BodyData, body_of, quadrature, shapes_along
 
-__all__ = ["SMALLEST", "BodyMass", "body_mass", "euler_weights", "mass_of"]
+__all__ = ["SMALLEST", "BodyMass", "body_mass", "euler_weights"]
 
 SMALLEST = 1e-12
 """Inertia below this share of the largest is none: rounding is four digits below it."""
@@ -63,13 +63,6 @@ class BodyMass:
 def euler_weights(inertia: Array) -> Array:
     """Weights of the axes (..., 3) for moments of inertia (..., 3) about them."""
     return np.asarray(0.5 * inertia.sum(axis=-1, keepdims=True) - inertia)
-
-
-def mass_of(scene: Scene, name: str) -> Array:
-    """Mass matrix (6 n, 6 n) of a small member in the fixed axes of the undeformed scene, zero without mass."""
-    found = body_mass(scene, name)
-    size = 6 * len(scene.members[name].nodes)
-    return np.zeros((size, size)) if found is None else found.matrix
 
 
 def body_mass(scene: Scene, name: str) -> BodyMass | None:

@@ -11,7 +11,7 @@ from ..description.obstacles import Obstacle, obstacle, rounded, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.supports import turned_about
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, unit
 from .beams import Scales
 from .bodies import BodyData, body_of
 from .contact_joints import (
@@ -97,7 +97,7 @@ class _Maker:
             axis = node.axis if pin.joint == "hinge" else node.direction
             yield One(Hinge(True), name, pin.node, normals(np.asarray(axis), 3).ravel(), sides, row=name)
         elif pin.joint == "universal":
-            axes = [_unit(a) for a in (node.axis, node.axis2)]
+            axes = [unit(a) for a in (node.axis, node.axis2)]
             yield One(Universal(True), name, pin.node, np.concatenate(axes), sides, row=name)
 
     def _slide(self, member: str, i: int, node: str) -> One:
@@ -126,11 +126,11 @@ class _Maker:
             if motion.rotation is not None:
                 axis = turned_about(motion, node, self.scene.members)
                 sides = self._end(first, motion.node), self._end(second, motion.node)
-                yield One(DrivenTurn(self.space), name, motion.node, _unit(axis), sides, row=row)
+                yield One(DrivenTurn(self.space), name, motion.node, unit(axis), sides, row=row)
             if motion.displacement is not None:
                 i = self.scene.members[second].nodes.index(motion.node)
                 places = self.segments.place(motion.node), self.segments.place(self.segments.ends[second, i])
-                along = _unit(node.direction)[: self.axes]
+                along = unit(node.direction)[: self.axes]
                 yield One(DrivenSlide(self.space), name, motion.node, along, (self._base(motion.node),), places, row)
 
     def _spring(self, name: str) -> One:
@@ -142,7 +142,7 @@ class _Maker:
         other, places = spring.to, self._ends_of(name)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
         if spring.direction is not None:
-            data = np.array([*_unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
+            data = np.array([*unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
             return One(LineSpring(self.space), name, spring.node, data, (), places)
         start = self.scene.nodes[spring.node].position
         anchor = self.scene.nodes[other].position if other is not None else spring.anchor or start
@@ -169,7 +169,7 @@ class _Maker:
                 stop = TurnStop(self.space, crossed)
                 yield One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
                 continue
-            data = np.array([*_unit(spring.direction)[: self.axes], at / self.scales.length])
+            data = np.array([*unit(spring.direction)[: self.axes], at / self.scales.length])
             yield One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
 
     @property
@@ -183,12 +183,12 @@ class _Maker:
         At a universal joint a spring about one of the two axes is put on the side that carries this axis.
         """
         spring, (first, second) = self.scene.springs[name], self.parties(name)
-        axis, node = _unit(self.scene.spring_axis(name)), self.scene.nodes[spring.node]
+        axis, node = unit(self.scene.spring_axis(name)), self.scene.nodes[spring.node]
         for pin in self.rotations.pins:
             base = GROUND if pin.base is None else pin.base
             if not self.space or pin.joint != "universal" or {base, pin.turn} != {first, second}:
                 continue
-            one, two = _unit(node.axis), _unit(node.axis2)
+            one, two = unit(node.axis), unit(node.axis2)
             for carrier, other, along, across in ((base, pin.turn, one, two), (pin.turn, base, two, one)):
                 if np.linalg.norm(np.cross(axis, along)) < PARALLEL:
                     return True, (carrier, other), [*(axis if carrier == first else -axis), *across]
@@ -346,11 +346,6 @@ def anchored(scene: Scene, touch: Touch, stop: Obstacle) -> bool:
     nodes = scene.members[touch.member].nodes
     ends = [nodes[int(at)] for at in touch.places if at in (0.0, 1.0)]
     return all(takes_part(end, scene.nodes[end], scene.motions.values(), stop) for end in ends)
-
-
-def _unit(direction: object) -> Array:
-    d = np.asarray(direction, dtype=float)
-    return np.asarray(d / np.linalg.norm(d))
 
 
 def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, int]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.supports import drives
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, unit
 from ..mathematics.linear import SparseMap
 from .mesh import Mesh
 from .segments import Segments
@@ -59,7 +59,7 @@ class Positions:
 
 def normals(direction: Array, axes: int) -> Array:
     """Unit vectors that complete a direction to an orthonormal basis, (axes - 1, axes)."""
-    d = direction[:axes] / np.linalg.norm(direction[:axes])
+    d = unit(direction[:axes])
     basis = np.linalg.svd(d[None, :])[2][1:]
     return np.asarray(basis)
 
@@ -160,7 +160,7 @@ class _Placing:
 
     def _guide(self, name: str) -> Array:
         d = np.asarray(self.scene.nodes[name].direction)[: self.axes]
-        return np.asarray(d / np.linalg.norm(d))
+        return unit(d)
 
     def _prescribed(self, name: str) -> _Place:
         return _Place({("B", self.number[name]): self.eye})

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..description.scene import Member, Node, Scene
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, unit
 from .elements import Element
 from .mesh import Mesh
 
@@ -93,7 +93,7 @@ def number_rotations(scene: Scene, mesh: Mesh, element: Element) -> Rotations:
     return Rotations(
         turns=np.array(turns, dtype=np.intp).reshape(-1, element.order + 1),
         kind=np.array(numbers.kind, dtype=np.intp),
-        axis=np.array([np.asarray(a) / np.linalg.norm(a) for a in numbers.axis]).reshape(-1, 3),
+        axis=np.array([unit(a) for a in numbers.axis]).reshape(-1, 3),
         pins=tuple(_pins(scene, numbers)),
         ends=ends,
         node_turn={name: numbers.given.get(numbers.root(("node", name))) for name in scene.nodes},
@@ -164,7 +164,7 @@ def _together(limits: list[tuple[Turn, tuple[float, float, float]]]) -> tuple[Tu
     about = (0.0, 0.0, 1.0)
     if any(turn == Turn.HELD for turn, _ in limits):
         return Turn.HELD, about
-    axes = [np.asarray(axis) / np.linalg.norm(axis) for turn, axis in limits if turn == Turn.AXIS]
+    axes = [unit(axis) for turn, axis in limits if turn == Turn.AXIS]
     if not axes:
         return Turn.FREE, about
     same = all(np.linalg.norm(np.cross(axes[0], axis)) < PARALLEL for axis in axes)

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mathematics.constants import times
 
 __all__ = ["Dependence", "Number", "found"]
@@ -212,7 +212,7 @@ class _Probing:
 
     def differs(self, a: Array, b: Array, times: float = 1.0) -> Array:
         """Which data differ by more than rounding, or some times that."""
-        return np.abs(a - b) > times * EXACT * np.maximum(self.unit, 1e-300)
+        return np.abs(a - b) > times * EXACT * np.maximum(self.unit, TINY)
 
     def groups(self) -> list[tuple[int, ...]]:
         """Numbers that act together on any datum."""
@@ -330,7 +330,7 @@ class _Probing:
         self, group: tuple[int, ...], degrees: tuple[int, ...], rows: Array, values: Array, *, short: bool
     ) -> _Together:
         """Coefficients by what the basis is at some probes, and what data gain there."""
-        entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, 1e-300)).any(axis=0))
+        entries = np.flatnonzero((np.abs(values) > EXACT * np.maximum(self.unit, TINY)).any(axis=0))
         largest = np.abs(rows).max(axis=0)
         # Of one size where they are as unlike as products of moduli and widths.
         size = largest if largest.max(initial=0.0) > UNLIKE * largest.min(initial=np.inf) else np.ones(len(largest))
@@ -355,7 +355,7 @@ class _Probing:
             spans = [number.span for number in self.numbers]
             point = [c + h * x for (c, h), x in zip(spans, random.uniform(-0.95, 0.95, len(spans)), strict=True)]
             wanted = self.at(dict(enumerate(point)))
-            missed = np.abs(np.array(value(point)).ravel() - wanted) > 1e2 * EXACT * np.maximum(self.unit, 1e-300)
+            missed = np.abs(np.array(value(point)).ravel() - wanted) > 1e2 * EXACT * np.maximum(self.unit, TINY)
             if missed.any():
                 names = ", ".join(number.name for number in self.numbers)
                 message = f"found {names}, for which together the model is no polynomial"

@@ -13,6 +13,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +22,6 @@ from ..description.scene import Scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
-from ..mathematics.distributions import chi_square_tail, normal_quantile, student_quantile
-from ..mathematics.least_squares import Evaluated, Minimum, least_squares
 from .arguments import Asked, argument
 from .solving import ParametricAnswer, ParametricEquilibrium, Values, parametric
 
@@ -289,6 +288,8 @@ class Fitting:
         SolveError
             No equilibrium at the start, no least sum of squares, or parameters that are not determined.
         """
+        from scipy.optimize import least_squares
+
         measured = self.values if values is None else np.asarray(values, dtype=float).ravel()
         if measured.shape != self.values.shape or not np.isfinite(measured).all():
             raise SceneError(f"found {values!r}, accepted: {len(self.values)} finite numbers", ("values",))
@@ -297,35 +298,53 @@ class Fitting:
         width = np.where(np.isfinite(high - low), high - low, 0.0)
         scale = np.maximum(np.abs(begin), width)
         scale = np.where(scale > 0.0, scale, 1.0)
-        search = _Search(self, measured, scale)
-        positive = (low > 0.0) & (low < TINY)
-        found = least_squares(search, begin / scale, low / scale, high / scale, positive=positive)
-        if found is None:
-            raise search.failure or SolveError(Status.FAILED, "the search found no start")
-        if not found.converged:
-            raise SolveError(Status.ITERATIONS, f"{found.iterations} steps towards the least sum of squares", search)
-        _refuse_undetermined(found, self.numbers)
-        return Fit(self, measured, scale, found, tuple(search.reached))
+        search = _Search(self, measured, scale, (low > 0.0) & (low < TINY))
+        bounds = low / scale, high / scale
+        # Of steps that rounding decides the sum of squares does not fall: only their length tells when to end.
+        ends = {"ftol": None, "xtol": SHORT, "gtol": None, "max_nfev": MOST}
+        found = least_squares(
+            search.residuals, np.clip(begin / scale, *bounds), search.jacobian, bounds, "dogbox", x_scale="jac", **ends
+        )
+        if not found.success:
+            raise SolveError(Status.ITERATIONS, f"{found.nfev} steps towards the least sum of squares", search)
+        answer = Fit(self, measured, scale, found, tuple(search.reached))
+        _refuse_undetermined(answer)
+        return answer
 
 
 class _Search:
-    """Residuals over their deviations at scaled numbers; each case begins where it was last accepted."""
+    """Residuals over their deviations at scaled numbers; each case begins where it was last accepted.
 
-    def __init__(self, fitting: Fitting, measured: Array, scale: Array) -> None:
-        self._of, self._measured, self._scale = fitting, measured, scale
+    No step takes a number that has to be ``positive`` below a fifth of itself.
+    """
+
+    def __init__(self, fitting: Fitting, measured: Array, scale: Array, positive: Array) -> None:
+        self._of, self._measured, self._scale, self._positive = fitting, measured, scale, positive
+        self._here = np.zeros(len(scale))
+        self._tried: list[ParametricAnswer] = []
         self.reached: list[ParametricAnswer] = []
-        self.failure: SolveError | None = None
 
-    def __call__(self, x: Array) -> Evaluated | None:
+    def residuals(self, x: Array) -> Array:
+        """Residuals at x, infinite where there is no equilibrium: the step is then shortened.
+
+        Raises
+        ------
+        SolveError
+            There is none at the start.
+        """
+        nothing = np.full(len(self._measured), np.inf)
+        if (self._positive & (x < 0.2 * self._here)).any():
+            return nothing
         starts: Sequence[ParametricAnswer | None] = self.reached or [None] * len(self._of.cases)
         try:
             found = [self._solved(x, case, start) for case, start in zip(self._of.cases, starts, strict=True)]
             told = np.stack([np.concatenate([np.ravel(a) for a in one.answers.values()]) for one in found])
-        except SolveError as error:
-            self.failure = error
-            return None
-        residuals = told[self._of._cases, self._of._row] - self._measured
-        return Evaluated(residuals / self._of.deviations, lambda: self._jacobian(found))
+        except SolveError:
+            if not self.reached:
+                raise
+            return nothing
+        self._tried = found
+        return np.asarray((told[self._of._cases, self._of._row] - self._measured) / self._of.deviations)
 
     def _solved(self, x: Array, case: Values, start: ParametricAnswer | None) -> ParametricAnswer:
         equilibrium = self._of.equilibrium
@@ -333,13 +352,19 @@ class _Search:
         numbers[self._of._own] = x * self._scale
         return equilibrium.solve(equilibrium.by_parameter(numbers), start)
 
-    def _jacobian(self, found: list[ParametricAnswer]) -> Array:
-        # What derivatives are asked of was accepted.
-        self.reached = found
-        whole = np.stack([one.flat_jacobian[:, self._of._own] for one in found])
+    def jacobian(self, x: Array) -> Array:
+        """Derivatives of the residuals by x, which was accepted after the residuals there."""
+        self._here, self.reached = x.copy(), self._tried
+        whole = np.stack([one.flat_jacobian[:, self._of._own] for one in self.reached])
         rows = whole[self._of._cases, self._of._row] * self._scale
         return np.asarray(rows / self._of.deviations[:, None])
 
+
+SHORT = 1e-8
+"""Length of a step, of numbers over their sizes, from which on the search has come to its end."""
+
+MOST = 100
+"""Steps of a search."""
 
 TINY = 1e-300
 """Lower limits below this say no more than that a number is above zero."""
@@ -348,12 +373,12 @@ UNDETERMINED = 1e-7
 """Share of the largest singular value, of parameters over their size, below which a direction is not determined."""
 
 
-def _refuse_undetermined(found: Minimum, names: tuple[str, ...]) -> None:
+def _refuse_undetermined(found: Fit) -> None:
     """Refuse what no measurement depends on, alone or together."""
-    free = np.flatnonzero(~found.held)
+    free, names = np.flatnonzero(~found.held), found.of.numbers
     if not len(free):
         return
-    _, values, vectors = np.linalg.svd(found.jacobian[:, free], full_matrices=False)
+    _, values, vectors = np.linalg.svd(found.minimum.jac[:, free], full_matrices=False)
     if values[-1] > UNDETERMINED * values[0]:
         return
     shares = np.abs(vectors[-1])
@@ -374,8 +399,8 @@ class Fit:
     measured : ndarray (measured,)
     scale : ndarray (numbers,)
         Sizes of the numbers.
-    minimum : Minimum
-        Where the search ended, for numbers over their sizes.
+    minimum : scipy.optimize.OptimizeResult
+        Where the search ended, for numbers over their sizes: ``x``, residuals ``fun``, their derivatives ``jac``.
     answers : tuple of ParametricAnswer
         The equilibrium of each case there.
     """
@@ -383,7 +408,7 @@ class Fit:
     of: Fitting
     measured: Array
     scale: Array
-    minimum: Minimum
+    minimum: Any
     answers: tuple[ParametricAnswer, ...]
 
     @property
@@ -394,22 +419,29 @@ class Fit:
     @property
     def residuals(self) -> Array:
         """Computed less measured values, (measured,), SI units."""
-        return self.minimum.here.residuals * self.of.deviations
+        return np.asarray(self.minimum.fun * self.of.deviations)
+
+    @property
+    def held(self) -> Array:
+        """Which numbers push against an end of their range, (numbers,) of bool."""
+        return np.asarray(self.minimum.active_mask * self.minimum.grad < 0.0)
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom: measured numbers less those that are free."""
-        return len(self.measured) - int((~self.minimum.held).sum())
+        return len(self.measured) - int((~self.held).sum())
 
     @property
     def chi_square(self) -> float:
         """Sum of the squares of residuals over deviations; over the freedom it is near one where the model is right."""
-        return float(self.minimum.here.residuals @ self.minimum.here.residuals)
+        return float(self.minimum.fun @ self.minimum.fun)
 
     @property
     def probability(self) -> float | None:
         """How often noise alone would leave more than this; None where deviations are not known."""
-        return chi_square_tail(self.chi_square, self.freedom) if self.of.known and self.freedom else None
+        from scipy.special import chdtrc
+
+        return float(chdtrc(self.freedom, self.chi_square)) if self.of.known and self.freedom else None
 
     @property
     def deviation(self) -> float | None:
@@ -420,7 +452,7 @@ class Fit:
     def notes(self) -> tuple[str, ...]:
         """What to know about the bounds."""
         found = []
-        for name, held in zip(self.of.numbers, self.minimum.held, strict=True):
+        for name, held in zip(self.of.numbers, self.held, strict=True):
             if held:
                 found.append(
                     f"{name} is at an end of its range: it has no bounds, and those of others take it as known"
@@ -435,23 +467,23 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """Of the numbers, (numbers, numbers), from first derivatives; not a number where a range ends."""
-        return self._inverse(self.minimum.jacobian.T @ self.minimum.jacobian)
+        return self._inverse(self.minimum.jac.T @ self.minimum.jac)
 
     @functools.cached_property
     def full_covariance(self) -> Array:
         """The same from second derivatives, too."""
         size = len(self.minimum.x)
         curved: Array = np.zeros((size, size))
-        shares = self.minimum.here.residuals / self.of.deviations
+        shares = self.minimum.fun / self.of.deviations
         for i, answer in enumerate(self.answers):
             weights = np.zeros(self.of.equilibrium.solver.results.size)
             np.add.at(weights, self.of._row[self.of._cases == i], shares[self.of._cases == i])
             curved += answer.flat_hessian(weights)[np.ix_(self.of._own, self.of._own)]
         curved *= np.outer(self.scale, self.scale)
-        return self._inverse(self.minimum.jacobian.T @ self.minimum.jacobian + curved)
+        return self._inverse(self.minimum.jac.T @ self.minimum.jac + curved)
 
     def _inverse(self, information: Array) -> Array:
-        free = np.ix_(~self.minimum.held, ~self.minimum.held)
+        free = np.ix_(~self.held, ~self.held)
         found = np.full(information.shape, np.nan)
         size = np.sqrt(np.diag(information[free]))
         found[free] = np.linalg.inv(information[free] / np.outer(size, size)) / np.outer(size, size)
@@ -476,8 +508,10 @@ class Fit:
         """
         if not 0.0 < confidence < 1.0:
             raise SceneError(f"found {confidence:g}, accepted: between 0 and 1", ("confidence",))
+        from scipy.special import ndtri, stdtrit
+
         p = 0.5 * (1.0 + confidence)
-        wide = normal_quantile(p) if self.of.known else student_quantile(p, self.freedom)
+        wide = ndtri(p) if self.of.known else stdtrit(self.freedom, p)
         size = wide * np.sqrt(np.diag(self.full_covariance if full else self.covariance))
         middle = self.minimum.x * self.scale
         pairs = zip((middle - size).tolist(), (middle + size).tolist(), strict=True)

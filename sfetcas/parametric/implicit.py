@@ -24,7 +24,7 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Batch
-from ..mathematics.linear import SparseSolver
+from ..mathematics.linear import SparseSolver, places_of
 from ..mathematics.threads import single_threaded
 from .arguments import Arguments
 from .results import Results
@@ -226,8 +226,7 @@ class Implicit:
     def _filled(self) -> tuple[Array, Array]:
         """Places of the derivatives of the answers by x."""
         assert self._by_all is not None
-        row, column = self._by_all.sparsity_out(1).get_triplet()
-        return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
+        return places_of(self._by_all.sparsity_out(1))
 
     @single_threaded
     def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
@@ -251,8 +250,7 @@ class Implicit:
 
     @functools.cached_property
     def _places(self) -> tuple[Array, Array]:
-        row, column = (np.array(part, dtype=np.intp) for part in self._program.sparsity.get_triplet())
-        return row, column
+        return places_of(self._program.sparsity)
 
     @functools.cached_property
     def _straight(self) -> SparseSolver:

@@ -86,18 +86,16 @@ class ContactCurve:
         Mesh -> Prepared.
     unit : float
         Change of the factor that counts as much as a radian.
+
+    Attributes
+    ----------
     piece : tuple of float
         Factors between which no history has a knot.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        prepare: Callable[[Mesh], Prepared],
-        unit: float,
-        piece: tuple[float, float] = (-np.inf, np.inf),
-    ) -> None:
-        self.scene, self.prepare, self.unit, self.piece = scene, prepare, unit, piece
+    def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared], unit: float) -> None:
+        self.scene, self.prepare, self.unit = scene, prepare, unit
+        self.piece = (-np.inf, np.inf)
 
     def plain(self, prepared: Prepared) -> Curve:
         """The curve of one model, with places held."""

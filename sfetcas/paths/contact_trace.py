@@ -14,7 +14,7 @@ import numpy as np
 from ..contact.contact_statics import ContactRun
 from ..contact.settling import Held, Ran, free_places, moved, placed
 from ..equilibria.solution import Equilibrium
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.equations import State
 from ..mechanics.mesh import Mesh, Touch
@@ -192,7 +192,7 @@ class Tracer:
         curve = self.curve.plain(now.held.prepared)
         turning = float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
         stride = (self.span[1] - self.span[0]) / SHARE
-        return min(LONGEST / max(turning, 1e-300), stride / max(abs(now.tangent.factor), 1e-300))
+        return min(LONGEST / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
     def _growth(self, now: Stood, there: Stood) -> float:
         cosine = min(1.0, self.curve.plain(now.held.prepared).inner(now.tangent, there.tangent))

@@ -62,9 +62,6 @@ SAMPLES = 8
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
 
-TAUT = 1e3
-"""Multipliers above this many times the loads, in members without slack, are those of a taut string."""
-
 STEADY = 0.3
 """Share of the factor in the tangent from which on a point may be compared at its factor."""
 

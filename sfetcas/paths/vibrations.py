@@ -25,7 +25,7 @@ from ..dynamics.small_motion import SmallMotion
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import SAME, Mesh, breaks_of
 from ..mechanics.model import Model
@@ -355,7 +355,7 @@ class _Meeting:
             group = groups[np.argmin(np.abs(groups.mean(axis=1) - self._middle))]
             middle, value = float(group.mean()), float(group[half:].mean() - group[:half].mean()) ** 2
         self.omega = float(np.sqrt(max(-middle, 0.0)))
-        return value / max(middle**2, 1e-300)
+        return value / max(middle**2, TINY)
 
 
 class _Crossing:

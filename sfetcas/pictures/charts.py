@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..paths.path import Branch, Path
 from .files import DPI, check_ending, save_figure
 from .glyphs import sketch_holds
@@ -98,7 +98,7 @@ def _telling(path: Path) -> _Quantity:
         if quantity.node is None or quantity.node not in loaded:
             return change
         along = loaded[quantity.node]
-        return LOADED * change * (0.2 + 0.8 * float(along[quantity.axis] / max(along.max(), 1e-300)))
+        return LOADED * change * (0.2 + 0.8 * float(along[quantity.axis] / max(along.max(), TINY)))
 
     return max(found, key=change)
 

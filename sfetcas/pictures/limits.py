@@ -161,7 +161,7 @@ def _sketch_round(sketch: Sketch, name: str, stop: Obstacle) -> None:
     _strokes(sketch, line, -stop.sign * out, name)
 
 
-def _turns(towards: Array, half: float, count: int) -> Array:
+def _turns(half: float, count: int) -> Array:
     """Angles of wires: evenly all round, or from one end of an arc to the other."""
     return np.linspace(-half, half, count, endpoint=half < math.pi)
 
@@ -183,7 +183,7 @@ def _cylinder(sketch: Sketch, stop: Obstacle) -> list[Array]:
 
     round_about = np.linspace(-half, half, 91)
     arcs = [wire(round_about, np.full(91, at)) for at in np.linspace(low, high, 5)]
-    lines = [wire(np.full(2, angle), np.array([low, high])) for angle in _turns(towards, half, 16)]
+    lines = [wire(np.full(2, angle), np.array([low, high])) for angle in _turns(half, 16)]
     return arcs + lines
 
 
@@ -203,7 +203,7 @@ def _sphere(sketch: Sketch, stop: Obstacle) -> list[Array]:
 
     whole, polar = np.linspace(0.0, 2.0 * math.pi, 91), np.linspace(0.0, half, 46)
     latitudes = [wire(np.full(91, at), whole) for at in np.linspace(0.0, half, 8)[1:]]
-    return latitudes + [wire(polar, np.full(46, turn)) for turn in _turns(pole, math.pi, 12)]
+    return latitudes + [wire(polar, np.full(46, turn)) for turn in _turns(math.pi, 12)]
 
 
 # Stops and slots

@@ -28,7 +28,7 @@ from mpl_toolkits.mplot3d import proj3d  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
 
 from ..description.structure import unit
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from .files import DPI
 from .sketch import (
     BEHIND,
@@ -537,7 +537,7 @@ class Sheet:
         if any(met for _, _, met in tried):
             largest: dict[str, float] = {}
             for label in labels:
-                largest[label.unit] = max(label.value, largest.get(label.unit, 1e-300))
+                largest[label.unit] = max(label.value, largest.get(label.unit, TINY))
             # What has no value, as the number of an equilibrium, is never left out.
             order = sorted(labels, key=lambda label: -label.value / largest[label.unit] if label.unit else -math.inf)
             tried = self._tried(order, crowd, boxes, frame, thin=True)

@@ -297,9 +297,9 @@ class Sketch:
         mark = Mark(kind="area", points=points, name=name, colour=SUPPORT, width=1.2, fill=fill, level=level)
         self.marks.append(mark)
 
-    def dot(self, point: Array, name: str, fill: str = "white") -> None:
+    def dot(self, point: Array, name: str) -> None:
         """Sketch a small circle at (3,)."""
-        mark = Mark(kind="dot", points=point[None, :], name=name, colour=SUPPORT, fill=fill, level=8.0)
+        mark = Mark(kind="dot", points=point[None, :], name=name, colour=SUPPORT, fill="white", level=8.0)
         self.marks.append(mark)
 
     def arrow(self, points: Array, ink: Ink) -> None:

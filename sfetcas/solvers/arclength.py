@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Point, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
@@ -267,7 +267,7 @@ class Curve:
         """A load of size one that has a share in every shape: where an eigenvalue vanishes it moves much."""
         weight, probe = self.prepared.weight, np.zeros(self.equations.total)
         shape = np.random.default_rng(0).standard_normal(self._turning)
-        probe[: self._turning] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), 1e-300))
+        probe[: self._turning] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), TINY))
         return probe
 
     def standing(

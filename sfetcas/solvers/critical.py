@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from .arclength import Curve, Standing, Tangent
 from .sides import Sides
 from .stability import NEUTRAL
@@ -210,7 +210,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
             c, fc, a, fa = a, fa, x, fx
         else:
             c, fc, b, fb, a, fa = b, fb, a, fa, x, fx
-        least = tolerance / max(abs(b - a), 1e-300)
+        least = tolerance / max(abs(b - a), TINY)
         known = blur and abs(fa) <= BLURRED * blur and least > SHARP / APART
         if abs(fa) <= least_value or least > 0.5 or known:
             break

@@ -104,14 +104,11 @@ def _angles(model: Model, here: State, there: State) -> Array:
 
 
 def _rotation_vectors(model: Model, here: State, there: State) -> Array:
-    relative = quaternion.multiply(here.q, quaternion.conjugate(there.q))
-    relative = relative * np.where(relative[:, :1] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(relative[:, 1:], axis=1, keepdims=True)
-    vectors = relative[:, 1:] * (2.0 * np.arctan2(sine, relative[:, :1]) / np.maximum(sine, 1e-300))
+    vectors = quaternion.rotation_vector(quaternion.multiply(here.q, quaternion.conjugate(there.q)))
     # The one unknown of a rotation about a held axis is the angle about it.
     held = model.rotations.kind == Turn.AXIS
     vectors[held, 0] = (vectors * model.rotations.axis).sum(axis=1)[held]
-    return np.asarray(vectors)
+    return vectors
 
 
 @kept(1)

@@ -18,7 +18,7 @@ import numpy as np
 from ..description.records import enumerated
 from ..description.supports import along, upwards
 from ..mathematics.arrays import Array, first_of_largest
-from ..mathematics.linear import blurred
+from ..mathematics.linear import SparseMap, blurred
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from .newton import loose_rows, rows_in
@@ -132,13 +132,10 @@ def _lowest(equations: Equations, stiffness: Array, metric: Array, count: int) -
         loads[:n] = root * block
         block = np.linalg.qr(root * equations.solver.solve(loads)[:n])[0]
     motions = block / root
-    chosen = (equations.row < n) & (equations.column < n)
-    products = np.zeros((n, count))
-    np.add.at(products, equations.row[chosen], stiffness[chosen][:, None] * motions[equations.column[chosen]])
+    chosen = equations.column < n
+    matrix = SparseMap(equations.row[chosen], equations.column[chosen], stiffness[chosen], (equations.total, n))
+    products, gaps = np.split(matrix @ motions, [n])
     # What opens a closing is no motion.
-    rows = (equations.row >= n) & (equations.column < n)
-    gaps = np.zeros((equations.total - n, count))
-    np.add.at(gaps, equations.row[rows] - n, stiffness[rows][:, None] * motions[equations.column[rows]])
     values, turn = np.linalg.eigh(motions.T @ products + gaps.T @ gaps)
     return values, motions @ turn
 

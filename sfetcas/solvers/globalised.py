@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.linear import places_of
 from .program import Program
 from .sides import Sides
 
@@ -189,7 +190,7 @@ class Globalised:
         # What firmness acts upon: rotations by their weight, displacements; softness, with the signs of the pivots.
         self.mass = np.concatenate([weight, np.ones(self._unknowns - self._turning), np.zeros(equations.rows)])
         self.soft = np.repeat([0.0, 1.0, -1.0], [self._turning, self._unknowns - self._turning, equations.rows])
-        row, column = (np.array(part) for part in program.sparsity.get_triplet())
+        row, column = places_of(program.sparsity)
         self.diagonal = np.flatnonzero(row == column)
         # Where the softest shape is looked for from: a rule of the scene, and next to nothing where nothing turns.
         beside = LEAST / (1.0 + np.arange(self._unknowns - self._turning))

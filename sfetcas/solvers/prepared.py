@@ -262,7 +262,7 @@ class Prepared:
 
     def multipliers(self, found: Corrected) -> float:
         """The largest multiplier over the loads, or over the unit of force."""
-        return float(np.abs(found.state.lam).max(initial=0.0)) / max(1.0, self.load_size(found))
+        return float(np.abs(found.state.lam).max(initial=0.0)) / max(1.0, self._load_size)
 
     @functools.cached_property
     def _globalised(self) -> Globalised:
@@ -356,8 +356,9 @@ class Prepared:
         size = max(abs(up.potential), abs(down.potential), up.strain, down.strain)
         return second if up.potential - down.potential > 1e-9 * size else first
 
-    def load_size(self, found: Corrected) -> float:
-        """Largest elastic moment or load in the balance of a state, dimensionless."""
+    @functools.cached_property
+    def _load_size(self) -> float:
+        """Largest load, dimensionless."""
         loading = self.model.loading(1.0)
         return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.moment))
 
@@ -365,6 +366,5 @@ class Prepared:
         """Largest angle between the rotations of two states, rad."""
         if not self.model.space:
             return float(np.abs(a.q - b.q).max(initial=0.0))
-        relative = quaternion.multiply(quaternion.conjugate(a.q), b.q)
-        sine = np.linalg.norm(relative[:, 1:], axis=-1)
-        return float(2.0 * np.arctan2(sine, np.abs(relative[:, 0])).max(initial=0.0))
+        turns = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(a.q), b.q))
+        return float(np.linalg.norm(turns, axis=-1).max(initial=0.0))

@@ -90,9 +90,9 @@ class Program:
                 found[name] = value
         return Given(**{"data": (), "loads": ()} | found)
 
-    def given_of(self, loading: Loading, model: Model | None = None) -> Array:
-        """What is given under loads, with the data of this model or of another one of the same structure."""
-        data = data_of(model or self.model)
+    def given_of(self, loading: Loading) -> Array:
+        """What is given under loads."""
+        data = data_of(self.model)
         parts = [data[name] if name in data else self._load(name, loading) for name in self.sizes]
         return np.concatenate([np.zeros(0), *parts])
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
 from .critical import FIRM, Event, events_between
@@ -236,7 +236,7 @@ def _to_start(curve: Curve, start: Standing, now: Standing, there: Standing) -> 
 
 def _longest(curve: Curve, now: Standing, stride: float) -> float:
     turning = float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
-    return min(STRIDE / max(turning, 1e-300), stride / max(abs(now.tangent.factor), 1e-300))
+    return min(STRIDE / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
 
 def _step(

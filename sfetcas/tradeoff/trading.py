@@ -11,7 +11,7 @@ Each run has a process of its own: the first run is a first run, and memory is i
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -144,10 +144,10 @@ class Trade:
     notes: tuple[str, ...] = ()
     peers: tuple[Peer, ...] = ()
 
-    def front(self, cost: Callable[[Row], float], rows: Iterable[Row] | None = None) -> list[Row]:
+    def front(self, cost: Callable[[Row], float]) -> list[Row]:
         """Rows of which none is both better and cheaper, the cheapest first."""
         best, found = np.inf, []
-        for row in sorted(self.rows if rows is None else rows, key=lambda row: (cost(row), row.error)):
+        for row in sorted(self.rows, key=lambda row: (cost(row), row.error)):
             if row.error < best and np.isfinite(cost(row)):
                 found.append(row)
                 best = row.error

@@ -21,7 +21,7 @@ from ..description.scene import Scene
 from ..dynamics.stages import StageEquations
 from ..equilibria.settings import Settings
 from ..errors import SceneError
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import TINY, Array, Index
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import moved_by
 from ..mechanics.masses import masses_of
@@ -256,7 +256,7 @@ class ControlledSystem:
         values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
         values, vectors = values[::-1], vectors[:, ::-1]
         shapes = basis @ np.linalg.solve(factor.T, vectors)
-        massive = values > 1e-12 * max(values.max(initial=0.0), 1e-300)
+        massive = values > 1e-12 * max(values.max(initial=0.0), TINY)
         squares = np.where(massive, 1.0 / np.where(massive, values, 1.0) - shift, np.inf)
         return np.sqrt(np.maximum(squares, 0.0)), mass @ shapes, stiffness[:free, :free] @ shapes
 
@@ -279,7 +279,7 @@ def _null_space(rows: Array) -> Array:
     if not len(rows):
         return np.eye(rows.shape[1])
     _, sizes, right = np.linalg.svd(rows)
-    rank = int((sizes > 1e-10 * max(sizes.max(initial=0.0), 1e-300)).sum())
+    rank = int((sizes > 1e-10 * max(sizes.max(initial=0.0), TINY)).sum())
     return np.asarray(right[rank:].T)
 
 

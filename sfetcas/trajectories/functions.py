@@ -21,7 +21,7 @@ from ..description.scene import Scene
 from ..dynamics.index_one import LINEAR, IndexOne
 from ..equilibria.settings import Settings
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..parametric.equilibrium import Place
 from .controlled import ControlledSystem
 from .optimal_control import moving
@@ -278,6 +278,3 @@ KEPT = ["gaps", "rates", "norms"]
 
 SINGULAR = 1e-12
 """Share of the largest singular value below which the matrix of accelerations and multipliers has no inverse."""
-
-TINY = 1e-300
-"""Keeps zero from being divided by."""

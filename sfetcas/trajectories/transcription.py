@@ -21,9 +21,8 @@ import numpy as np
 from ..description.records import unknown
 from ..dynamics.methods import RADAU
 from ..errors import SceneError
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.interpolation import differentiation, integration
-from ..mathematics.kernels import Kernels
 from ..mathematics.pieces import Pieces, Unknown
 from ..mathematics.relations import Relation
 from .controlled import ControlledSystem
@@ -69,16 +68,13 @@ class Transcription:
     statement : Statement
     system : ControlledSystem
     guess : Course
-    kernels : str
     """
 
-    def __init__(
-        self, statement: Statement, system: ControlledSystem, guess: Course, kernels: Kernels = "auto"
-    ) -> None:
+    def __init__(self, statement: Statement, system: ControlledSystem, guess: Course) -> None:
         self.statement, self.system, self.guess = statement, system, guess
         self.places = RADAU[statement.stages]
         self.intervals, self.stages = len(statement.shares), statement.stages
-        self.pieces = Pieces(kernels)
+        self.pieces = Pieces()
         self._lifted: dict[str, Unknown] = {}
         self.resting: dict[str, Unknown] = {}
         self._unknowns()
@@ -93,7 +89,7 @@ class Transcription:
         system, guess, statement, pieces = self.system, self.guess, self.statement, self.pieces
         shape = (self.intervals, self.stages)
         low, high = statement.duration
-        unit = max(guess.end, 1e-300)
+        unit = max(guess.end, TINY)
         self.end = pieces.unknowns("end time", guess.end, low, high, unit)
         turning = system.system.equations.turning_unknowns
         d = guess.d.copy()
@@ -514,7 +510,7 @@ RESOLVED = 2.0
 
 def _scaled(columns: Array) -> Array:
     """Columns of length one."""
-    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), TINY))
 
 
 def _varying(name: str, found: Relation) -> Relation:
