@@ -23,10 +23,21 @@ from sfetcas.parametric.arguments import argument, default_arguments
 from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 PROBLEMS = Path(__file__).parent.parent / "problems"
-STATIC = [
-    file for file in sorted(PROBLEMS.glob("*.toml")) if load(file).analysis.type == "static" and not load(file).contacts
-]
+
+
+def is_static(file):
+    """Without contacts; by the text, as making scenes of all files at each start of the tests takes seconds."""
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    return table.get("analysis", {}).get("type", "static") == "static" and "contacts" not in table
+
+
+STATIC = [file for file in sorted(PROBLEMS.glob("*.toml")) if is_static(file)]
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
 
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
@@ -65,7 +76,7 @@ def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
     words = re.fullmatch(r"(\d+) of (\d+) cases agree, (\d+) of them to the last bit.*\n", said(program))
     assert words
     outcome, results = solver.solve()
-    assert outcome.code in (Code.SOLVED, Code.UNSTABLE)
+    assert outcome.code is (Code.UNSTABLE if solver.answer.certificate.stable is False else Code.SOLVED)
     # What has no solution is told by its status only.
     cases = int(words[2])
     assert int(words[1]) == cases
@@ -208,7 +219,9 @@ def test_default_arguments():
     assert default_arguments(beam()) == ["factor", "loads.tip.value"]
     assert argument(beam(), "loads.tip.value").default == (0.3, 4.0)
     scene = load(PROBLEMS / "portal_frame_sprung_feet.toml")
-    assert "factor" not in default_arguments(scene) or scene.gravity is not None
+    # Each load has a history, and nothing is left to the factor.
+    names = ("first", "second", "third")
+    assert default_arguments(scene) == [*(f"histories.{n}" for n in names), *(f"loads.{n}.value" for n in names)]
 
 
 # -- the files ------------------------------------------------------------------------------------
@@ -722,12 +735,14 @@ def test_export_needs_no_compiler(tmp_path, monkeypatch):
     export(beam(), tmp_path / "d", derivatives=True)
 
 
+@needs_compiler
 def test_benchmark_of_generated_c(capsys, monkeypatch):
     monkeypatch.setattr(benchmark_code, "CASES", ((False, "SFET5", 2),))
     monkeypatch.setattr(benchmark_code, "STEPS", ("radau-2",))
     benchmark_code.code()
     said_of = capsys.readouterr().out
-    assert ("plane, 2 SFET5" in said_of and "radau-2" in said_of) or "no C compiler" in said_of
+    assert "plane, 2 SFET5" in said_of
+    assert "radau-2" in said_of
 
 
 @needs_compiler
