@@ -19,7 +19,7 @@ gc.set_threshold(20_000, 20, 20)
 
 
 def durations():
-    """What the file says: of tests the seconds of the slowest case, of single cases `long`."""
+    """What the file says: of tests the seconds of the slowest case, of single cases `long` or `fast`."""
     lines = DURATIONS.read_text(encoding="utf-8").splitlines()
     return {name: first for first, name in (line.split(" ", 1) for line in lines if not line.startswith("#"))}
 
@@ -54,7 +54,7 @@ class Clock:
         for name, seconds in self.seconds.items():
             measured[function(name)] = max(seconds, measured.get(function(name), 0.0))
         slow = {name: f"{seconds:.1f}" for name, seconds in measured.items() if seconds >= FAST}
-        kept = {name: first for name, first in said.items() if first == "long" or name not in measured}
+        kept = {name: first for name, first in said.items() if first in ("long", "fast") or name not in measured}
         head = [line for line in DURATIONS.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
         lines = [f"{first} {name}" for name, first in sorted({**slow, **kept}.items())]
         DURATIONS.write_text("\n".join([*head, *lines, ""]), encoding="utf-8")
@@ -65,18 +65,19 @@ def pytest_collection_modifyitems(config, items):
     """Marks what is fast; what is long runs with --long or where it is named."""
     said = durations()
     long = {name for name, first in said.items() if first == "long"}
-    config.stash[COLLECTED] = {item.nodeid for item in items}
+    whole = not any("::" in argument for argument in config.args)
+    config.stash[COLLECTED] = {item.nodeid for item in items if whole}
     for item in items:
-        if item.nodeid not in long and function(item.nodeid) not in said:
+        if said.get(item.nodeid, said.get(function(item.nodeid), "fast")) == "fast":
             item.add_marker("fast")
-    if not config.getoption("--long") and not any("::" in argument for argument in config.args):
+    if whole and not config.getoption("--long"):
         config.hook.pytest_deselected(items=[item for item in items if item.nodeid in long])
         items[:] = [item for item in items if item.nodeid not in long]
 
 
 @pytest.fixture(scope="session")
 def lost_names(pytestconfig):
-    """What `durations.txt` says of tests that are not there any more, in files that were collected."""
+    """What `durations.txt` says of tests that are not there any more, in files that were collected as a whole."""
     found = pytestconfig.stash[COLLECTED]
     files = {name.partition("::")[0] for name in found}
     there = found | {function(name) for name in found}
