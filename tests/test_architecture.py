@@ -1,11 +1,10 @@
 """The rules that keep the source readable: order of the modules, no cycle, nothing hidden."""
 
 import ast
+import functools
 import importlib
 import inspect
 from pathlib import Path
-
-import pytest
 
 import sfetcas
 
@@ -288,10 +287,34 @@ def named(path):
     return ".".join(parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts)
 
 
-TREES = {named(path): ast.parse(path.read_text()) for path in sorted(FOLDER.rglob("*.py"))}
+FILES = {named(path): path for path in sorted(FOLDER.rglob("*.py"))}
 PACKAGES = {path.parent.name for path in FOLDER.glob("*/__init__.py")}
-MODULES = sorted(TREES)
-each = pytest.mark.parametrize("name", MODULES)
+MODULES = sorted(FILES)
+
+
+@functools.cache
+def tree(name):
+    return ast.parse(FILES[name].read_text())
+
+
+@functools.cache
+def nodes(name):
+    return list(ast.walk(tree(name)))
+
+
+def each(rule):
+    """One test of all modules, which tells every one that breaks the rule: a test for each would take twice as long."""
+
+    def test():
+        broken = []
+        for name in MODULES:
+            try:
+                rule(name)
+            except AssertionError as error:
+                broken.append(f"{name}: {error}")
+        assert not broken, "\n".join(broken)
+
+    return test
 
 
 def sources(name, node):
@@ -308,11 +331,12 @@ def sources(name, node):
     return {place}
 
 
+@functools.cache
 def taken():
     """For each module what others import from it: (module, names)."""
     found = {}
-    for other, tree in TREES.items():
-        for node in ast.walk(tree):
+    for other in MODULES:
+        for node in nodes(other):
             if isinstance(node, ast.ImportFrom) and node.level and len(sources(other, node)) == 1:
                 (name,) = sources(other, node)
                 names = {alias.name for alias in node.names} - {name.split(".")[-1]}
@@ -320,13 +344,12 @@ def taken():
     return found
 
 
-TAKEN = taken()
-
-
+@functools.cache
+@functools.cache
 def imported(name):
     """(own modules, other top-level packages) that a module imports, also inside functions."""
     own, other = set(), set()
-    for node in ast.walk(TREES[name]):
+    for node in nodes(name):
         if isinstance(node, ast.ImportFrom):
             if node.level or node.module.split(".")[0] == "sfetcas":
                 own |= sources(name, node)
@@ -335,7 +358,7 @@ def imported(name):
         elif isinstance(node, ast.Import):
             other |= {alias.name.split(".")[0] for alias in node.names}
     # The command line reads the version from the package.
-    return {source if source in TREES else "__init__" for source in own}, other
+    return {source if source in FILES else "__init__" for source in own}, other
 
 
 def test_every_module_has_its_place():
@@ -364,7 +387,7 @@ def test_mechanics_and_solvers_know_no_more_than_they_need(name):
 
 @each
 def test_no_print_no_bare_except_no_global_state(name):
-    for node in ast.walk(TREES[name]):
+    for node in nodes(name):
         if isinstance(node, ast.ExceptHandler):
             assert node.type is not None, f"bare except in line {node.lineno}"
             caught = {getattr(t, "id", "") for t in getattr(node.type, "elts", [node.type])}
@@ -388,7 +411,7 @@ def test_imports_stand_at_the_top(name):
     imports = [node for node in ast.walk(TREES[name]) if isinstance(node, (ast.Import, ast.ImportFrom))]
     inside = {
         node
-        for function in ast.walk(TREES[name])
+        for function in nodes(name)
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
         for node in ast.walk(function)
         if node in imports
@@ -404,7 +427,7 @@ def test_imports_stand_at_the_top(name):
 @each
 def test_all_is_complete_and_documented(name):
     if name in ("__main__", *PACKAGES, *PICTURES):
-        assert ast.get_docstring(TREES[name])
+        assert ast.get_docstring(tree(name))
         return
     module = importlib.import_module("sfetcas" if name == "__init__" else f"sfetcas.{name}")
     assert module.__doc__
@@ -417,13 +440,13 @@ def test_all_is_complete_and_documented(name):
     if name == "__init__":
         return
     # What other modules import is public in the module it comes from.
-    for other, names in TAKEN.get(name, []):
+    for other, names in taken().get(name, []):
         assert names <= set(module.__all__), f"imported by {other}"
 
 
 @each
 def test_public_methods_are_documented(name):
-    classes = [node for node in TREES[name].body if isinstance(node, ast.ClassDef)]
+    classes = [node for node in tree(name).body if isinstance(node, ast.ClassDef)]
     methods = [(c, m) for c in classes for m in c.body if isinstance(m, ast.FunctionDef) and not m.name.startswith("_")]
     # What an abstract class asks for is said once, in its docstring.
     asked = {m.name for _, m in methods if any("abstractmethod" in ast.unparse(d) for d in m.decorator_list)}
@@ -435,8 +458,13 @@ def test_public_methods_are_documented(name):
 def test_package_exports_what_it_lists():
     names = {
         alias.asname or alias.name
-        for node in TREES["__init__"].body
+        for node in tree("__init__").body
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
     assert names == set(sfetcas.__all__)
+
+
+def test_durations_are_those_of_tests(lost_names):
+    """The line of a test that has another name by now is deleted; `pytest --time` writes the new one."""
+    assert lost_names == []

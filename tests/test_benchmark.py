@@ -132,7 +132,9 @@ def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
 def test_paths_are_measured(capsys, once, monkeypatch):
     monkeypatch.setattr(benchmark, "PATH_ACCURACIES", (1e-4,))
     benchmark.main(["path"])
-    for line in capsys.readouterr().out.strip().splitlines()[2:]:
+    lines = capsys.readouterr().out.strip().splitlines()[2:]
+    assert len(lines) == 3
+    for line in lines:
         _, points, limits, seconds, each, single, hundred = re.match(
             r"\s+([\w' -]+?)\s+(\d+)\s+(\d+)\s+([\d.]+) s\s+([\d.]+)\s+([\d.]+) ms\s+100 points: ([\d.]+) single", line
         ).groups()

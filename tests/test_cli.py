@@ -268,7 +268,7 @@ def test_command_line_as_a_process(scene):
         run, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONWARNINGS": "error"}
     )
     assert done.stderr == ""
-    assert "stable" in done.stdout
+    assert "\n  stable, smallest eigenvalue" in done.stdout
 
 
 def test_importing_costs_no_matplotlib():

@@ -23,10 +23,21 @@ from sfetcas.parametric.arguments import argument, default_arguments
 from sfetcas.parametric.equilibrium import equilibrium_solver
 from sfetcas.solvers.globalised import Code
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 PROBLEMS = Path(__file__).parent.parent / "problems"
-STATIC = [
-    file for file in sorted(PROBLEMS.glob("*.toml")) if load(file).analysis.type == "static" and not load(file).contacts
-]
+
+
+def is_static(file):
+    """Without contacts; by the text, as making scenes of all files at each start of the tests takes seconds."""
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    return table.get("analysis", {}).get("type", "static") == "static" and "contacts" not in table
+
+
+STATIC = [file for file in sorted(PROBLEMS.glob("*.toml")) if is_static(file)]
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
 
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs a C compiler")
@@ -65,7 +76,7 @@ def test_c_gives_the_bits_of_the_solver_in_process(file, tmp_path):
     words = re.fullmatch(r"(\d+) of (\d+) cases agree, (\d+) of them to the last bit.*\n", said(program))
     assert words
     outcome, results = solver.solve()
-    assert outcome.code in (Code.SOLVED, Code.UNSTABLE)
+    assert outcome.code is (Code.UNSTABLE if solver.answer.certificate.stable is False else Code.SOLVED)
     # What has no solution is told by its status only.
     cases = int(words[2])
     assert int(words[1]) == cases
@@ -208,7 +219,9 @@ def test_default_arguments():
     assert default_arguments(beam()) == ["factor", "loads.tip.value"]
     assert argument(beam(), "loads.tip.value").default == (0.3, 4.0)
     scene = load(PROBLEMS / "portal_frame_sprung_feet.toml")
-    assert "factor" not in default_arguments(scene) or scene.gravity is not None
+    # Each load has a history, and nothing is left to the factor.
+    names = ("first", "second", "third")
+    assert default_arguments(scene) == [*(f"histories.{n}" for n in names), *(f"loads.{n}.value" for n in names)]
 
 
 # -- the files ------------------------------------------------------------------------------------
@@ -532,16 +545,23 @@ def test_a_cold_solve_leads_where_statics_does():
 # -- in process -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["lee", "bend_45_degrees", "four", "spatial_loop_ball", "clamped_rod_end_twist"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "bend_45_degrees",
+        "fourbar_curved_coupler",
+        "fourbar_flexible_hinges_in_space",
+        "spatial_loop_ball",
+        "clamped_rod_end_twist",
+    ],
+)
 def test_newton_in_process_gives_the_answers_of_ipopt(name):
-    files = [file for file in STATIC if name in file.stem][:2]
-    for file in files:
-        scene = load(file)
-        both = [solve(scene, Settings(solver=solver)).steps for solver in ("ipopt", "newton")]
-        for one, other in zip(*both, strict=True):
-            for node in scene.nodes:
-                size = scene.size * scene.analysis.accuracy
-                assert one.position(node) == pytest.approx(other.position(node), abs=2.0 * size)
+    scene = load(PROBLEMS / f"{name}.toml")
+    both = [solve(scene, Settings(solver=solver)).steps for solver in ("ipopt", "newton")]
+    for one, other in zip(*both, strict=True):
+        for node in scene.nodes:
+            size = scene.size * scene.analysis.accuracy
+            assert one.position(node) == pytest.approx(other.position(node), abs=2.0 * size)
 
 
 def test_newton_is_deterministic():
@@ -728,12 +748,14 @@ def test_export_needs_no_compiler(tmp_path, monkeypatch):
     export(beam(), tmp_path / "d", derivatives=True)
 
 
+@needs_compiler
 def test_benchmark_of_generated_c(capsys, monkeypatch):
     monkeypatch.setattr(benchmark_code, "CASES", ((False, "SFET5", 2),))
     monkeypatch.setattr(benchmark_code, "STEPS", ("radau-2",))
     benchmark_code.code()
     said_of = capsys.readouterr().out
-    assert ("plane, 2 SFET5" in said_of and "radau-2" in said_of) or "no C compiler" in said_of
+    assert "plane, 2 SFET5" in said_of
+    assert "radau-2" in said_of
 
 
 @needs_compiler

@@ -90,8 +90,6 @@ def test_limit_loads_of_a_symmetric_path_are_those_of_a_dead_load():
     found, wanted = ([p.factor for p in path.limit_points] for path in (following, dead))
     np.testing.assert_allclose(found, wanted, rtol=1e-8)
     found, wanted = ([p.factor for p in path.bifurcations] for path in (following, dead))
-    assert found
-    assert wanted
     assert abs(found[0] / wanted[0] - 1.0) > 1e-3
 
 

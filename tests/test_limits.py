@@ -270,7 +270,9 @@ def test_undeformed_lines_do_not_look_like_unstable_ones(seven):
         return np.inf if dashes is None else max(dashes[0::2]) / lines.get_linewidth()[0]
 
     (rest,) = named(figure, "undeformed", Collection)
-    assert all(longest_dash(lines) > 3.0 * longest_dash(rest) for lines in named(figure, "earlier", Collection))
+    others = named(figure, "earlier", Collection)
+    assert len(others) == 6
+    assert all(longest_dash(lines) > 3.0 * longest_dash(rest) for lines in others)
 
 
 def test_many_steps_have_one_entry_for_each_stability():

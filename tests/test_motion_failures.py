@@ -27,11 +27,11 @@ def test_velocities_that_joints_forbid():
     refused(changed(free, nodes__B__velocity=[2, 0, 0]), "contradicts the joints")
     with pytest.raises(SceneError) as found:
         moved(changed(free, nodes__B__velocity=[2, 0, 0]), 1.0)
-    assert str(found.value).startswith(("nodes.A.velocity", "nodes.B.velocity"))
+    assert str(found.value).startswith("nodes.B.velocity")
     rigid = changed(free, members__m__type="rigid", members__m__spin=1.0, nodes__B__velocity=[1, 5, 0])
     with pytest.raises(SceneError) as found:
         moved(rigid, 1.0)
-    assert str(found.value).startswith(("nodes.B.velocity", "members.m.spin"))
+    assert str(found.value).startswith("nodes.B.velocity")
 
 
 def test_velocities_that_joints_allow_nearly():

@@ -149,7 +149,7 @@ def test_answers_have_names_as_data(kind, tmp_path, monkeypatch, capsys):
     scene = hostile(analysis=analysis)
     dump(scene, "scene.json")
     outs = ["--json", "out.json", "--plot", "out.svg", "--vtk", "vtk"]
-    assert main(["run", "scene.json", *outs]) in (0, 1)
+    assert main(["run", "scene.json", *outs]) == 0
     printed = capsys.readouterr()
     for stream in printed:
         assert all(line.isprintable() for line in stream.split("\n"))
@@ -168,7 +168,7 @@ def test_tables_have_names_as_data(tmp_path, monkeypatch, capsys):
     column = f"loads.{NAMES[7]}.value.1"
     asked = ["--vary", f"{column}=0.01,1e300", "--quantity", f"nodes.{NAMES[4]}.position", "--workers", "1"]
     outs = [word for ending in ("csv", "json", "npz") for word in ("--out", f"out.{ending}")]
-    assert main(["sweep", "scene.json", *asked, *outs]) in (0, 1)
+    assert main(["sweep", "scene.json", *asked, *outs]) == 1
     assert all(line.isprintable() for line in capsys.readouterr().out.split("\n"))
     with open("out.csv", newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file)

@@ -386,7 +386,12 @@ def test_straight_lines_have_room(end, dimension):
 
 def test_far_from_the_origin():
     table = scenes.transformed(scenes.plane_loads(), shift=(1e7, -1e7, 0))
-    picture(solve(scenes.made(table))).draw_without_rendering()
+    figure = picture(solve(scenes.made(table)))
+    figure.draw_without_rendering()
+    (low, high), (below, above) = figure.axes[0].get_xlim(), figure.axes[0].get_ylim()
+    # A member of length 1 begins there, and the limits are of its size.
+    assert low < 1e7 < high < low + 10.0
+    assert below < -1e7 < above < below + 10.0
 
 
 @pytest.mark.parametrize(

@@ -27,18 +27,15 @@ def test_there_are_problems() -> None:
 
 
 @by_name
-def test_problem_names_its_source_and_the_reasons_of_its_tolerances(file: Path) -> None:
+def test_problem_is_solved(file: Path) -> None:
+    """And names its source, and the reasons of its tolerances."""
     scene = load(file)
     assert scene.title
     assert scene.source
     assert scene.expect
     for expect in scene.expect:
         assert expect.tolerance is None or (expect.tolerance > 0.0 and expect.why), expect.quantity
-
-
-@by_name
-def test_problem_is_solved(file: Path) -> None:
-    assert not failures(load(file))
+    assert not failures(scene)
 
 
 def test_falsified_reference_fails() -> None:

@@ -49,17 +49,22 @@ def test_most_are_solved():
     assert len(refused) < len(SEEDS) / 3
 
 
-@pytest.mark.parametrize(("name", "seed"), [(name, seed) for name, seeds in FEW.items() for seed in seeds])
+REFUSED = "refused: distributed followers need integration at the nodes, found Gauss integration"
+LEVEL = "another equilibrium (of the same energy; neutral, neutral)"
+
+
+# Those in space are in space already.
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [(name, seed) for name, seeds in FEW.items() for seed in seeds if name != "space" or seed % 2 == 0],
+)
 def test_the_same_however_it_is_put(name, seed):
-    """Another equilibrium has to be one of both models; what cannot be modelled otherwise is refused."""
+    """What is in space needs no model in space."""
     found = answer(seed)
-    if isinstance(found, Exception) or (name == "space" and found.scene.resolved_dimension == "space"):
-        pytest.skip("nothing to compare")
     said = compared(found.last, variant(name, found.scene, found.last, seed))
-    assert said.startswith(("same", "another equilibrium", "unstable in space", "refused")), said
-    if said.startswith("refused"):
-        # Gauss points do not carry distributed followers; out of plane what nothing holds may turn.
-        assert "need integration at the nodes" in said if name == "gauss" else name == "space", said
+    # Nothing holds 2011 along a motion that changes no energy: where it stands on its way depends on the axes.
+    accepted = {("gauss", 2009): {REFUSED}}.get((name, seed), {"same", LEVEL} if seed == 2011 else {"same"})
+    assert said in accepted
 
 
 def test_a_seed_gives_one_scene_and_others_give_others():
@@ -337,11 +342,10 @@ def test_weight_of_a_rigid_member_with_a_kink_in_its_mass():
 
 
 def test_a_turn_within_an_element_is_no_answer():
-    """In space this one jumps into a state whose rotation goes once round within 1e-9 of a member."""
+    """In space this one once jumped into a state whose rotation goes once round within 1e-9 of a member."""
     plane = random_scene(550)
     found = solve(plane).last
-    said = compared(found, variant("space", plane, found, 550))
-    assert said.startswith(("refused", "same", "another equilibrium", "unstable in space")), said
+    assert compared(found, variant("space", plane, found, 550)) == "same"
 
 
 def test_a_strut_held_at_its_exact_length_is_stretched():

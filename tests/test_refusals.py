@@ -85,10 +85,10 @@ def test_weight_holds_a_mechanism_also_against_a_small_moment(kind, value):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_moment_beyond_the_weight_names_the_free_motion_first(kind):
-    with pytest.raises((SolveError, SceneError)) as caught:
+    with pytest.raises(SceneError if kind == "rigid" else SolveError) as caught:
         sfetcas.solve(made(fourbar(kind, moment(1000.0), gravity=[0, -9.81])))
     assert "free to move: members crank, coupler, rocker turning" in str(caught.value)
-    if isinstance(caught.value, SolveError):
+    if kind != "rigid":
         assert caught.value.detail.startswith("free to move: ")
 
 
@@ -232,7 +232,7 @@ def test_straight_member_between_clamps_is_refused_on_the_third_finer_mesh(monke
         "nodes": {"a": {"position": [0, 0], "support": "clamped"}, "b": {"position": [1, 0], "support": "clamped"}},
         "members": {"m": {"nodes": ["a", "b"], "section": "s"}},
     }
-    with pytest.raises(SolveError, match=r"straight between places that come no closer|fully stretched"):
+    with pytest.raises(SolveError, match="fully stretched between held points"):
         sfetcas.solve(made(scene))
     assert len(meshes) < 20
 

@@ -413,7 +413,9 @@ def test_mirror_images_of_an_equilibrium_of_a_symmetric_scene_are_equilibria():
     table["sections"]["s"] = {"EI2": 2.0, "EI3": 1.0, "GJ": 0.8}
     ready, loading = prepared(table)
     start = ready.equations.start(loading)
-    for shape in ready.spectrum(ready.correct(start, loading), 2)[1]:
+    shapes = ready.spectrum(ready.correct(start, loading), 2)[1]
+    assert len(shapes) == 2
+    for shape in shapes:
         step = np.zeros(ready.equations.total)
         step[: len(shape)] = 1.5 * shape
         found = deflated(ready, ready.equations.moved(start, step), loading, [start])

@@ -239,8 +239,7 @@ def test_steps_are_answers_of_their_own():
     assert solution.last is solution.steps[-1]
 
 
-def test_hysteresis_needs_the_way():
-    """Loads down and back up again along the steps: an answer beyond a fold is continued, not started anew."""
+def test_turns_are_counted_along_steps_in_any_order():
     table = cantilever((0.0, 1.0))
     table["loads"] = {"m": {"type": "moment", "node": "B", "value": 2 * np.pi}}
     table["analysis"] = {"steps": [1.0, 3.0, 2.0]}
@@ -274,7 +273,7 @@ def test_fully_stretched_member_is_refused():
     line = made(table).center_lines["m"].length
     chord = np.array([1.0, 0.2])
     table["motions"] = {"pull": {"node": "B", "displacement": ((line / np.linalg.norm(chord) - 1) * chord).tolist()}}
-    with pytest.raises(SolveError):
+    with pytest.raises(SolveError, match=r"motions\.pull asks for more than there is in closing of m, x"):
         solve(made(table))
 
 
@@ -421,7 +420,7 @@ def two_bars(rise, *, length=1.0, force=1.0, turned=0.0, kinds=("rigid", "rigid"
 @pytest.mark.parametrize("kinds", [("rigid", "rigid"), ("rigid", "flexible"), ("flexible", "flexible")])
 def test_no_finite_force_holds_two_straight_bars(kinds, length, turned, force):
     """Newton's method halves their rise and doubles their forces until rounding stops it: that is no equilibrium."""
-    with pytest.raises(SolveError, match=r"fully stretched|straight between|free to move"):
+    with pytest.raises(SolveError, match=r"no finite force holds .*fully stretched between held points"):
         solve(made(two_bars(0.0, length=length, force=force, turned=turned, kinds=kinds)))
 
 

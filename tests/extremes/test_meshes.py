@@ -79,5 +79,5 @@ def test_turns_are_followed_on_a_mesh_of_its_own(turns):
 @pytest.mark.parametrize("mesh", [("SFET2", 1), ("SFET3", 2), ("SFET5", 1)])
 def test_moments_of_several_turns_on_one_element(mesh):
     scene = extremes.cantilever(0.0, True, moment=6.0 * np.pi, element=mesh[0], elements=mesh[1])
-    with pytest.raises(SolveError, match=r"more elements may help|take more|could not be followed from zero"):
+    with pytest.raises(SolveError, match="take more"):
         solve(scene)

@@ -42,9 +42,7 @@ def test_four_bar_from_beside_its_dead_point(exponent, kind):
 def test_two_bars_nearly_in_line(exponent, kind):
     rise = 10.0**-exponent
     if exponent > 6:
-        with pytest.raises(
-            SolveError, match=r"^(no finite force holds|the solver stopped).*\(free to move: members AB, BC"
-        ):
+        with pytest.raises(SolveError, match=r"^no finite force holds .*\(free to move: members AB, BC"):
             solve(extremes.bars(rise, kind))
         return
     step = solve(extremes.bars(rise, kind)).last
