@@ -18,6 +18,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from . import __version__
 from .analyses import solve
 from .checks import Answer, Check, check
 from .codegen.folder import export
@@ -129,6 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="sfetcas", description="Equilibria of very flexible beams under large motion."
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="solve a scene and print a short report")
     run.add_argument("file", type=Path, help="scene file, .toml or .json")
