@@ -1,20 +1,19 @@
-"""What a scene asks for is what is done: statics, a path, modes or a motion."""
+"""What a scene asks for is what is done: statics, a path, modes or a motion; only that is imported."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from .checks import Answer, look_up
 from .description.scene import Scene, check_loaded
-from .dynamics.modes import find_modes
-from .dynamics.simulation import simulate
 from .equilibria import statics, stops
 from .equilibria.statics import Settings
 from .errors import SceneError
 from .mechanics.resistance import check_resistance
-from .paths import paths
+
+if TYPE_CHECKING:
+    from .checks import Answer
 
 __all__ = ["solve"]
 
@@ -58,12 +57,19 @@ def solve(
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
     if scene.analysis.type == "dynamic":
+        from .checks import look_up
+        from .dynamics.simulation import simulate
+
         return simulate(scene, settings, look_up, progress)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":
-        return paths.follow_path(scene, settings)
+        from .paths.paths import follow_path
+
+        return follow_path(scene, settings)
     if scene.analysis.type == "modes":
+        from .dynamics.modes import find_modes
+
         return find_modes(scene, settings)
     stopped = any(spring.stop is not None for spring in scene.springs.values())
     return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)

@@ -275,6 +275,14 @@ PICTURES = (
 """What needs matplotlib, which a run pays for only when a picture is asked for."""
 
 
+HEAVY = {"scipy", "tqdm"}
+"""Packages that take long to import and that few runs need: they may be imported where they are used."""
+
+DISPATCHERS = ("analyses", "outputs", "cli")
+"""What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
+chose."""
+
+
 def named(path):
     """A module by its place below the package: ``mechanics.mesh``, ``mechanics`` for that package itself."""
     parts = path.relative_to(FOLDER if path.is_relative_to(FOLDER) else BENCHMARKS.parent).with_suffix("").parts
@@ -382,9 +390,9 @@ def test_imports_stand_at_the_top(name):
         for node in ast.walk(function)
         if isinstance(node, (ast.Import, ast.ImportFrom))
     ]
-    # Pictures, and a bar on a terminal, are what a run does not pay for unless they are asked for.
-    allowed = {"outputs": {*PICTURES, "pictures.paraview"}, "cli": {"tqdm"}}.get(name, set())
-    assert {getattr(node, "module", None) for node in inside} <= allowed
+    names = {getattr(node, "module", None) or ", ".join(alias.name for alias in node.names) for node in inside}
+    if name not in DISPATCHERS:
+        assert {found.split(".")[0] for found in names} <= HEAVY
 
 
 @each
@@ -419,11 +427,19 @@ def test_public_methods_are_documented(name):
             assert ast.get_docstring(method), f"{owner.name}.{method.name}"
 
 
-def test_package_exports_what_it_lists():
-    names = {
-        alias.asname or alias.name
-        for node in TREES["__init__"].body
-        if isinstance(node, ast.ImportFrom)
+def test_package_has_the_names_that_type_checkers_see():
+    seen = {
+        (alias.name, f"sfetcas.{node.module}")
+        for node in ast.walk(TREES["__init__"])
+        if isinstance(node, ast.ImportFrom) and node.level
         for alias in node.names
     }
-    assert names == set(sfetcas.__all__)
+    assert seen == {(name, f"sfetcas.{module}") for name, module in sfetcas._MODULES.items()}
+    assert {name for name, _ in seen} == set(sfetcas.__all__) <= set(dir(sfetcas))
+    for name, module in seen:
+        assert getattr(sfetcas, name) is getattr(importlib.import_module(module), name)
+
+
+def test_other_names_are_refused():
+    with pytest.raises(AttributeError, match="module 'sfetcas' has no attribute 'solv'"):
+        sfetcas.solv  # noqa: B018
