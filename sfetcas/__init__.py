@@ -120,7 +120,7 @@ if TYPE_CHECKING:
     from .trajectories.replay import Response as Response
     from .trajectories.replay import respond as respond
 
-# What is imported stays: to look for garbage in it would take a sixth of a small run.  The command lets that begin later.
+# What is imported stays: looking for garbage in it would take a sixth of a small run, and the command does that later.
 if sfetcas.stopping.COMMAND:
     gc.disable()
 
