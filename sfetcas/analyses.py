@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from .description.scene import Scene, check_loaded
+from .description.scene import Scene, check_loaded, check_scene
 from .equilibria import statics, stops
 from .equilibria.statics import Settings
 from .errors import SceneError
@@ -53,6 +53,7 @@ def solve(
     >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
+    check_scene(scene, "solve({})")
     settings = replace(settings or Settings(), **changes)
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import numpy as np
 
 from .description.records import say
-from .description.scene import Expect, Scene
+from .description.scene import Expect, Scene, check_scene
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.quantities import entry_of, value_of
 from .equilibria.solution import Equilibrium, Solution
@@ -55,6 +55,7 @@ def check(scene: Scene, solution: Answer) -> list[Check]:
     SceneError
         A quantity that the answer does not have.
     """
+    check_scene(scene, "check({}, ...)")
     checks = []
     entries = _assigned(scene, solution)
     for i, expect in enumerate(scene.expect):
