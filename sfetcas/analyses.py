@@ -15,7 +15,10 @@ from .mechanics.resistance import check_resistance
 if TYPE_CHECKING:
     from .checks import Answer
 
-__all__ = ["solve"]
+__all__ = ["LATER", "solve"]
+
+LATER = ("sfetcas.dynamics.modes", "sfetcas.dynamics.simulation", "sfetcas.paths.paths")
+"""Modules that :func:`solve` imports by the type of the analysis; for processes that solve they are imported once."""
 
 
 def solve(

@@ -1,10 +1,15 @@
 """What is imported when: the package itself next to nothing, a run of the command what its scene needs."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from sfetcas.analyses import LATER
+from sfetcas.sweeps.workers import PRELOADED
+from sfetcas.tradeoff import running
 
 ROOT = Path(__file__).parent.parent
 SCENE = "problems/hinged_beam_end_shortening.toml"
@@ -66,3 +71,11 @@ except SystemExit:
 assert gc.isenabled()
 """
     assert "sfetcas.cli" in loaded(code)
+
+
+def test_processes_that_solve_have_all_analyses_imported():
+    tree = ast.parse((ROOT / "sfetcas" / "analyses.py").read_text())
+    (function,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
+    chosen = {f"sfetcas.{node.module}" for node in ast.walk(function) if isinstance(node, ast.ImportFrom)}
+    assert chosen - {"sfetcas.checks"} == set(LATER)
+    assert set(LATER) <= {*PRELOADED} & {*running.PRELOADED}

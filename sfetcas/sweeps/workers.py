@@ -15,6 +15,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
+from ..analyses import LATER
 from ..description.records import whole
 from ..errors import SceneError
 from ..processes import begin_apart, context_of, postponed
@@ -24,7 +25,7 @@ __all__ = ["Workers", "cores"]
 P = ParamSpec("P")
 T = TypeVar("T")
 
-PRELOADED = ["sfetcas.sweeps.work"]
+PRELOADED = ["sfetcas.sweeps.work", *LATER]
 
 AHEAD = 2
 """Pieces of work that a process has at once: it does not wait for the next one."""
