@@ -436,6 +436,7 @@ def test_package_has_the_names_that_type_checkers_see():
     }
     assert seen == {(name, f"sfetcas.{module}") for name, module in sfetcas._MODULES.items()}
     assert {name for name, _ in seen} == set(sfetcas.__all__) <= set(dir(sfetcas))
+    assert not [node for node in TREES["__init__"].body if getattr(node, "name", "") == "__getattr__"], "hides mistakes"
     for name, module in seen:
         assert getattr(sfetcas, name) is getattr(importlib.import_module(module), name)
 
