@@ -1,22 +1,24 @@
-"""What a scene asks for is what is done: statics, a path, modes or a motion."""
+"""What a scene asks for is what is done: statics, a path, modes or a motion; only that is imported."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from .checks import Answer, look_up
-from .description.scene import Scene, check_loaded
-from .dynamics.modes import find_modes
-from .dynamics.simulation import simulate
+from .description.scene import Scene, check_loaded, check_scene
 from .equilibria import statics, stops
 from .equilibria.statics import Settings
 from .errors import SceneError
 from .mechanics.resistance import check_resistance
-from .paths import paths
 
-__all__ = ["solve"]
+if TYPE_CHECKING:
+    from .checks import Answer
+
+__all__ = ["LATER", "solve"]
+
+LATER = ("sfetcas.dynamics.modes", "sfetcas.dynamics.simulation", "sfetcas.paths.paths")
+"""Modules that :func:`solve` imports by the type of the analysis; for processes that solve they are imported once."""
 
 
 def solve(
@@ -54,16 +56,24 @@ def solve(
     >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
+    check_scene(scene, "solve({})")
     settings = replace(settings or Settings(), **changes)
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
     if scene.analysis.type == "dynamic":
+        from .checks import look_up
+        from .dynamics.simulation import simulate
+
         return simulate(scene, settings, look_up, progress)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":
-        return paths.follow_path(scene, settings)
+        from .paths.paths import follow_path
+
+        return follow_path(scene, settings)
     if scene.analysis.type == "modes":
+        from .dynamics.modes import find_modes
+
         return find_modes(scene, settings)
     stopped = any(spring.stop is not None for spring in scene.springs.values())
     return stops.solve_stopped(scene, settings) if stopped else statics.solve(scene, settings)

@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
 from .description.records import say
-from .description.scene import Expect, Scene
-from .dynamics.modes import Modes
+from .description.scene import Expect, Scene, check_scene
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.quantities import entry_of, value_of
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
 from .paths.path import FlutterPoint, Path
 
+if TYPE_CHECKING:
+    from .dynamics.modes import Modes
+
 __all__ = ["Answer", "Check", "asked", "check", "look_up"]
 
 
-Answer = Solution | Path | Trajectory | Modes
+Answer: TypeAlias = "Solution | Path | Trajectory | Modes"
 """What an analysis may give."""
 
 
@@ -53,6 +55,7 @@ def check(scene: Scene, solution: Answer) -> list[Check]:
     SceneError
         A quantity that the answer does not have.
     """
+    check_scene(scene, "check({}, ...)")
     checks = []
     entries = _assigned(scene, solution)
     for i, expect in enumerate(scene.expect):
@@ -130,8 +133,8 @@ def _numbered(entries: Sequence[Equilibrium], number: int, key: str) -> Equilibr
 def _value(solution: Answer, entry: Equilibrium | Instant, expect: Expect) -> Any:
     """What the answer says; of modes as of equilibria."""
     kind, _, key = expect.quantity.partition(".")
-    if kind == "modes" and isinstance(solution, Modes):
-        return entry_of(solution.values(), key)
+    if kind == "modes" and solution.scene.analysis.type == "modes":
+        return entry_of(cast("Modes", solution).values(), key)
     return look_up(entry, expect.quantity, expect.at)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import io
 import os
 import re
@@ -18,9 +19,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from . import __version__
 from .analyses import solve
 from .checks import Answer, Check, check
-from .codegen.folder import export
 from .description.records import counted
 from .description.scene import Scene
 from .description.scenefile import load
@@ -35,11 +36,7 @@ from .outputs import Output, outputs_of, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
 from .reports import flexible, print_checks, report, report_sweep
 from .solvers.prepared import Prepared
-from .stopping import INTERRUPTED, SENTENCE, arrived, asked, heard
-from .sweeps.sweeping import sweep
-from .sweeps.texts import assigned, cases_in_words, usual_quantities
-from .tradeoff.tables import as_markdown
-from .tradeoff.trading import Limits, trade, with_peer
+from .stopping import COMMAND, INTERRUPTED, SENTENCE, arrived, asked, heard
 
 __all__ = ["main"]
 
@@ -53,6 +50,9 @@ REPORT = "a mistake of sfetcas, not of the scene; please report it with the line
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code is returned."""
+    if COMMAND:
+        gc.freeze()
+        gc.enable()
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             # Whoever closed it wants to see nothing.
@@ -129,6 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="sfetcas", description="Equilibria of very flexible beams under large motion."
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="solve a scene and print a short report")
     run.add_argument("file", type=Path, help="scene file, .toml or .json")
@@ -163,11 +164,14 @@ def _parser() -> argparse.ArgumentParser:
         help="another program, with {file} for the scene; it prints answers as run --json does, one a line",
     )
     trading.add_argument(
-        "--repeats", type=int, default=Limits.repeats, help="whole runs of each setting after the first, 0 to 1000 (5)"
+        "--repeats",
+        type=int,
+        default=argparse.SUPPRESS,
+        help="whole runs of each setting after the first, 0 to 1000 (5)",
     )
-    trading.add_argument("--longest", type=float, default=Limits.longest, metavar="S", help="seconds of a setting (10)")
+    trading.add_argument("--longest", type=float, default=argparse.SUPPRESS, metavar="S", help="seconds of each (10)")
     trading.add_argument(
-        "--budget", type=float, default=Limits.budget, metavar="S", help="seconds of all, and of each peer (300)"
+        "--budget", type=float, default=argparse.SUPPRESS, metavar="S", help="seconds of all, and of each peer (300)"
     )
     trading.set_defaults(command=_trade)
     many = commands.add_parser("sweep", help="solve many cases of a scene at once, each with other numbers")
@@ -397,6 +401,8 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
+    from .codegen.folder import export
+
     scene, name = load(options.file), options.name or re.sub(r"\W", "_", options.file.stem, flags=re.ASCII)
     spans = dict(_span(text) for text in options.argument) if options.argument else None
     places = dict(_place(text) for text in options.places or ())
@@ -426,7 +432,10 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _trade(options: argparse.Namespace) -> int:
-    limits = Limits(options.repeats, options.longest, options.budget)
+    from .tradeoff.tables import as_markdown
+    from .tradeoff.trading import Limits, trade, with_peer
+
+    limits = Limits(**{key: value for key, value in vars(options).items() if key in ("repeats", "longest", "budget")})
     scene = load(options.file)
     if options.accuracy_of is not None:
         analysis = scene.analysis.model_copy(update={"accuracy_of": options.accuracy_of})
@@ -436,12 +445,15 @@ def _trade(options: argparse.Namespace) -> int:
         found = _named(options.file, lambda: trade(scene, limits=limits, against=options.against, progress=progress))
         for command in options.peer:
             progress(f"peer, {command}")
-            found = with_peer(found, command, options.file, options.budget)
+            found = with_peer(found, command, options.file, limits.budget)
     _give(found, lambda: print(as_markdown(found, every=False), end=""), outputs)
     return SOLVED
 
 
 def _sweep(options: argparse.Namespace) -> int:
+    from .sweeps.sweeping import sweep
+    from .sweeps.texts import cases_in_words, usual_quantities
+
     cases = cases_in_words(
         options.vary,
         options.sample,
@@ -507,6 +519,8 @@ def _named_progress() -> Iterator[Callable[[str], object]]:
 
 def _span(text: str) -> tuple[str, tuple[float, float] | None]:
     """An argument with the range that it may have."""
+    from .sweeps.texts import assigned
+
     name, span = assigned(text)
     if not span:
         return name, None
@@ -519,6 +533,8 @@ def _span(text: str) -> tuple[str, tuple[float, float] | None]:
 
 def _place(text: str) -> tuple[str, tuple[float, ...]]:
     """Fractions of a member."""
+    from .sweeps.texts import assigned
+
     name, numbers = assigned(text)
     try:
         return name, tuple(float(x) for x in numbers.split(","))

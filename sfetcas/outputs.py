@@ -10,14 +10,14 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .description.scene import Scene
 from .errors import SceneError
 from .files import write_file, write_folder
-from .sweeps.result import check_table
-from .tradeoff.tables import as_csv, as_json, as_markdown
-from .tradeoff.trading import Trade
+
+if TYPE_CHECKING:
+    from .tradeoff.trading import Trade
 
 __all__ = ["Output", "outputs_of", "outputs_of_sweep", "outputs_of_trade"]
 
@@ -96,6 +96,8 @@ def outputs_of_trade(options: argparse.Namespace) -> list[Output]:
     SceneError
         They cannot be written.
     """
+    from .tradeoff.tables import as_csv, as_json, as_markdown
+
     texts: dict[str, Callable[[Trade], str]] = {"markdown": as_markdown, "csv": as_csv, "json": as_json}
     found: list[Output] = []
     for key in (*texts, "plot"):
@@ -120,6 +122,8 @@ def outputs_of_sweep(options: argparse.Namespace) -> list[Output]:
     SceneError
         They cannot be written.
     """
+    from .sweeps.result import check_table
+
     found: list[Output] = []
     for path in options.out:
         check_table(path)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from .checks import Answer, Check
 from .description.records import counted
-from .dynamics.modes import Modes
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium
 from .mathematics.arrays import first_of_largest
@@ -17,7 +16,10 @@ from .mechanics.model import Model
 from .paths.path import Branch, FlutterPoint
 from .paths.path import Path as Course
 from .quoting import printable
-from .sweeps.result import Sweep
+
+if TYPE_CHECKING:
+    from .dynamics.modes import Modes
+    from .sweeps.result import Sweep
 
 __all__ = ["flexible", "print_checks", "report", "report_sweep"]
 
@@ -39,8 +41,8 @@ def report(solution: Answer, seconds: float) -> None:
     print(f"  {flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
     if isinstance(solution, Course):
         _report_path(solution)
-    if isinstance(solution, Modes):
-        _report_modes(solution)
+    if solution.scene.analysis.type == "modes":
+        _report_modes(cast("Modes", solution))
     if isinstance(solution, Trajectory):
         _report_motion(solution)
     else:

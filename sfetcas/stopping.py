@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-__all__ = ["INTERRUPTED", "SENTENCE", "arrived", "asked", "heard", "leave_at_once", "noted"]
+__all__ = ["COMMAND", "INTERRUPTED", "SENTENCE", "arrived", "asked", "heard", "leave_at_once", "noted"]
 
 INTERRUPTED = 128 + signal.SIGINT
 """Exit code after Ctrl-C."""

@@ -6,9 +6,15 @@ import importlib
 import inspect
 from pathlib import Path
 
+import pytest
+
+import benchmarks
 import sfetcas
 
 FOLDER = Path(sfetcas.__file__).parent
+
+BENCHMARKS = Path(benchmarks.__file__).parent
+"""Not part of the package, but read by the same rules."""
 
 ORDER = [
     "stopping",
@@ -226,7 +232,13 @@ ORDER = [
     "pictures.fronts",
     "pictures.animation",
     "pictures.paraview",
+    "reports",
+    "outputs",
+    "cli",
+    "__init__",
+    "__main__",
     "benchmarks",
+    "benchmarks.scenes",
     "benchmarks.random_scenes",
     "benchmarks.random_checks",
     "benchmarks.motion",
@@ -243,31 +255,14 @@ ORDER = [
     "benchmarks.contact_oracle",
     "benchmarks.contact_scenes",
     "benchmarks.contact_run",
-    "benchmark",
-    "reports",
-    "outputs",
-    "cli",
-    "__init__",
-    "__main__",
+    "benchmarks.importing",
+    "benchmarks.speed",
+    "benchmarks.__main__",
 ]
 """A module imports only from names to its left."""
 
-PROGRAMS = (
-    "cli",
-    "reports",
-    "benchmark",
-    "benchmarks.motion",
-    "benchmarks.code",
-    "benchmarks.accuracy",
-    "benchmarks.pieces",
-    "benchmarks.derivatives",
-    "benchmarks.extremes",
-    "benchmarks.many",
-    "benchmarks.random_run",
-    "benchmarks.jitter",
-    "benchmarks.contact_run",
-)
-"""What is run and not imported: only these print."""
+PROGRAMS = ("cli", "reports")
+"""Modules of the package that print."""
 
 PICTURES = (
     "pictures.files",
@@ -281,14 +276,22 @@ PICTURES = (
 """What needs matplotlib, which a run pays for only when a picture is asked for."""
 
 
+HEAVY = {"scipy", "tqdm"}
+"""Packages that take long to import and that few runs need: they may be imported where they are used."""
+
+DISPATCHERS = ("analyses", "outputs", "cli")
+"""What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
+chose."""
+
+
 def named(path):
     """A module by its place below the package: ``mechanics.mesh``, ``mechanics`` for that package itself."""
-    parts = path.relative_to(FOLDER).with_suffix("").parts
+    parts = path.relative_to(FOLDER if path.is_relative_to(FOLDER) else BENCHMARKS.parent).with_suffix("").parts
     return ".".join(parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts)
 
 
-FILES = {named(path): path for path in sorted(FOLDER.rglob("*.py"))}
-PACKAGES = {path.parent.name for path in FOLDER.glob("*/__init__.py")}
+FILES = {named(path): path for path in sorted([*FOLDER.rglob("*.py"), *BENCHMARKS.glob("*.py")])}
+PACKAGES = {"benchmarks", *(path.parent.name for path in FOLDER.glob("*/__init__.py"))}
 MODULES = sorted(FILES)
 
 
@@ -345,7 +348,6 @@ def taken():
 
 
 @functools.cache
-@functools.cache
 def imported(name):
     """(own modules, other top-level packages) that a module imports, also inside functions."""
     own, other = set(), set()
@@ -357,7 +359,8 @@ def imported(name):
                 other.add(node.module.split(".")[0])
         elif isinstance(node, ast.Import):
             other |= {alias.name.split(".")[0] for alias in node.names}
-    # The command line reads the version from the package.
+    # Whatever else is read from the package itself comes from the modules on the left of its own.
+    own.discard("__version__")
     return {source if source in FILES else "__init__" for source in own}, other
 
 
@@ -382,7 +385,8 @@ def test_mechanics_and_solvers_know_no_more_than_they_need(name):
     if name.startswith("description"):
         assert "casadi" not in other, "descriptions need no solver"
     assert ("matplotlib" in other) == (name in PICTURES)
-    assert not {*PICTURES, *PROGRAMS} & own or name in ("benchmark", "outputs", "cli", "__main__", *PICTURES)
+    assert not {*PICTURES, *PROGRAMS} & own or name in ("outputs", "cli", "__main__", *PICTURES)
+    assert "benchmarks" not in other, "benchmarks are not installed"
 
 
 @each
@@ -395,7 +399,7 @@ def test_no_print_no_bare_except_no_global_state(name):
             last = name == "cli" and "traceback.print_exc()" in ast.unparse(node)
             assert not {"Exception", "BaseException"} & caught or last, f"catches everything in line {node.lineno}"
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "print":
-            assert name in PROGRAMS, f"print in line {node.lineno}"
+            assert name in PROGRAMS or name.startswith("benchmarks."), f"print in line {node.lineno}"
         assert not isinstance(node, ast.Global), f"global in line {node.lineno}"
         if isinstance(node, ast.ImportFrom):
             assert all(alias.name != "*" for alias in node.names)
@@ -408,7 +412,7 @@ def packages(node):
 
 @each
 def test_imports_stand_at_the_top(name):
-    imports = [node for node in ast.walk(TREES[name]) if isinstance(node, (ast.Import, ast.ImportFrom))]
+    imports = [node for node in nodes(name) if isinstance(node, (ast.Import, ast.ImportFrom))]
     inside = {
         node
         for function in nodes(name)
@@ -416,12 +420,11 @@ def test_imports_stand_at_the_top(name):
         for node in ast.walk(function)
         if node in imports
     }
-    # Pictures, and a bar on a terminal, are what a run does not pay for unless they are asked for.
-    allowed = {"outputs": {*PICTURES, "pictures.paraview"}, "cli": {"tqdm"}}.get(name, set())
-    # So is SciPy, each of whose parts takes a quarter to a half of the time in which sfetcas is imported.
+    # SciPy, each of whose parts takes a quarter to a half of the time in which sfetcas is imported, never at the top.
     scipy = {node for node in imports if any(str(package).split(".")[0] == "scipy" for package in packages(node))}
     assert scipy <= inside
-    assert {package for node in inside - scipy for package in packages(node)} <= allowed
+    if name not in DISPATCHERS:
+        assert {str(package).split(".")[0] for node in inside for package in packages(node)} <= HEAVY
 
 
 @each
@@ -429,7 +432,8 @@ def test_all_is_complete_and_documented(name):
     if name in ("__main__", *PACKAGES, *PICTURES):
         assert ast.get_docstring(tree(name))
         return
-    module = importlib.import_module("sfetcas" if name == "__init__" else f"sfetcas.{name}")
+    above = "" if name.startswith("benchmarks.") else "sfetcas."
+    module = importlib.import_module("sfetcas" if name == "__init__" else above + name)
     assert module.__doc__
     assert isinstance(module.__all__, list)
     assert len(set(module.__all__)) == len(module.__all__)
@@ -455,14 +459,23 @@ def test_public_methods_are_documented(name):
             assert ast.get_docstring(method), f"{owner.name}.{method.name}"
 
 
-def test_package_exports_what_it_lists():
-    names = {
-        alias.asname or alias.name
-        for node in tree("__init__").body
-        if isinstance(node, ast.ImportFrom)
+def test_package_has_the_names_that_type_checkers_see():
+    seen = {
+        (alias.name, f"sfetcas.{node.module}")
+        for node in ast.walk(tree("__init__"))
+        if isinstance(node, ast.ImportFrom) and node.level
         for alias in node.names
     }
-    assert names == set(sfetcas.__all__)
+    assert seen == {(name, f"sfetcas.{module}") for name, module in sfetcas._MODULES.items()}
+    assert {name for name, _ in seen} == set(sfetcas.__all__) <= set(dir(sfetcas))
+    assert not [node for node in tree("__init__").body if getattr(node, "name", "") == "__getattr__"], "hides mistakes"
+    for name, module in seen:
+        assert getattr(sfetcas, name) is getattr(importlib.import_module(module), name)
+
+
+def test_other_names_are_refused():
+    with pytest.raises(AttributeError, match="module 'sfetcas' has no attribute 'solv'"):
+        sfetcas.solv  # noqa: B018
 
 
 def test_durations_are_those_of_tests(lost_names):

@@ -6,22 +6,24 @@ import re
 import numpy as np
 import pytest
 
-from sfetcas import benchmark
-from sfetcas.benchmarks import derivatives as benchmark_derivatives
-from sfetcas.benchmarks import many as benchmark_many
-from sfetcas.benchmarks import motion as benchmark_motion
-from sfetcas.benchmarks import random_run as benchmark_random
+from benchmarks import derivatives as benchmark_derivatives
+from benchmarks import importing, scenes, speed
+from benchmarks import many as benchmark_many
+from benchmarks import motion as benchmark_motion
+from benchmarks import random_run as benchmark_random
+from benchmarks.__main__ import main
 from sfetcas.checks import check
 from sfetcas.description.scene import Analysis, Expect
-from sfetcas.equilibria.statics import solve
+from sfetcas.equilibria.statics import Settings, solve
+from sfetcas.paths.paths import follow_path
 from sfetcas.sweeps.workers import cores
 
 
 @pytest.fixture
 def once(monkeypatch):
     """One timed run instead of the median of several."""
-    median = benchmark._median
-    monkeypatch.setattr(benchmark, "_median", lambda call, runs: median(call, 1))
+    median = speed._median
+    monkeypatch.setattr(speed, "_median", lambda call, runs: median(call, 1))
 
 
 def rows(printed):
@@ -30,15 +32,15 @@ def rows(printed):
 
 
 def test_benchmark_of_another_name_is_refused():
-    accepted = "net, path, motion, steps, code, accuracy, pieces, sweep, start, extremes, random, jitter, contact"
+    accepted = "net, path, motion, steps, code, accuracy, pieces, sweep, import, extremes, random, jitter, contact"
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
-        benchmark.main(["nets"])
+        main(["nets"])
 
 
 def test_sweeps_are_measured_against_their_solves(capsys, monkeypatch):
     monkeypatch.setattr(benchmark_many, "CASES", 4)
     monkeypatch.setattr(benchmark_many, "_dask", contextlib.nullcontext)
-    benchmark.main(["sweep"])
+    main(["sweep"])
     lines = [line.split("|")[1:-1] for line in capsys.readouterr().out.strip().splitlines()[4:]]
     assert [(row[0].strip(), row[-1].strip()) for row in lines] == 2 * [("plane", "the same")] + 2 * [
         ("space", "the same")
@@ -49,10 +51,15 @@ def test_sweeps_are_measured_against_their_solves(capsys, monkeypatch):
         assert cores() * wall / solves - 1.0 == pytest.approx(overhead / 100.0, rel=0.1)
 
 
-def test_start_is_measured(capsys, once):
-    benchmark.main(["start"])
-    lines = capsys.readouterr().out.strip().splitlines()
-    assert [re.sub(r"[\d.]+", "", line).split() for line in lines] == [["import", "s"], ["command", "line", "s"]]
+def test_imports_are_measured(capsys, monkeypatch):
+    monkeypatch.setattr(importing, "RUNS", 1)
+    monkeypatch.setattr(importing, "COMMANDS", {"import casadi": ["-c", "pass"], "other": ["-c", "pass"]})
+    main(["import"])
+    (first, own), (other, multiple) = re.findall(
+        r"^ *([a-z]+(?: [a-z]+)*) +[\d.]+ s +([\d.]+)$", capsys.readouterr().out, re.M
+    )
+    assert (first, own, other) == ("import casadi", "1.0", "other")
+    assert float(multiple) > 0.0
 
 
 def test_derivatives_are_measured_and_are_those_of_differences(capsys, monkeypatch):
@@ -60,7 +67,7 @@ def test_derivatives_are_measured_and_are_those_of_differences(capsys, monkeypat
     monkeypatch.setattr(
         benchmark_derivatives, "CASES", {"linkage": benchmark_derivatives.linkage, "bend": benchmark_derivatives.bend}
     )
-    benchmark.main(["derivatives"])
+    main(["derivatives"])
     lines = capsys.readouterr().out.strip().splitlines()[4:]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert [row[0] for row in cells] == ["linkage", "bend"]
@@ -71,16 +78,16 @@ def test_derivatives_are_measured_and_are_those_of_differences(capsys, monkeypat
 
 @pytest.mark.parametrize("members", [1, 7, 30, 100])
 def test_net_has_as_many_members_as_asked_for_and_a_row_more_at_most(members):
-    scene = benchmark.woven(members)
+    scene = scenes.woven(members)
     columns = sum(name.endswith(" 0") for name in scene.nodes) - 1
     assert members <= len(scene.members) < members + 2 * columns + 1
     assert len(scene.nodes) == len(scene.members) / (2 * columns + 1) * (columns + 1) + columns + 1
 
 
-@pytest.mark.parametrize("kind", benchmark.NETS)
+@pytest.mark.parametrize("kind", speed.NETS)
 @pytest.mark.parametrize("members", [1, 7, 30])
 def test_large_systems_are_of_their_kind(kind, members):
-    scene = benchmark.large(kind, members)
+    scene = scenes.large(kind, members)
     assert members <= len(scene.members) <= 2 * members + 4
     types = {member.type for member in scene.members.values()}
     asked = {
@@ -98,7 +105,7 @@ def test_large_systems_are_of_their_kind(kind, members):
 )
 def test_large_systems_are_solved(kind, members):
     """Systems for which solvers of linear equations run out of what they estimated: the ground balances the loads."""
-    scene = benchmark.large(kind, members)
+    scene = scenes.large(kind, members)
     step = solve(scene).last
     assert step.certificate.stable is True
     held = [name for name, node in scene.nodes.items() if node.support != "free"]
@@ -114,12 +121,12 @@ def test_large_systems_are_solved(kind, members):
 
 
 def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
-    monkeypatch.setattr(benchmark, "NETS", {"wavy strips": (3, 10), "lattice": (4,)})
-    benchmark.main(["net"])
+    monkeypatch.setattr(speed, "NETS", {"wavy strips": (3, 10), "lattice": (4,)})
+    main(["net"])
     lines = capsys.readouterr().out.strip().splitlines()[2:]
     cases = [("wavy strips", 3), ("wavy strips", 10), ("lattice", 4)]
     for line, (kind, members) in zip(lines, cases, strict=True):
-        scene = benchmark.large(kind, members)
+        scene = scenes.large(kind, members)
         assert line[:12].strip() == kind
         row = line[12:].split()
         assert int(row[0]) == len(scene.members)
@@ -130,8 +137,8 @@ def test_nets_are_measured_in_processes_of_their_own(capsys, monkeypatch):
 
 
 def test_paths_are_measured(capsys, once, monkeypatch):
-    monkeypatch.setattr(benchmark, "PATH_ACCURACIES", (1e-4,))
-    benchmark.main(["path"])
+    monkeypatch.setattr(speed, "PATH_ACCURACIES", (1e-4,))
+    main(["path"])
     lines = capsys.readouterr().out.strip().splitlines()[2:]
     assert len(lines) == 3
     for line in lines:
@@ -147,7 +154,7 @@ def test_paths_are_measured(capsys, once, monkeypatch):
 
 @pytest.mark.parametrize(
     ("scene", "factors", "limit"),
-    [(benchmark.lee_frame(), [-1.5, 2.5], 1.8558746454), (benchmark.arch(), [-100, 1000], 897.3089969723)],
+    [(scenes.lee_frame(), [-1.5, 2.5], 1.8558746454), (scenes.arch(), [-100, 1000], 897.3089969723)],
     ids=["lee", "arch"],
 )
 def test_scenes_of_the_paths_are_those_of_the_literature(scene, factors, limit):
@@ -155,7 +162,7 @@ def test_scenes_of_the_paths_are_those_of_the_literature(scene, factors, limit):
     expect = Expect(quantity="factor", limit_point=1, value=limit, tolerance=1e-6 * limit, why="a millionth")
     analysis = Analysis(type="path", range=factors, accuracy=1e-8, points=60)
     asked = scene.replace(analysis=analysis, expect=[expect])
-    (found,) = check(asked, benchmark.follow_path(asked, benchmark.Settings()))
+    (found,) = check(asked, follow_path(asked, Settings()))
     assert found.passed, found
 
 
@@ -163,14 +170,14 @@ def test_motion_is_measured_against_a_finer_run(monkeypatch, capsys):
     make, length, *_ = benchmark_motion.PROBLEMS["D1 pendulum"]
     monkeypatch.setattr(benchmark_motion, "PROBLEMS", {"pendulum": (make, length, (("SFET4", 2),), ("SFET5", 3, 1e-3))})
     monkeypatch.setattr(benchmark_motion, "TOLERANCES", {"radau-3": (1e-2,)})
-    benchmark.main(["motion"])
+    main(["motion"])
     line = next(line for line in capsys.readouterr().out.splitlines() if "radau-3" in line)
     # Two elements of order 3 resolve some waves of a sudden release: a percent, not more and not rounding.
     assert 1e-4 < float(line.split()[5]) < 3e-2
 
 
 def test_random_scenes_are_counted(capsys):
-    benchmark.main(["random", "--count", "2", "--first", "8"])
+    main(["random", "--count", "2", "--first", "8"])
     printed = capsys.readouterr().out
     assert "| of 2 scenes |" in printed
     rows = dict(re.findall(r"^\| ([\w :-]+) \| (\d+) \|", printed, re.MULTILINE))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scenes import SOFT, made
 
-from sfetcas import benchmark, first_mesh
+from benchmarks.scenes import woven
+from sfetcas import first_mesh
 from sfetcas.mechanics.carried import _parts, carried
 
 
@@ -76,7 +77,7 @@ def test_moment_on_a_hinged_foot_turns_what_stands_on_it():
 
 def test_members_of_a_net_share_the_loads():
     """A row pulled at every node: what a member carries does not grow with the net, nor does its mesh."""
-    few, many = benchmark.woven(30), benchmark.woven(600)
+    few, many = woven(30), woven(600)
     largest = [max(found.force for found in carried(scene).values()) for scene in (few, many)]
     assert largest[1] < 1.2 * largest[0] < 0.3 * sum(np.linalg.norm(load.vector) for load in many.loads.values())
     per_member = [first_mesh(scene, 4).elements / len(scene.members) for scene in (few, many)]

@@ -13,8 +13,8 @@ import pytest
 import systems
 from scenes import cantilever, helix
 
+from benchmarks import code as benchmark_code
 from sfetcas import Prepared, Scene, SceneError, Settings, assemble, export, load, solve, solve_model
-from sfetcas.benchmarks import code as benchmark_code
 from sfetcas.codegen.derivatives import derivatives
 from sfetcas.mathematics import kernels
 from sfetcas.mechanics.equations import Equations

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sfetcas import benchmark
-from sfetcas.benchmarks.contact_chain import NotAChainError
-from sfetcas.benchmarks.contact_oracle import chain_contact
-from sfetcas.benchmarks.contact_scenes import FAMILIES, contact_scene
+from benchmarks.__main__ import main
+from benchmarks.contact_chain import NotAChainError
+from benchmarks.contact_oracle import chain_contact
+from benchmarks.contact_scenes import FAMILIES, contact_scene
 
 TIP = [0.445004402246249, 0.810609024880296]
 """Of a cantilever under F L^2/EI = 10, elliptic integrals."""
@@ -120,6 +120,6 @@ def test_random_scenes_start_clear_of_their_obstacles(family):
 
 def test_contact_is_judged(capsys):
     """A scene through the benchmark: a line for what is not right, and the table."""
-    benchmark.main(["contact", "--count", "1", "--first", "1", "--family", "drums"])
+    main(["contact", "--count", "1", "--first", "1", "--family", "drums"])
     table = capsys.readouterr().out.strip().splitlines()
     assert table[-1].startswith("| drums | 1 |")

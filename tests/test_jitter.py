@@ -5,8 +5,8 @@ import pytest
 from scenes import made
 
 import sfetcas
-from sfetcas.benchmarks.jitter import answered, differences, jittered
-from sfetcas.benchmarks.random_scenes import random_scene
+from benchmarks.jitter import answered, differences, jittered
+from benchmarks.random_scenes import random_scene
 
 
 def pressed(space=False, supports=("clamped", "clamped"), force=60.0, **more):

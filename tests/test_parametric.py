@@ -303,7 +303,8 @@ REFUSED = [
     (
         cantilever,
         {"length": Parameter(1.1, lambda x: {"nodes.B.position.0": x})},
-        "parameters.length: nodes.B.position.0 is 1 in the scene, but 1.1 for 1.1, accepted: the same",
+        "parameters.length: nodes.B.position.0 is 1 in the scene, but 1.1 where the parameter is 1.1, accepted: "
+        "both the same: change that number of the scene, or the value of the parameter",
     ),
     (
         cantilever,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scenes import turned_about
 
+from benchmarks.random_checks import VARIANTS, compared, defects, variant, wrong
+from benchmarks.random_scenes import random_scene, reordered, transformed
 from sfetcas import Scene, SceneError, SolveError, Status, solve
-from sfetcas.benchmarks.random_checks import VARIANTS, compared, defects, variant, wrong
-from sfetcas.benchmarks.random_scenes import random_scene, reordered, transformed
 from sfetcas.solvers.prepared import Prepared
 
 SEEDS = range(2009, 2027)

@@ -8,7 +8,7 @@ from scenes import SOFT, ZOO, cantilever, made, model_of
 from systems import EVERY, SYSTEMS
 
 import sfetcas
-from sfetcas import benchmark
+from benchmarks.scenes import large
 from sfetcas.equilibria.statics import pilot_of, solve_model
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.model import assemble
@@ -331,7 +331,7 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
 @pytest.mark.parametrize("kind", ["all types", "lattice"])
 def test_bordered_count_of_nets_is_the_dense_count(kind, soft, monkeypatch):
     """With each softness, at the answer and far from it, where hundreds of eigenvalues are negative."""
-    prepared = Prepared(assemble(scene := benchmark.large(kind, 60), pilot_of(scene), assembly="nodal"))
+    prepared = Prepared(assemble(scene := large(kind, 60), pilot_of(scene), assembly="nodal"))
     equations, loading = prepared.equations, prepared.model.loading(1.0)
     found = prepared.correct(equations.start(loading), loading, iterations=30)
     assert found.converged

@@ -7,7 +7,8 @@ import pytest
 from scenes import SOFT, UNLIKE, ZOO, arch, bend_45, cantilever, elastica, guided, helix, made, model_of
 
 import sfetcas
-from sfetcas import SceneError, SolveError, Status, benchmark
+from benchmarks.scenes import lattice, of_all_types
+from sfetcas import SceneError, SolveError, Status
 from sfetcas.cli import main
 from sfetcas.equilibria import meshing
 from sfetcas.equilibria.statics import Settings, pilot_of, solve, solve_model
@@ -494,9 +495,9 @@ def test_without_flexible_members_nothing_is_assembled_twice(monkeypatch):
     """Their meshes cannot be refined: the answer is on the pilot, and its error is zero."""
     assembled, assemble = [], meshing.assemble
     monkeypatch.setattr(meshing, "assemble", lambda *args, **options: assembled.append(1) or assemble(*args, **options))
-    assert solve(benchmark.lattice(12)).last.certificate.error_estimate == 0.0
+    assert solve(lattice(12)).last.certificate.error_estimate == 0.0
     assert len(assembled) == 1
-    assert solve(benchmark.of_all_types(12)).last.certificate.error_estimate > 0.0
+    assert solve(of_all_types(12)).last.certificate.error_estimate > 0.0
     assert len(assembled) == 3
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scenes import cantilever, made
 
+from benchmarks.scenes import lee_frame
 from sfetcas import (
     Analysis,
     LogNormal,
@@ -30,7 +31,6 @@ from sfetcas import (
     solve,
     sweep,
 )
-from sfetcas.benchmark import lee_frame
 from sfetcas.cli import main
 from sfetcas.equilibria.quantities import Quantity
 from sfetcas.processes import context_of

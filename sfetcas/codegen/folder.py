@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..description.records import say
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..files import read_file, write_folder
@@ -96,6 +96,7 @@ def export(
     -------
     >>> export(scene, "tip", arguments=["loads.tip.value"])       # doctest: +SKIP
     """
+    check_scene(scene, "export({}, ...)")
     path = Path(folder)
     check_name(name)
     check_folder(path, overwrite=overwrite)

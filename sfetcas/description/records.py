@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
@@ -35,6 +36,7 @@ __all__ = [
     "sentence",
     "turn",
     "unknown",
+    "whole",
 ]
 
 T = TypeVar("T")
@@ -96,6 +98,24 @@ def number(value: Any) -> float:
         raise ValueError("found a whole number with over 300 digits, accepted: a finite number") from None
     if not math.isfinite(found):
         raise ValueError(f"found {found}, accepted: a finite number")
+    return found
+
+
+def whole(value: Any, least: int, most: int | None = None, *, what: str = "whole number", name: str = "") -> int:
+    """A whole number within limits as an int: one of Python or NumPy; in messages it is ``what``, with its ``name``.
+
+    Raises
+    ------
+    SceneError
+        Anything else, also true and false and whole numbers written with a dot.
+    """
+    try:
+        found = None if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        found = None
+    if found is None or found < least or (most is not None and found > most):
+        span = f"from {least}" + ("" if most is None else f" to {most}")
+        raise SceneError(f"found {say(value)}, accepted: a {what} {span}", (name,) if name else ())
     return found
 
 

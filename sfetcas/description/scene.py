@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from types import MappingProxyType
@@ -40,6 +41,7 @@ __all__ = [
     "Spring",
     "Until",
     "check_loaded",
+    "check_scene",
 ]
 
 
@@ -472,6 +474,30 @@ def _check_expect(scene: Scene) -> None:
         if expect.step is not None and not any(math.isclose(expect.step, f) for f in scene.analysis.steps):
             accepted = f"a factor of analysis.steps, {say(scene.analysis.steps)}"
             raise SceneError(f"found {expect.step:g}, accepted: {accepted}", ("expect", str(i), "step"))
+
+
+def check_scene(value: object, call: str) -> None:
+    """Refuse what is no scene where a public function takes one.
+
+    Parameters
+    ----------
+    value : what was given
+    call : the call with the scene in braces, as ``check({}, ...)``
+
+    Raises
+    ------
+    SceneError
+        Names of files and tables get the call that would take them.
+    """
+    if isinstance(value, Scene):
+        return
+    found, made = say(value), "load('FILE.toml')"
+    if isinstance(value, (str, os.PathLike)):
+        name = say(os.fspath(value))
+        found, made = f"the {'text' if isinstance(value, str) else 'path'} {name}", f"load({name})"
+    elif isinstance(value, Mapping):
+        found, made = "a table", "Scene.from_dict(...)"
+    raise SceneError(f"{call.partition('(')[0]} takes a Scene, found {found}; accepted: {call.format(made)}")
 
 
 _RULES: tuple[Callable[[Scene], None], ...] = (

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import SceneError
 from ..files import UnreadableError, read_file
 from .records import say
-from .scene import Scene
+from .scene import Scene, check_scene
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -122,6 +122,7 @@ def dump(scene: Scene, path: str | os.PathLike[str]) -> None:
     SceneError
         Other ending, no permission, no space or no package for TOML; the sentence starts with the path.
     """
+    check_scene(scene, "dump({}, ...)")
     try:
         _write(Path(path), _text(scene, _format(Path(path))))
     except SceneError as error:

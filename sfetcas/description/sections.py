@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, final
 import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BeforeValidator, TypeAdapter, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .records import NotNegative, Number, Numbers, Record, say
+from .records import NotNegative, Number, Numbers, Record, number, say
 
 __all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
 
@@ -62,9 +62,6 @@ class Polynomial(Record):
     polynomial: Numbers
 
 
-_NUMBER: TypeAdapter[float] = TypeAdapter(Number)
-
-
 def quantity(value: Any) -> Any:
     """A quantity along a member from what stands for it: a number, a table of a file, or a record.
 
@@ -82,7 +79,7 @@ def quantity(value: Any) -> Any:
     if isinstance(value, (Mapping, str, Iterable)) and getattr(value, "shape", None) != ():
         accepted = "a number, {at = [..], value = [..]} or {polynomial = [..]}"
         raise ValueError(f"found {say(value)}, accepted: {accepted}")
-    return _NUMBER.validate_python(value)
+    return number(value)
 
 
 Quantity = float | Table | Polynomial

@@ -7,16 +7,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
-from .records import Direction, NotNegative, Number, Record, Vector, listed, number, say
+from .records import Direction, Number, Record, Vector, listed, number, say
 
 __all__ = ["Spring"]
 
 
-def _stiffness(value: Any) -> float:
-    stiffness = number(value)
-    if stiffness < 0.0:
-        raise ValueError(f"found {stiffness:g}, accepted: zero or a number above zero, N/m or N m")
-    return stiffness
+_UNITS = {"stiffness": ("N m", "N/m"), "length": ("m", "m"), "damping": ("N m s/rad", "N s/m")}
+"""Of what is not below zero, by the key: of a rotational spring, and of a translational one."""
 
 
 def _parties(value: Any) -> tuple[Any, ...]:
@@ -59,20 +56,25 @@ class Spring(Record):
 
     type: Literal["rotational", "translational"] = "rotational"
     node: str
-    stiffness: Annotated[float, BeforeValidator(_stiffness)]
+    stiffness: Number
     axis: Direction | None = None
     between: Annotated[tuple[str, str], BeforeValidator(_parties)] | None = None
     rest: Number = 0.0
     to: str | None = None
     anchor: Vector | None = None
-    length: Annotated[float, BeforeValidator(_stiffness)] | None = None
+    length: Number | None = None
     direction: Direction | None = None
-    damping: NotNegative = 0.0
+    damping: Number = 0.0
     stop: Annotated[tuple[float, float], BeforeValidator(_stop)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Spring:
         turning = self.type == "rotational"
+        for key, units in _UNITS.items():
+            value = getattr(self, key)
+            if value is not None and value < 0.0:
+                accepted = f"zero or a number above zero, {units[not turning]}"
+                raise SceneError(f"found {value:g}, accepted: {accepted}", (key,))
         useless = ("to", "anchor", "length", "direction") if turning else ("between", "axis")
         for key in useless:
             if key in self.model_fields_set and getattr(self, key) is not None:

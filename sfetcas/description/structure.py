@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
@@ -10,7 +9,7 @@ from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
-from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn
+from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn, whole
 from .sections import Polynomial, Quantity, Table, quantity
 from .shapes import Shape, Straight
 
@@ -27,13 +26,7 @@ def unit(direction: Iterable[float]) -> tuple[float, float, float]:
 
 
 def _count(value: Any) -> int:
-    try:
-        count = operator.index(value)
-    except TypeError:
-        count = 0
-    if isinstance(value, bool) or not 1 <= count <= 1_000_000:
-        raise ValueError(f"found {say(value)}, accepted: a whole number from 1 to 1000000")
-    return count
+    return whole(value, 1, 1_000_000)
 
 
 def _ends(value: Any) -> tuple[Any, ...]:

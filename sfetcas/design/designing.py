@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.records import unknown as not_known
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
@@ -156,6 +156,7 @@ class Design:
         accuracy: float | None = None,
         kernels: Kernels = "auto",
     ) -> None:
+        check_scene(scene, "Design({}, ...)")
         cases = cases if cases is not None else {ONE: {}}
         self._formulation, self._kernels = Formulation(scene, list(cases), accuracy), kernels
         self._guess = dict(guess or {})
@@ -320,6 +321,7 @@ def find(
     SolveError
         There are no such numbers.
     """
+    check_scene(scene, "find({}, ...)")
     free = (-np.inf, np.inf)
     bounds = unknown if isinstance(unknown, Mapping) else dict.fromkeys(unknown, free)
     design = Design(scene, bounds, guess=guess, accuracy=accuracy)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.records import unknown as not_known
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
@@ -155,6 +155,7 @@ class QuasiStatic:
         accuracy: float | None = None,
         kernels: Kernels = "auto",
     ) -> None:
+        check_scene(scene, "QuasiStatic({}, ...)")
         if points < 3:
             raise SceneError(f"found {points}, accepted: three or more", ("points",))
         if not inputs:

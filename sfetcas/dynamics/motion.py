@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,9 +17,11 @@ from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
 from ..mechanics.model import Model
-from .inertia import Inertia
 from .projecting import factor_closings
-from .sampling import Sample
+
+if TYPE_CHECKING:
+    from .inertia import Inertia
+    from .sampling import Sample
 
 __all__ = ["Instant", "Mover", "Trajectory"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..description.sections import breaks as kinks
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried
@@ -171,6 +171,7 @@ def _divided(breaks: Array, elements: int) -> Array:
 
 def uniform_mesh(scene: Scene, order: int, elements: int | Mapping[str, int], gauss: bool = False) -> Mesh:
     """Equal elements on each member; one more wherever a load or a kink of the section needs a cut."""
+    check_scene(scene, "uniform_mesh({}, ...)")
     counts = elements if isinstance(elements, Mapping) else dict.fromkeys(scene.members, elements)
     cuts = {name: _divided(breaks_of(scene, name), counts.get(name, 1)) for name in cut(scene)}
     cuts |= {name: rigid_cuts(scene, name) for name in rigid(scene)}
@@ -200,6 +201,7 @@ def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
     end moments.  Under forces far above EI/L^2 a member is straight but for layers as thin as
     ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
     """
+    check_scene(scene, "first_mesh({}, ...)")
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]
     reaching, follows = carried(scene), any(load.follows for load in scene.loads.values())
     cuts = {}

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ..description.records import counted, enumerated
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
@@ -268,6 +268,7 @@ def assemble(
     SceneError
         A moment on a node that nothing turns with.
     """
+    check_scene(scene, "assemble({}, ...)")
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
     element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)

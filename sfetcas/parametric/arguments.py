@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..description import records
 from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
 from ..description.shapes import end_of
@@ -133,9 +134,13 @@ def _check_asked(name: Any, span: Any) -> None:
         raise SceneError(f"found {name!r}, accepted: names of numbers of the scene", ("arguments",))
     if span is None or isinstance(span, Parameter):
         return
-    ends = np.asarray(span, dtype=object).ravel()
-    if len(ends) != 2 or not all(isinstance(x, (int, float, np.number)) and np.isfinite(x) for x in ends):
-        raise SceneError(f"found {span!r}, accepted: a range from low to high", ("arguments", name))
+    accepted = "a range from low to high"
+    try:
+        ends = [records.number(end) for end in records.listed(span, accepted)]
+    except ValueError:
+        ends = []
+    if len(ends) != 2:
+        raise SceneError(f"found {span!r}, accepted: {accepted}", ("arguments", name))
 
 
 def _own(scene: Scene, name: str, given: Parameter) -> Argument:
@@ -148,8 +153,9 @@ def _own(scene: Scene, name: str, given: Parameter) -> Argument:
     for number, value in single_numbers(scene, given.numbers(given.value)).items():
         (stands,) = argument(scene, number).default
         if abs(value - stands) > SAME * max(abs(value), abs(stands)):
-            message = f"{number} is {stands:g} in the scene, but {value:g} for {given.value:g}, accepted: the same"
-            raise SceneError(message, ("arguments", name))
+            found = f"{number} is {stands:g} in the scene, but {value:g} where the parameter is {given.value:g}"
+            accepted = "both the same: change that number of the scene, or the value of the parameter"
+            raise SceneError(f"{found}, accepted: {accepted}", ("arguments", name))
     unit, meaning = given.unit or "as its numbers", given.meaning
     return Argument(name, (float(given.value),), unit, meaning, given.low, given.high, None, given.numbers)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from numpy.typing import ArrayLike
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..errors import SceneError
 from .arguments import FACTOR, single_numbers, with_numbers
 
@@ -25,6 +25,7 @@ def changed(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
     SceneError
         The scene has no such number, or accepts no such value.
     """
+    check_scene(scene, "changed({}, ...)")
     single = single_numbers(scene, values)
     factor = single.pop(FACTOR, None)
     if any(name.startswith("histories.") and name.count(".") == 1 for name in single):

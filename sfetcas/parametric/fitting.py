@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
@@ -79,6 +79,7 @@ def fit(
     SolveError
         No equilibrium at the start, no least sum of squares, or parameters that the measurements do not determine.
     """
+    check_scene(scene, "fit({}, ...)")
     return fitting(scene, parameters, measurements, settings=settings).fit(start=start)
 
 
@@ -92,6 +93,7 @@ def fitting(
     SceneError
         As of :func:`fit`.
     """
+    check_scene(scene, "fitting({}, ...)")
     if not measurements:
         raise SceneError("found none, accepted: one or more", ("measurements",))
     for i, one in enumerate(measurements):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.records import unknown
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
@@ -74,6 +74,7 @@ def parametric(
         A scene with contact, stops or turning axes; a number or an answer that it does not have; a number that changes
         what the model is made of, or that the model depends on in no way that is found.
     """
+    check_scene(scene, "parametric({}, ...)")
     parameters = [parameters] if isinstance(parameters, str) else parameters
     answers = [answers] if isinstance(answers, str) else answers
     refuse_search(scene, "without derivatives")

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..description.records import counted, say
+from ..description.records import counted, say, whole
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..files import UnreadableError, read_file
@@ -152,12 +152,10 @@ def sampled(
     SceneError
         Anything that is not accepted.
     """
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count <= MOST_CASES:
-        raise SceneError(f"found {say(count)}, accepted: a number of cases from 1 to {MOST_CASES}", ("count",))
+    count = whole(count, 1, MOST_CASES, what="number of cases", name="count")
     if method not in ("random", "latin"):
         raise SceneError(f"found {say(method)}, accepted: 'random' or 'latin'", ("method",))
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise SceneError(f"found {say(seed)}, accepted: a whole number from 0", ("seed",))
+    seed = whole(seed, 0, name="seed")
     if not isinstance(distributions, Mapping) or not distributions:
         raise SceneError(f"found {say(distributions)}, accepted: a table of at least one distribution", ("cases",))
     for name, one in distributions.items():

@@ -8,7 +8,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from ..description.records import say
+from ..description.records import number, say
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 
@@ -91,8 +91,10 @@ Distribution = Normal | LogNormal | Uniform
 
 
 def _finite(value: float, name: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
-        raise SceneError(f"found {say(value)}, accepted: a finite number", (name,))
+    try:
+        number(value)
+    except ValueError:
+        raise SceneError(f"found {say(value)}, accepted: a finite number", (name,)) from None
 
 
 def _positive(value: float, name: str) -> None:

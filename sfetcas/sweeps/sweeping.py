@@ -9,8 +9,8 @@ from concurrent.futures import Executor
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..description.records import say
-from ..description.scene import Scene
+from ..description.records import say, whole
+from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from .cases import Cases, cases_from
@@ -76,13 +76,14 @@ def sweep(
     >>> found = sweep(scene, {"loads.tip.value.1": [0, 5, 10]}, ["nodes.tip.position"])  # doctest: +SKIP
     >>> found.values("nodes.tip.position")  # doctest: +SKIP
     """
+    check_scene(scene, "sweep({}, ...)")
     if executor is not None and (not isinstance(executor, Executor) or workers is not None):
         found = say(executor) if workers is None else "an executor and a number of workers"
         raise SceneError(
             f"found {found}, accepted: a concurrent.futures.Executor, or a number of workers", ("executor",)
         )
-    if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1):
-        raise SceneError(f"found {say(chunk)}, accepted: a number of cases from 1", ("chunk",))
+    if chunk is not None:
+        chunk = whole(chunk, 1, what="number of cases", name="chunk")
     single = cases_from(cases).single(scene)
     wanted = wanted_of(scene, quantities)
     _check_together(single, wanted)

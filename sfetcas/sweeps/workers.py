@@ -15,6 +15,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
+from ..analyses import LATER
+from ..description.records import whole
 from ..errors import SceneError
 from ..processes import begin_apart, context_of, postponed
 
@@ -23,7 +25,7 @@ __all__ = ["Workers", "cores"]
 P = ParamSpec("P")
 T = TypeVar("T")
 
-PRELOADED = ["sfetcas.sweeps.work"]
+PRELOADED = ["sfetcas.sweeps.work", *LATER]
 
 AHEAD = 2
 """Pieces of work that a process has at once: it does not wait for the next one."""
@@ -97,8 +99,7 @@ class Workers(Executor):
     """
 
     def __init__(self, count: int) -> None:
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
-            raise SceneError(f"found {count!r}, accepted: a number of processes from 1 to {MOST}", ("workers",))
+        count = whole(count, 1, MOST, what="number of processes", name="workers")
         self._context = context_of(PRELOADED)
         self.room = AHEAD * count
         self._reader, self._writer = self._context.Pipe(duplex=False)

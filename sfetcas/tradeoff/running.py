@@ -10,11 +10,12 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from ..analyses import LATER
 from ..processes import begin_apart, context_of, postponed
 
 __all__ = ["Apart", "EndedError"]
 
-PRELOADED = ["sfetcas.tradeoff.measuring"]
+PRELOADED = ["sfetcas.tradeoff.measuring", *LATER]
 
 
 class EndedError(Exception):

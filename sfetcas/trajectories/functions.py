@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..dynamics.index_one import LINEAR, IndexOne
 from ..equilibria.settings import Settings
 from ..errors import SceneError
@@ -153,6 +153,7 @@ def motion_functions(
     SceneError
         The scene has no such numbers or answers, or something in it turns without inertia.
     """
+    check_scene(scene, "motion_functions({}, ...)")
     spans = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, (-np.inf, np.inf))
     variables = [Variable(name, low, high) for name, (low, high) in spans.items()]
     controls = [Control(name) for name in inputs]

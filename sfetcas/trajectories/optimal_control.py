@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
@@ -86,8 +86,7 @@ class OptimalControl:
         places: Place | None = None,
         settings: Settings | None = None,
     ) -> None:
-        if not isinstance(scene, Scene):
-            raise SceneError(f"scene: found {scene!r}, accepted: a Scene")
+        check_scene(scene, "OptimalControl({}, ...)")
         duration = _duration(time)
         known = [Variable(name, *bounds_of(name, pair)) for name, pair in (variables or {}).items()]
         if not controls and not known:

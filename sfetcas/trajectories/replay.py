@@ -15,7 +15,7 @@ import numpy as np
 
 from ..description.loads import History
 from ..description.records import plain, unknown
-from ..description.scene import Scene
+from ..description.scene import Scene, check_scene
 from ..dynamics.motion import Instant, Trajectory
 from ..dynamics.simulation import Simulation
 from ..equilibria.settings import Settings
@@ -195,6 +195,7 @@ def respond(
     SolveError
         A step does not converge, other than the last halved ones.
     """
+    check_scene(scene, "respond({}, ...)")
     for name, history in commands.items():
         if not isinstance(history, History):
             raise SceneError(f"commands: found {history!r} for {name}, accepted: History(t=[...], value=[...])")

@@ -219,7 +219,7 @@ def controls_of(given: Mapping[str, object], rates: Mapping[str, float]) -> list
     for name, rate in rates.items():
         if name not in given:
             raise SceneError(f"rates: {unknown(name, list(given), 'such controls')}")
-        if not isinstance(rate, (int, float)) or not rate > 0.0:
+        if np.ndim(rate) or np.asarray(rate).dtype.kind not in "iuf" or not rate > 0.0:
             raise SceneError(f"rates: found {rate!r} for {name}, accepted: the largest rate, a number above zero")
     return [Control(name, *bounds_of(name, pair), rate=float(rates.get(name, np.inf))) for name, pair in given.items()]
 

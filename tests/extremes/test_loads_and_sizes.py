@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import cantilever, elastica, made
 
-from sfetcas.benchmarks import extremes
+from benchmarks import extremes
 from sfetcas.equilibria.statics import solve
 
 PLANE_AND_SPACE = pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])

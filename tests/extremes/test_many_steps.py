@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks import extremes
 from sfetcas import SolveError
-from sfetcas.benchmarks import extremes
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 

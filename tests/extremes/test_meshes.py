@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scenes import elastica
 
+from benchmarks import extremes
 from sfetcas import SolveError
-from sfetcas.benchmarks import extremes
 from sfetcas.equilibria.statics import solve
 
 PLANE_AND_SPACE = pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks import extremes
 from sfetcas import SceneError, SolveError, Status
-from sfetcas.benchmarks import extremes
 from sfetcas.equilibria.piloting import CHANGE_POINT
 from sfetcas.equilibria.statics import solve
 

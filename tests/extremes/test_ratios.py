@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import elastica
 
-from sfetcas.benchmarks import extremes
+from benchmarks import extremes
 from sfetcas.equilibria.single import HIDDEN
 from sfetcas.equilibria.statics import solve
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sfetcas import benchmark
-from sfetcas.benchmarks import extremes
+from benchmarks import extremes
+from benchmarks.__main__ import main
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_table_is_markdown(monkeypatch, capsys):
         "told": ("itself", lambda: [extremes.Outcome(None, 0.0, "refused: too coarse (9 elements)", False)] * 3),
     }
     monkeypatch.setattr(extremes, "LINES", lines)
-    benchmark.main(["extremes"])
+    main(["extremes"])
     head, bar, right, wrong, told = capsys.readouterr().out.strip().splitlines()
     assert head.count("|") == bar.count("|") == right.count("|")
     assert right == "| right | itself | 1e-09 (estimate 1e-08) | 2 of 2 | - |"

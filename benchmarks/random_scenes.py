@@ -11,11 +11,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..description.scene import Scene
-from ..description.shapes import Curvature, place
-from ..description.structure import SLIDING
-from ..mathematics.arrays import Array
-from ..mathematics.quaternion import from_rotation_vector, matrix, multiply, rotate
+from sfetcas.description.scene import Scene
+from sfetcas.description.shapes import Curvature, place
+from sfetcas.description.structure import SLIDING
+from sfetcas.mathematics.arrays import Array
+from sfetcas.mathematics.quaternion import from_rotation_vector, matrix, multiply, rotate
 
 __all__ = ["random_scene", "reordered", "transformed"]
 

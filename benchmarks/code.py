@@ -1,4 +1,4 @@
-"""Generated C measured: seconds of a solve and of a step, size and compilation; part of ``sfetcas.benchmark``.
+"""Generated C measured: seconds of a solve and of a step, size and compilation; part of ``python -m benchmarks``.
 
 A cantilever under a transverse tip force of 10 EI/L^2, and one in space under two; warm solves go to and fro between
 loads that differ by a hundredth.  Errors are those of the tip against many more elements.
@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..codegen.folder import export
-from ..codegen.timestep import TimeStep
-from ..description.scene import Analysis, Load, Member, Node, Scene
-from ..description.sections import CrossSection
-from ..equilibria.settings import Settings
-from ..parametric.equilibrium import EquilibriumSolver
+from sfetcas.codegen.folder import export
+from sfetcas.codegen.timestep import TimeStep
+from sfetcas.description.scene import Analysis, Load, Member, Node, Scene
+from sfetcas.description.sections import CrossSection
+from sfetcas.equilibria.settings import Settings
+from sfetcas.parametric.equilibrium import EquilibriumSolver
 
 __all__ = ["code"]
 

@@ -1,4 +1,4 @@
-"""The knob measured: what ``accuracy`` promises against what comes out; part of ``python -m sfetcas.benchmark``.
+"""The knob measured: what ``accuracy`` promises against what comes out; part of ``python -m benchmarks``.
 
 All problems of statics in the folder ``problems`` of the working folder are solved to several accuracies.  True errors
 are against the same equilibria on a quarter of the element lengths, in contact against the finest answer;
@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..description.scene import Scene
-from ..description.scenefile import load
-from ..errors import SceneError
-from ..tradeoff.measuring import Measurement, measure
-from ..tradeoff.tables import markdown_table
-from ..tradeoff.variants import Variant, families
+from sfetcas.description.scene import Scene
+from sfetcas.description.scenefile import load
+from sfetcas.errors import SceneError
+from sfetcas.tradeoff.measuring import Measurement, measure
+from sfetcas.tradeoff.tables import markdown_table
+from sfetcas.tradeoff.variants import Variant, families
 
 __all__ = ["knob", "static_problems"]
 

@@ -1,6 +1,6 @@
 """The same scene put otherwise by what nobody means: every answer has to stay what it is.
 
-``python -m sfetcas.benchmark jitter [--count 300] [--first 0] [--changes 5] [--seconds 30] [FILE ...]`` solves scene
+``python -m benchmarks jitter [--count 300] [--first 0] [--changes 5] [--seconds 30] [FILE ...]`` solves scene
 files, or random scenes where none are named, as they are and so changed, and prints what differs.
 """
 
@@ -17,16 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from ..analyses import solve
-from ..checks import Answer
-from ..description.scene import Scene
-from ..description.scenefile import load
-from ..dynamics.modes import Modes
-from ..dynamics.motion import Trajectory
-from ..equilibria.solution import Equilibrium, Solution
-from ..errors import SceneError, SolveError
-from ..mathematics.arrays import Array
-from ..paths.path import Path
+from sfetcas.analyses import solve
+from sfetcas.checks import Answer
+from sfetcas.description.scene import Scene
+from sfetcas.description.scenefile import load
+from sfetcas.dynamics.modes import Modes
+from sfetcas.dynamics.motion import Trajectory
+from sfetcas.equilibria.solution import Equilibrium, Solution
+from sfetcas.errors import SceneError, SolveError
+from sfetcas.mathematics.arrays import Array
+from sfetcas.paths.path import Path
+
 from .random_scenes import random_scene, reordered, transformed
 from .worker import Worker
 
@@ -276,7 +277,7 @@ def _run(scenes: Sequence[int | str], changes: int, seconds: float) -> Iterator[
 
 def jitter(arguments: Sequence[str] = ()) -> None:
     """Put scenes otherwise and print what differs."""
-    parser = argparse.ArgumentParser(prog="python -m sfetcas.benchmark jitter")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks jitter")
     parser.add_argument("files", nargs="*", help="scene files; left out, random scenes")
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--first", type=int, default=0)

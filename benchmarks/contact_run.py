@@ -1,6 +1,6 @@
-"""Contact at random against chains of rigid links; part of ``sfetcas.benchmark``.
+"""Contact at random against chains of rigid links; part of ``python -m benchmarks``.
 
-``python -m sfetcas.benchmark contact [--count 25] [--first 0] [--seconds 30] [--family NAME] [--save FOLDER]`` prints
+``python -m benchmarks contact [--count 25] [--first 0] [--seconds 30] [--family NAME] [--save FOLDER]`` prints
 a table in Markdown, and before it a line for each scene that is not simply right.
 """
 
@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ..analyses import solve
-from ..description.scene import Scene
-from ..description.scenefile import dump
-from ..errors import SceneError, SolveError
+from sfetcas.analyses import solve
+from sfetcas.description.scene import Scene
+from sfetcas.description.scenefile import dump
+from sfetcas.errors import SceneError, SolveError
+
 from .contact_chain import QUARTERS, NotAChainError
 from .contact_oracle import ChainAnswer, chain_contact
 from .contact_scenes import FAMILIES, contact_scene
@@ -163,7 +164,7 @@ def _judged(table: dict[str, Any], chain: ChainAnswer, worker: Worker, seconds: 
 
 def contact(arguments: Sequence[str] = ()) -> None:
     """Run scenes of contact at random and print what became of them."""
-    parser = argparse.ArgumentParser(prog="python -m sfetcas.benchmark contact")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks contact")
     parser.add_argument("--count", type=int, default=25, help="scenes of each family")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=30.0, help="CPU time of a solve")

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ..mathematics.arrays import Array
-from ..mathematics.threads import single_threaded
+from sfetcas.mathematics.arrays import Array
+from sfetcas.mathematics.threads import single_threaded
+
 from .contact_chain import Chain, ChainState, NotAChainError, in_space
 
 __all__ = ["ChainAnswer", "chain_contact", "free_way"]

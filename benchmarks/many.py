@@ -1,4 +1,4 @@
-"""What a sweep costs beside its solves; part of ``python -m sfetcas.benchmark``."""
+"""What a sweep costs beside its solves; part of ``python -m benchmarks``."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from ..description.scene import Load, Member, Node, Scene
-from ..description.sections import CrossSection
-from ..sweeps.cases import sampled
-from ..sweeps.distributions import Normal, Uniform
-from ..sweeps.result import Sweep
-from ..sweeps.sweeping import sweep
-from ..sweeps.workers import cores
-from ..tradeoff.tables import markdown_table
+from sfetcas.description.scene import Load, Member, Node, Scene
+from sfetcas.description.sections import CrossSection
+from sfetcas.sweeps.cases import sampled
+from sfetcas.sweeps.distributions import Normal, Uniform
+from sfetcas.sweeps.result import Sweep
+from sfetcas.sweeps.sweeping import sweep
+from sfetcas.sweeps.workers import cores
+from sfetcas.tradeoff.tables import markdown_table
 
 __all__ = ["many"]
 

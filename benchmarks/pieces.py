@@ -1,4 +1,4 @@
-"""What each piece of a model costs: the same structure with it and without; part of ``python -m sfetcas.benchmark``."""
+"""What each piece of a model costs: the same structure with it and without; part of ``python -m benchmarks``."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..description.scene import Analysis, Load, Member, Node, Scene
-from ..description.sections import CrossSection
-from ..description.springs import Spring
-from ..dynamics.beginning import at_rest
-from ..dynamics.integrating import Memory, Stepper
-from ..dynamics.methods import Radau
-from ..dynamics.stages import StageEquations
-from ..equilibria.single import solve_model
-from ..mechanics.equations import Equations
-from ..mechanics.masses import masses_of
-from ..mechanics.mesh import uniform_mesh
-from ..mechanics.model import Model, assemble
-from ..solvers.prepared import Prepared
-from ..tradeoff.tables import markdown_table
+from sfetcas.description.scene import Analysis, Load, Member, Node, Scene
+from sfetcas.description.sections import CrossSection
+from sfetcas.description.springs import Spring
+from sfetcas.dynamics.beginning import at_rest
+from sfetcas.dynamics.integrating import Memory, Stepper
+from sfetcas.dynamics.methods import Radau
+from sfetcas.dynamics.stages import StageEquations
+from sfetcas.equilibria.single import solve_model
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.masses import masses_of
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import Model, assemble
+from sfetcas.solvers.prepared import Prepared
+from sfetcas.tradeoff.tables import markdown_table
 
 __all__ = ["pieces"]
 

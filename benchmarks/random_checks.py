@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from ..description.scene import Load, Scene
-from ..description.sections import breaks, evaluate
-from ..description.structure import SLIDING
-from ..equilibria.solution import Equilibrium
-from ..equilibria.statics import solve
-from ..errors import SceneError, SolveError
-from ..mathematics.arrays import Array
-from ..mathematics.quaternion import conjugate, from_rotation_vector, matrix, multiply, rotate
+from sfetcas.description.scene import Load, Scene
+from sfetcas.description.sections import breaks, evaluate
+from sfetcas.description.structure import SLIDING
+from sfetcas.equilibria.solution import Equilibrium
+from sfetcas.equilibria.statics import solve
+from sfetcas.errors import SceneError, SolveError
+from sfetcas.mathematics.arrays import Array
+from sfetcas.mathematics.quaternion import conjugate, from_rotation_vector, matrix, multiply, rotate
+
 from .random_scenes import reordered, transformed
 
 __all__ = ["VARIANTS", "Defects", "Variant", "compared", "defects", "variant", "wrong"]

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from sfetcas.mathematics.arrays import Array
+
 from .contact_chain import NotAChainError, member_points
 from .contact_oracle import free_way
 

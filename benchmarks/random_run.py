@@ -1,6 +1,6 @@
-"""Random scenes solved by the thousand, each answer looked at and asked again otherwise; part of ``sfetcas.benchmark``.
+"""Random scenes solved by the thousand, each answer looked at and asked again; part of ``python -m benchmarks``.
 
-``python -m sfetcas.benchmark random [--count 1000] [--first 0] [--seconds 30] [--processes 1]`` prints a summary in
+``python -m benchmarks random [--count 1000] [--first 0] [--seconds 30] [--processes 1]`` prints a summary in
 Markdown, and before it a line for each scene that is more than solved and the same every way.
 """
 
@@ -15,9 +15,10 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from ..equilibria.solution import Solution
-from ..equilibria.statics import solve
-from ..errors import SceneError, SolveError
+from sfetcas.equilibria.solution import Solution
+from sfetcas.equilibria.statics import solve
+from sfetcas.errors import SceneError, SolveError
+
 from .random_checks import VARIANTS, compared, variant, wrong
 from .random_scenes import random_scene
 from .worker import Worker
@@ -109,7 +110,7 @@ def random_run(seeds: Sequence[int], seconds: float = 30.0, processes: int = 1) 
 
 def random_scenes(arguments: Sequence[str] = ()) -> None:
     """Run scenes at random and print what became of them."""
-    parser = argparse.ArgumentParser(prog="python -m sfetcas.benchmark random")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks random")
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=30.0)

@@ -1,4 +1,4 @@
-"""How far answers can be trusted: loads, sizes, ratios and meshes far beyond use; part of ``sfetcas.benchmark``.
+"""How far answers can be trusted: loads, sizes, ratios and meshes far beyond use; part of ``python -m benchmarks``.
 
 Each line of the table tries a range, compares with a value that is known by itself, and says how breaking is told.
 An answer is *wrong* where it counts as solved, says nothing, and is off by more than three times the larger of its
@@ -20,15 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from ..description.scene import Scene
-from ..dynamics.motion import Trajectory
-from ..dynamics.simulation import simulate
-from ..equilibria.solution import Equilibrium
-from ..equilibria.statics import Settings, solve
-from ..errors import SceneError, SolveError, Status
-from ..mathematics import quaternion
-from ..mathematics.arrays import Array
-from ..mathematics.interpolation import lobatto
+from sfetcas.description.scene import Scene
+from sfetcas.dynamics.motion import Trajectory
+from sfetcas.dynamics.simulation import simulate
+from sfetcas.equilibria.solution import Equilibrium
+from sfetcas.equilibria.statics import Settings, solve
+from sfetcas.errors import SceneError, SolveError, Status
+from sfetcas.mathematics import quaternion
+from sfetcas.mathematics.arrays import Array
+from sfetcas.mathematics.interpolation import lobatto
 
 __all__ = [
     "LINES",

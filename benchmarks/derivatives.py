@@ -1,4 +1,4 @@
-"""Derivatives by ten numbers against solves, and against differences; part of ``python -m sfetcas.benchmark``."""
+"""Derivatives by ten numbers against solves, and against differences; part of ``python -m benchmarks``."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..description.scene import Analysis, Load, Member, Motion, Node, Scene
-from ..description.sections import CrossSection, Table
-from ..description.shapes import Arc
-from ..description.springs import Spring
-from ..equilibria.statics import solve
-from ..mathematics.arrays import Array
-from ..parametric.solving import ParametricAnswer, parametric
-from ..tradeoff.tables import markdown_table
+from sfetcas.description.scene import Analysis, Load, Member, Motion, Node, Scene
+from sfetcas.description.sections import CrossSection, Table
+from sfetcas.description.shapes import Arc
+from sfetcas.description.springs import Spring
+from sfetcas.equilibria.statics import solve
+from sfetcas.mathematics.arrays import Array
+from sfetcas.parametric.solving import ParametricAnswer, parametric
+from sfetcas.tradeoff.tables import markdown_table
 
 __all__ = ["derivatives"]
 

@@ -1,4 +1,4 @@
-"""Motion measured: error against seconds, cost of a step, start-up; part of ``python -m sfetcas.benchmark``.
+"""Motion measured: error against seconds, cost of a step, start-up; part of ``python -m benchmarks``.
 
 Three problems for which other programs' figures are known, with finite rotary inertia: D1 a pendulum released from
 rest, horizontal, L = 1, EI = 0.1, rhoA = 1, rhoI = 1e-4, for 1 s; D2 a beam in flight in the plane, L = 10, EI = 500,
@@ -16,20 +16,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..description.scene import Analysis, History, Load, Member, Node, Scene
-from ..description.sections import CrossSection
-from ..dynamics.beginning import at_rest
-from ..dynamics.integrating import Memory, Stepper, integrate
-from ..dynamics.methods import GeneralisedAlpha, Method, Radau
-from ..dynamics.sampling import Sampler
-from ..dynamics.stages import StageEquations
-from ..mathematics.arrays import Array
-from ..mathematics.kernels import Kernels
-from ..mechanics.elements import ELEMENTS
-from ..mechanics.equations import Equations
-from ..mechanics.masses import masses_of
-from ..mechanics.mesh import uniform_mesh
-from ..mechanics.model import assemble
+from sfetcas.description.scene import Analysis, History, Load, Member, Node, Scene
+from sfetcas.description.sections import CrossSection
+from sfetcas.dynamics.beginning import at_rest
+from sfetcas.dynamics.integrating import Memory, Stepper, integrate
+from sfetcas.dynamics.methods import GeneralisedAlpha, Method, Radau
+from sfetcas.dynamics.sampling import Sampler
+from sfetcas.dynamics.stages import StageEquations
+from sfetcas.mathematics.arrays import Array
+from sfetcas.mathematics.kernels import Kernels
+from sfetcas.mechanics.elements import ELEMENTS
+from sfetcas.mechanics.equations import Equations
+from sfetcas.mechanics.masses import masses_of
+from sfetcas.mechanics.mesh import uniform_mesh
+from sfetcas.mechanics.model import assemble
 
 __all__ = ["motion", "step_cost"]
 

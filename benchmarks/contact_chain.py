@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
+from sfetcas.mathematics.arrays import Array, Index
 
 __all__ = ["QUARTERS", "Chain", "ChainState", "NotAChainError", "in_space", "member_points"]
 
