@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from .checks import Answer, look_up
+from .checks import Answer
 from .description.scene import Scene, check_loaded
 from .dynamics.modes import find_modes
 from .dynamics.simulation import simulate
@@ -58,7 +58,7 @@ def solve(
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
     if scene.analysis.type == "dynamic":
-        return simulate(scene, settings, look_up, progress)
+        return simulate(scene, settings, progress)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":

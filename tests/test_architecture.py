@@ -36,6 +36,7 @@ ORDER = [
     "mathematics.least_squares",
     "description",
     "description.records",
+    "description.answers",
     "description.matrices",
     "description.sections",
     "description.shapes",

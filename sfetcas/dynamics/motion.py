@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from ..description.answers import MOTION
 from ..description.records import plain
 from ..equilibria.solution import Posture, heading
 from ..errors import Status
@@ -77,6 +78,8 @@ class Instant(Posture):
         Rotations, quantities and their rates, dimensionless.
     """
 
+    where: ClassVar[str] = MOTION
+
     time: float
     sample: Sample = field(repr=False)
     energies: tuple[float, float, float] = field(repr=False)
@@ -105,29 +108,19 @@ class Instant(Posture):
         time, scales = self.mover.time, self.model.scales
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
 
+    def table(self, kind: str, name: str = "") -> dict[str, Any]:
+        """As of :meth:`Posture.table`; also energies and momenta."""
+        if kind == "momentum":
+            return dict(self.momentum)
+        return self.energy if kind == "energy" else super().table(kind, name)
+
+    def _node(self, name: str) -> dict[str, Any]:
+        return {**super()._node(name), "velocity": self.velocity(name)}
+
     def to_dict(self) -> dict[str, Any]:
         """Values of this time, as leaves of the JSON answer."""
-        scene = self.model.scene
-        nodes: dict[str, Any] = {}
-        for name in self.model.nodes:
-            entry: dict[str, Any] = {"position": self.position(name), "velocity": self.velocity(name)}
-            turned = self.quaternion(name)
-            if turned is not None:
-                entry["quaternion"] = turned
-                if not self.model.space:
-                    entry["angle"] = self.angle(name)
-            nodes[name] = entry
-        reactions = {}
-        for name, node in scene.nodes.items():
-            if node.support != "free":
-                force, moment = self.reaction(name)
-                reactions[name] = {"force": force, "moment": moment}
-        answer: dict[str, Any] = {"nodes": nodes, "reactions": reactions}
-        if scene.springs:
-            answer["springs"] = {name: self.spring(name).to_dict() for name in scene.springs}
-        if scene.motions:
-            answer["motions"] = {name: self.motion(name) for name in scene.motions}
-        return {**answer, "energy": self.energy, "momentum": self.momentum}
+        tables = self.tables("nodes", "reactions", "springs", "motions")
+        return {**tables, "energy": self.energy, "momentum": self.momentum}
 
 
 @dataclass(frozen=True, eq=False)

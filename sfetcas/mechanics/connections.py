@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +44,7 @@ from .positions import normals
 from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
 from .segments import Segments, cushioned
 
-__all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "freedoms"]
+__all__ = ["GROUND", "Group", "anchored", "body_numbers", "connect", "connections_of", "freedoms"]
 
 GROUND = -1
 """Number of a side that is the ground: it neither turns nor moves."""
@@ -75,6 +75,13 @@ class Group:
     rows: tuple[str, ...]
     names: tuple[str, ...]
     nodes: tuple[str, ...]
+
+
+def connections_of(groups: Sequence[Group], table: str, name: str) -> Iterator[tuple[int, int]]:
+    """Groups that have what a name of a table of the scene stands for, and its number in each."""
+    for number, group in enumerate(groups):
+        if group.kind.table == table and name in group.names:
+            yield number, group.names.index(name)
 
 
 @dataclass(frozen=True)

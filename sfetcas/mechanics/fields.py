@@ -16,12 +16,14 @@ from ..description.obstacles import obstacle
 from ..mathematics import curves, interpolation, quaternion
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.keeping import kept
+from ..mathematics.kernels import Batch
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .contact_joints import OnPlane, OnRound
 from .equations import Equations, State, turned_tangents
 from .loading import Loading
 from .mesh import Touch
+from .singles import fibre_strain
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -109,7 +111,7 @@ class Fields:
         """
         motion = self.model.scene.motions[name]
         if motion.between is not None:
-            return dict(self.balance.drive(name))
+            return dict(self.balance.answers("motions", name))
         found: dict[str, Any] = {}
         force, moment = self.reaction(motion.node)
         if motion.rotation is not None:
@@ -150,6 +152,40 @@ class Fields:
             strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
         return result
+
+    def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
+        """Largest strain, and stress (Pa), by bending in sections that have a shape, (n,) each."""
+        scene = self.model.scene
+        section = scene.sections[str(scene.members[member].section)]
+        change, fibres = curvature - scene.center_lines[member].curvatures(x), section.fibres(x)
+        strain = fibre_strain(section.shape != "rectangle")(change.T, fibres[:, 1:].T).full().ravel()
+        return strain, fibres[:, 0] * strain
+
+    def largest_bending(self, member: str) -> tuple[float, float]:
+        """Largest strain, and stress (Pa), by bending along a member whose section has a shape.
+
+        The largest of places within elements, and between these of the parabola through the three that are nearest.
+        """
+        cuts = self.model.mesh.cuts[member]
+        x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * np.arange(PARTS) / PARTS).ravel(), cuts[-1])
+        strain, stress = self.bending(member, x, self.along(member, x)["curvature"])
+        return _largest(strain), _largest(stress)
+
+    def strain_energy(self, member: str) -> float:
+        """Strain energy of a member that is not rigid, N m."""
+        model = self.model
+        if member in model.members:
+            return float(self._strain_energies[model.elements_of(member)].sum()) * model.scales.moment
+        return self.balance.answers("members", member)["energy"]
+
+    @functools.cached_property
+    def _strain_energies(self) -> Array:
+        """Of all elements."""
+        model, element = self.model, self.model.element
+        batch = Batch(element.energy, len(self.turned))
+        for i, values in enumerate((self.q[model.rotations.turns], model.beams.stiffness, model.beams.tangent)):
+            batch.set(i, values)
+        return batch()[0].ravel()
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
@@ -492,6 +528,20 @@ def _per_place(xi: Array, rows: Any) -> Array:
 
 FEW = 8
 """Places up to which looking for equal ones costs more than it saves."""
+
+
+PARTS = 8
+"""Parts of an element between whose ends the largest strain is looked for."""
+
+
+def _largest(values: Array) -> float:
+    """The largest of values at the ends of the parts of elements; at the ends of elements they may have kinks."""
+    i = int(values.argmax())
+    if i % PARTS == 0:
+        return float(values[i])
+    before, here, after = values[i - 1 : i + 2]
+    bend = 2.0 * here - before - after
+    return float(here + (after - before) ** 2 / (8.0 * bend)) if bend > 0.0 else float(here)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import abc
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 import numpy as np
@@ -35,6 +36,7 @@ __all__ = [
     "TurnStop",
     "Turning",
     "Universal",
+    "answers_of",
     "by_components",
     "by_turning",
     "forces_by_turning",
@@ -53,9 +55,22 @@ class Connection(Components, abc.ABC):
     ----------
     space : bool
         Quaternions and three axes, or angles and two.
+    table : str
+        Table of the scene and of the answer in which it stands by its name; empty of what is told of in none.
+    answers : mapping
+        Keys of what :meth:`answer` says of it, with their units.
+    one_sided : bool
+        Its moments on the rotations of one node do not add up to nothing.
+    supports : bool
+        What it does to the ground is a reaction of the support there.
     """
 
     space: bool
+
+    table: ClassVar[str] = ""
+    answers: ClassVar[Mapping[str, str]] = {}
+    one_sided: ClassVar[bool] = False
+    supports: ClassVar[bool] = False
 
     @property
     @abc.abstractmethod
@@ -68,6 +83,10 @@ class Connection(Components, abc.ABC):
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """What has to be zero: angles (rad) and displacements, dimensionless."""
+        return []
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """What the answer tells of it, in the order of :attr:`answers`, dimensionless; ``lam`` of its rows."""
         return []
 
     # -- what the sides say to each other --------------------------------------------------------
@@ -122,6 +141,8 @@ class Hinge(Connection):
 class Universal(Connection):
     """An axis of either side that stay normal to each other; data: both, undeformed.  Space only."""
 
+    supports: ClassVar[bool] = True
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row."""
@@ -138,6 +159,9 @@ class Universal(Connection):
 class DrivenTurn(Connection):
     """The angle between two rotations about an axis is prescribed; data: axis, load: angle."""
 
+    table: ClassVar[str] = "motions"
+    answers: ClassVar[Mapping[str, str]] = {"moment": "N m"}
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row."""
@@ -151,11 +175,20 @@ class DrivenTurn(Connection):
         about, half = ca.dot(data, ca.vertcat(*r[1:])), 0.5 * load
         return [2.0 * (ca.cos(half) * about - ca.sin(half) * r[0])]
 
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The moment on the second side; in space the row is a sine, which changes its sign with each whole turn."""
+        if not self.space:
+            return [-lam]
+        r, half = self.relative(*q), 0.5 * load
+        return [-lam * ca.sign(ca.cos(half) * r[0] + ca.sin(half) * ca.dot(data, ca.vertcat(*r[1:])))]
+
 
 @final
 @dataclass(frozen=True)
 class Slide(Connection):
     """A place that slides along a line carried by a rotation at another one; data: directions across the line."""
+
+    one_sided: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -174,6 +207,10 @@ class Slide(Connection):
 class DrivenSlide(Connection):
     """The travel of a slide is prescribed; data: direction of the line, load: travel."""
 
+    table: ClassVar[str] = "motions"
+    answers: ClassVar[Mapping[str, str]] = {"force": "N"}
+    one_sided: ClassVar[bool] = True
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row."""
@@ -183,6 +220,10 @@ class DrivenSlide(Connection):
         """Travel along the line less what it shall be."""
         gap = ca.vertcat(*self.back(q[0], [b - a for a, b in zip(*u, strict=True)]))
         return [ca.dot(data, gap) - load]
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The force on the second side along the line."""
+        return [-lam]
 
 
 @dataclass(frozen=True)
@@ -205,6 +246,8 @@ class Turning(Connection):
     """
 
     crossed: bool = False
+
+    one_sided: ClassVar[bool] = True
 
     @property
     @abc.abstractmethod
@@ -242,6 +285,9 @@ class Turning(Connection):
 class TurnSpring(Turning):
     """A rotational spring about an axis of the first side; its own data: stiffness, rest angle."""
 
+    table: ClassVar[str] = "springs"
+    answers: ClassVar[Mapping[str, str]] = {"angle": "rad", "moment": "N m"}
+
     @property
     def own(self) -> int:
         """Two."""
@@ -251,6 +297,11 @@ class TurnSpring(Turning):
         """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
         angle = self.angle(q, data)
         return 0.5 * data[self.first] * angle * (angle - 2.0 * data[self.first + 1])
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The angle, and the moment on the second side."""
+        angle = self.angle(q, data)
+        return [angle, -data[self.first] * (angle - data[self.first + 1])]
 
 
 @final
@@ -295,6 +346,9 @@ class LineStop(Connection):
 class Spring(Connection):
     """A spring between two places with a free length; data: their distance (vector), stiffness, free length."""
 
+    table: ClassVar[str] = "springs"
+    answers: ClassVar[Mapping[str, str]] = {"travel": "m", "force": "N"}
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """No row."""
@@ -305,6 +359,12 @@ class Spring(Connection):
         n = self.axes
         gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
         return 0.5 * data[n] * (self._square(gap, data[n + 1]) - self._square(data[:n], data[n + 1]))
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The elongation and the force, below zero where it pulls."""
+        n = self.axes
+        travel = ca.norm_2(data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n + 1]
+        return [travel, -data[n] * travel]
 
     @staticmethod
     def _square(gap: ca.SX, free: ca.SX) -> ca.SX:
@@ -318,6 +378,9 @@ class Spring(Connection):
 class LineSpring(Connection):
     """A spring that acts along a direction fixed in space; data: direction, stiffness, rest travel."""
 
+    table: ClassVar[str] = "springs"
+    answers: ClassVar[Mapping[str, str]] = {"travel": "m", "force": "N"}
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """No row."""
@@ -328,6 +391,12 @@ class LineSpring(Connection):
         n = self.axes
         travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
         return 0.5 * data[n] * travel * (travel - 2.0 * data[n + 1])
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The travel along the direction, and the force."""
+        n = self.axes
+        travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
+        return [travel, -data[n] * (travel - data[n + 1])]
 
 
 @final
@@ -347,6 +416,9 @@ class Body(Connection):
     nodes, stiff : int
         Number of macro-nodes and of rows.
     """
+
+    table: ClassVar[str] = "members"
+    answers: ClassVar[Mapping[str, str]] = {"energy": "J"}
 
     nodes: int
     stiff: int
@@ -407,6 +479,10 @@ class Body(Connection):
             work += ca.dot(lever_now[:, k], ca.vertcat(*self.forth(frame, unit))) - lever[k, k]
         return 0.5 * ca.dot(e, ca.mtimes(stiffness, e)) - work
 
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The strain energy."""
+        return [self.energy(q, u, data, ca.SX.zeros(load.shape))]
+
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Deformations that do not exist."""
         rest, _, stiff = self._split(data)
@@ -437,6 +513,17 @@ def name_of(kind: Connection) -> str:
                 name_of(value) if isinstance(value, Connection) else item.name if value is True else str(value)
             )
     return f"{type(kind).__name__.lower()}_{'space' if kind.space else 'plane'}{extra}"
+
+
+@functools.cache
+def answers_of(kind: Connection) -> ca.Function:
+    """(q, u, data, load, lam) -> what the answer tells of a connection, in the order of its ``answers``."""
+    arguments, _, _ = _symbols(kind)
+    q, u, data, load, lam = arguments
+    sides = [[ca.vertsplit(part[:, i]) for i in range(part.shape[1])] for part in (q, u)]
+    found = kind.answer(sides[0], sides[1], data, load, lam)
+    names = ["q", "u", "data", "load", "lam"]
+    return ca.Function(f"answers_{name_of(kind)}", arguments, [ca.densify(ca.vertcat(*found))], names, ["answers"])
 
 
 @functools.cache

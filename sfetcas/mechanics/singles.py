@@ -18,6 +18,7 @@ __all__ = [
     "arms_product",
     "counted_angle",
     "exponential",
+    "fibre_strain",
     "moved_rotation",
     "rotation_between",
     "rows_of",
@@ -137,6 +138,23 @@ def rows_of(kind: Connection) -> ca.Function:
     sides = [ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)]
     rows = ca.densify(ca.vertcat(*kind.residual(*sides, given, load)))
     return ca.Function(f"values_{name_of(kind)}", [q, u, given, load], [rows])
+
+
+@functools.cache
+def fibre_strain(round_section: bool) -> ca.Function:
+    """(change, reach) -> largest strain of the fibres of a section by bending.
+
+    ``change`` of the curvature about b1, b2, b3; ``reach`` of the outermost fibre from b2 and from b3.  At a corner of
+    a rectangle both bendings add up, at the rim of what is round they add up as vectors.
+    """
+    change, reach = ca.SX.sym("change", 3), ca.SX.sym("reach", 2)
+    if round_section:
+        # With a derivative, zero, also where nothing is bent.
+        square = ca.dot(change[1:], change[1:])
+        strain = reach[0] * ca.sqrt(ca.fmax(square, 1e-300)) * (square > 0.0)
+    else:
+        strain = reach[0] * ca.fabs(change[1]) + reach[1] * ca.fabs(change[2])
+    return ca.Function(f"fibre_{'round' if round_section else 'rectangle'}", [change, reach], [strain])
 
 
 @functools.cache

@@ -158,17 +158,19 @@ class Program:
     @functools.cached_property
     def strain(self) -> ca.MX:
         """Elastic energy of elements and connections."""
-        expressions, given, model = self.expressions, self.given, self.model
         q, y, _, near = self.parts
-        total = ca.MX(0)
-        if expressions.elements:
-            turns = model.rotations.turns.ravel().tolist()
-            nothing = ca.MX.zeros(expressions.axes, expressions.elements * expressions.points)
-            energy = expressions.many(model.element.energy, expressions.elements)
-            total += ca.sum2(energy(q[:, turns], given.stiffness, given.tangent, nothing))
-        for found in self._linked(y, q, near):
-            total += ca.sum2(found[1])
-        return total
+        return sum((ca.sum2(found[1]) for found in self._linked(y, q, near)), ca.sum2(self.strains))
+
+    @functools.cached_property
+    def strains(self) -> ca.MX:
+        """Elastic energy of each element, (1, elements)."""
+        expressions, given, model = self.expressions, self.given, self.model
+        if not expressions.elements:
+            return ca.MX(1, 0)
+        turns = model.rotations.turns.ravel().tolist()
+        nothing = ca.MX.zeros(expressions.axes, expressions.elements * expressions.points)
+        energy = expressions.many(model.element.energy, expressions.elements)
+        return energy(self.parts[0][:, turns], given.stiffness, given.tangent, nothing)
 
     def _linked(self, y: ca.MX, q: ca.MX, near: ca.MX) -> Iterator[Sequence[ca.MX]]:
         """Results of connections without multipliers, group by group."""
