@@ -92,6 +92,29 @@ class Instant(Posture):
         rate = self.sample.v[axes * place : axes * (place + 1)]
         return three(rate) * self.model.scales.length / self.mover.time
 
+    def angular_velocity(self, node: str) -> Array | None:
+        """Angular velocity of a node about the fixed axes, (3,) rad/s; None where it has no rotation of its own."""
+        number = self.model.rotations.node_turn[self._known(node, self.model.nodes, "node")]
+        if number is None:
+            return None
+        found, spin = np.zeros(3), self.sample.spin[number]
+        found[3 - len(spin) :] = spin / self.mover.time
+        return found
+
+    def along(self, member: str, at: Any) -> dict[str, Array]:
+        """As of :meth:`Posture.along`; also ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
+
+        Not of small members, whose inside is not followed in time.
+        """
+        found, model = super().along(member, at), self.model
+        if member in model.members:
+            place, axes = model.segments.place(model.segments.ends[member, 0]), model.element.axes
+            start = self.sample.v[axes * place : axes * (place + 1)]
+            velocity, turning = self.fields.rates(member, np.atleast_1d(at), self.sample.spin, start)
+            found["velocity"] = velocity * model.scales.length / self.mover.time
+            found["angular_velocity"] = turning / self.mover.time
+        return found
+
     @property
     def energy(self) -> dict[str, float]:
         """Kinetic and elastic energy, potential of the loads as they are now, and their sum, N m.
@@ -115,7 +138,9 @@ class Instant(Posture):
         return self.energy if kind == "energy" else super().table(kind, name)
 
     def _node(self, name: str) -> dict[str, Any]:
-        return {**super()._node(name), "velocity": self.velocity(name)}
+        found = {**super()._node(name), "velocity": self.velocity(name)}
+        turning = self.angular_velocity(name)
+        return found if turning is None else {**found, "angular_velocity": turning}
 
     def to_dict(self) -> dict[str, Any]:
         """Values of this time, as leaves of the JSON answer."""
@@ -180,6 +205,10 @@ class Trajectory:
     def velocities(self, node: str) -> Array:
         """Velocities of a node over the times, (times, 3) m/s."""
         return np.array([step.velocity(node) for step in self.steps])
+
+    def angular_velocities(self, node: str) -> Array:
+        """Angular velocities of a node with a rotation of its own over the times, (times, 3) rad/s."""
+        return np.array([step.angular_velocity(node) for step in self.steps], dtype=float)
 
     def energies(self, kind: str = "total") -> Array:
         """Energies over the times, (times,) N m: kinetic, elastic, loads or total."""

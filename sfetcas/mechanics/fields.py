@@ -319,10 +319,40 @@ class Fields:
         """Positions (n, 3) at fractions of the length, m."""
         model = self.model
         part = model.elements_of(member)
+        gained = self.turned[part] - model.beams.tangent[part]
+        moved = _three(self._summed(member, x, self._element_starts(member), gained))
+        return model.scene.center_lines[member].positions(x) + moved * model.scales.length
+
+    def _summed(self, member: str, x: Array, starts: Array, gained: Array) -> Array:
+        """What begins at elements and is gained at the integration points (elements, points, axes), at places."""
         e, to_x = self._located(member, x)
-        moved = np.einsum("nk,nka->na", to_x, (self.turned[part] - model.beams.tangent[part])[e])
-        start = self._element_starts(member)
-        return model.scene.center_lines[member].positions(x) + _three(start[e] + moved) * model.scales.length
+        return np.asarray(starts[e] + np.einsum("nk,nka->na", to_x, gained[e]))
+
+    def rates(self, member: str, x: Array, spin: Array, start: Array) -> tuple[Array, Array]:
+        """Velocity and angular velocity (n, 3) at fractions of the length of a member of elements, dimensionless.
+
+        Parameters
+        ----------
+        spin : angular velocities (rotations, turns)
+        start : velocity of the first end, (axes,)
+        """
+        model, part = self.model, self.model.elements_of(member)
+        turns, axes = model.rotations.turns[part], model.element.axes
+        e, xi = _located(model.mesh.cuts[member], x)
+        rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
+        about = np.zeros((*turns.shape, 3))
+        about[..., 3 - spin.shape[1] :] = spin[turns]
+        gained = np.cross(about, _three(self.turned[part]))[..., :axes]
+        starts = start + np.concatenate([np.zeros((1, axes)), np.cumsum(gained.sum(axis=1), axis=0)])
+        velocity = _three(self._summed(member, x, starts, gained))
+        if not model.space:
+            return velocity, np.einsum("nj,nja->na", rows, about[e])
+        # Of the interpolated quaternion, whatever its length: w = 2 q' conj(q) / q.q.
+        nodal = self.q[turns]
+        rate = 0.5 * quaternion.multiply(np.pad(about, ((0, 0), (0, 0), (1, 0))), nodal)
+        here, change = (np.einsum("nj,njc->nc", rows, values[e]) for values in (nodal, rate))
+        turned = 2.0 * quaternion.multiply(change, quaternion.conjugate(here))[:, 1:]
+        return velocity, turned / np.einsum("nc,nc->n", here, here)[:, None]
 
     def _located(self, member: str, x: Array) -> tuple[Any, Array]:
         """Element of each fraction of a member's length, and weights that integrate in it up to there."""
@@ -530,7 +560,7 @@ FEW = 8
 """Places up to which looking for equal ones costs more than it saves."""
 
 
-PARTS = 8
+PARTS = 16
 """Parts of an element between whose ends the largest strain is looked for."""
 
 
