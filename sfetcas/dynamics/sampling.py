@@ -149,7 +149,7 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
     turns = np.array([_from(near.q, sample.q) for sample in samples])
 
     def mean(part: str) -> Array:
-        return np.asarray(row @ np.array([getattr(sample, part) for sample in samples]))
+        return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = _turned(near.q, np.einsum("n,nra->ra", row, turns))
     return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.near)
