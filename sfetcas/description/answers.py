@@ -33,6 +33,7 @@ __all__ = [
     "answers_table",
     "check_answer",
     "selected",
+    "single_number",
 ]
 
 STATICS, MOTION, PARAMETERS, STEPS = "statics", "motion", "parameters", "steps"
@@ -140,8 +141,8 @@ springs.NAME.moment | N m | | all | of a rotational one
 springs.NAME.travel | m | | all | of a translational one
 springs.NAME.force | N | | all | of a translational one
 springs.NAME.stop | N m, N | | statics | of one with a stop: what that adds; zero away from it
-motions.NAME.moment | N m | x y z | statics, motion | what makes a rotation; a number where that is one
-motions.NAME.force | N | x y z | statics, motion | what makes a displacement; a number at a driven joint
+motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
+motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
 contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resultant
 contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
 contacts.NAME.gap | m | | statics | smallest distance
@@ -395,6 +396,11 @@ def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
         accepted = [one.key for one in ANSWERS if one.table == kind.table and one.applies(scene, record)]
         found = f"found {name.quantity!r}"
         raise SceneError(f"{found}, accepted of {name.record!r}: {', '.join(filter(None, accepted)) or 'none'}")
+
+
+def single_number(motion: Any, key: str) -> bool:
+    """Whether what makes a motion is one number: at a driven joint, and a moment about the axis of a hinge."""
+    return motion.between is not None or (key == "moment" and isinstance(motion.rotation, float))
 
 
 HEAD = "name | unit | components | told of | what it is"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..description.scene import Scene
 from ..mathematics.arrays import Array
 from ..mathematics.keeping import kept
 from ..mathematics.kernels import Batch
@@ -20,9 +21,10 @@ from .connections import GROUND, Group, connections_of
 from .equations import Equations, State
 from .joints import answers_of
 from .loading import Loading
+from .model import Model
 from .rotations import STIFF, Turn, end_joints
 
-__all__ = ["Balance", "SpringState", "three"]
+__all__ = ["Balance", "SpringState", "guide", "pinned_turns", "three"]
 
 GROUPS = 64
 """Groups of connections of which something is kept at hand."""
@@ -47,6 +49,26 @@ class SpringState:
 def three(a: Array) -> Array:
     """Vectors (..., 2) or (..., 3) as (..., 3)."""
     return a if a.shape[-1] == 3 else np.concatenate([a, np.zeros((*a.shape[:-1], 1))], axis=-1)
+
+
+def guide(scene: Scene, node: str) -> Array | None:
+    """Direction in which a support lets a node move; None where it does not, or a motion drives it."""
+    record = scene.nodes[node]
+    if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
+        return None
+    along = np.asarray(record.direction, dtype=float)
+    return np.asarray(along / np.linalg.norm(along))
+
+
+def pinned_turns(model: Model, node: str) -> list[int]:
+    """Rotations of member ends that a support itself pins, its node having none."""
+    scene, rotations, record = model.scene, model.rotations, model.scene.nodes[node]
+    if record.support == "free" or record.joint != "hinge":
+        return []
+    turns = [rotations.ends[n][m.nodes.index(node)] for n, m in scene.members.items() if node in m.nodes]
+    # A member that is rigid up to another support that holds it is held there.
+    elsewhere = {turn for n, turn in rotations.node_turn.items() if scene.nodes[n].turn not in ("free", "ball")}
+    return [turn for turn in turns if turn not in elsewhere]
 
 
 class Balance:
@@ -119,23 +141,14 @@ class Balance:
         for group, links in zip(model.connections, self._links, strict=True):
             for number, side in np.argwhere(group.places == place):
                 force = force + self._force_of(group, links, number, side)
-        along = self._guide(node)
+        along = guide(self.model.scene, node)
         # A guide does nothing along itself: what is left there is not exactly in balance.
         return force if along is None else force - (along @ force) * along
-
-    def _guide(self, node: str) -> Array | None:
-        """Direction in which a support lets a node move; None where it does not, or a motion drives it."""
-        scene = self.model.scene
-        record = scene.nodes[node]
-        if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
-            return None
-        along = np.asarray(record.direction, dtype=float)
-        return np.asarray(along / np.linalg.norm(along))
 
     def _moment(self, node: str) -> Array:
         number = self.model.rotations.node_turn[node]
         if number is None:
-            return sum((self._totals[turn] for turn in self._pinned(node)), np.zeros(3))
+            return sum((self._totals[turn] for turn in pinned_turns(self.model, node)), np.zeros(3))
         if self._shared(number):
             return self._rigid[1].get(node, np.zeros(3))
         left = self._totals[number]
@@ -149,18 +162,6 @@ class Balance:
             axis = self.model.rotations.axis[number]
             return moment - (axis @ moment) * axis
         return np.zeros(3) if kind == Turn.FREE else moment
-
-    def _pinned(self, node: str) -> list[int]:
-        """Rotations of member ends that the support itself pins, the node having none."""
-        record = self.model.scene.nodes[node]
-        if record.support == "free" or record.joint != "hinge":
-            return []
-        rotations = self.model.rotations
-        turns = [rotations.ends[n][m.nodes.index(node)] for n, m in self.model.scene.members.items() if node in m.nodes]
-        # A member that is rigid up to another support that holds it is held there.
-        nodes = self.model.scene.nodes
-        elsewhere = {turn for n, turn in rotations.node_turn.items() if nodes[n].turn not in ("free", "ball")}
-        return [turn for turn in turns if turn not in elsewhere]
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""

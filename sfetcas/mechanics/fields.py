@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..description.answers import single_number
 from ..description.obstacles import obstacle
 from ..mathematics import curves, interpolation, quaternion
 from ..mathematics.arrays import Array, first_of_largest
@@ -116,7 +117,7 @@ class Fields:
         force, moment = self.reaction(motion.node)
         if motion.rotation is not None:
             axis = np.asarray(self.model.scene.nodes[motion.node].turn_axis, dtype=float)
-            number = isinstance(motion.rotation, float)
+            number = single_number(motion, "moment")
             found["moment"] = float(moment @ axis / np.linalg.norm(axis)) if number else moment
         if motion.displacement is not None:
             found["force"] = force

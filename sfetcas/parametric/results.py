@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer
+from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer, single_number
 from ..description.records import unknown
 from ..errors import SceneError
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.constants import constant, times
+from ..mechanics.balance import guide, pinned_turns
 from ..mechanics.connections import GROUND, connections_of
 from ..mechanics.joints import answers_of
 from ..mechanics.model import Model
@@ -87,10 +88,13 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
 def default_motion_results(model: Model) -> list[str]:
     """Of a motion: positions, rotations and velocities of all nodes, positions along the members, springs."""
     every = [answer_name(name) for name in default_results(model, unique=False)]
-    tables = {table: [name.text for name in every if name.kind.table == table] for table in ("nodes", "springs")}
-    members = [name.text for name in every if name.kind.table == "members" and name.kind.key == "position"]
-    speeds = [f"nodes.{name}.velocity" for name in model.nodes]
-    return [*tables["nodes"], *members, *speeds, *tables["springs"]]
+    moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
+    sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
+    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung]
+
+
+TRAVELS = ("angle", "travel")
+"""How springs are told of in motions."""
 
 
 def _moment_known(model: Model, node: str) -> bool:
@@ -108,6 +112,7 @@ WHOSE = {
     "reactions": "that the ground exerts at the node",
     "members": "of the member",
     "springs": "of the spring",
+    "motions": "of the motion",
     "energy": "energy",
 }
 """How the meaning of a result goes on after its key."""
@@ -174,7 +179,10 @@ class Results:
         if not kind.key:
             return Result(text, name, (n, n), kind.unit, f"tangent {kind.table} of {name.record}, {kind.meaning}")
         rows = (len(self.places[name.record]),) if kind.along and name.at is None else ()
-        columns = (len(kind.components),) if kind.components and name.component is None else ()
+        components = kind.components
+        if kind.table == "motions" and single_number(self.model.scene.motions[name.record], kind.key):
+            components = ()
+        columns = (len(components),) if name.component is None and components else ()
         what = f"{kind.key.replace('_', ' ')} {WHOSE[kind.table]}" + (f" {name.record}" if kind.named else "")
         more = "" if kind.meaning.startswith("of ") else f": {kind.meaning}"
         return Result(text, name, (*rows, *columns), kind.unit or "1", what + more)
@@ -187,7 +195,7 @@ class Results:
         check_answer(scene, name, STEPS if self._motion else PARAMETERS)
         if set(name.selectors) - {"at"} or (name.at is not None and not kind.along):
             raise SceneError(f"found {name.text!r}, accepted: {name.bare}")
-        if not self._unique and (kind.table == "reactions" or (kind.along and kind.key in BY_FORCES)):
+        if not self._unique and (kind.table in ("reactions", "motions") or (kind.along and kind.key in BY_FORCES)):
             raise SceneError("not unique as closings depend on each other, accepted: what is")
         if kind.along:
             flexible = [n for n, record in scene.members.items() if record.type == "flexible"]
@@ -198,7 +206,13 @@ class Results:
         turns = kind.table == "nodes" and kind.key in ("quaternion", "angle")
         if (turns or not kind.key) and node in scene.nodes and self.model.rotations.node_turn[node] is None:
             raise SceneError("found a node that has no rotation of its own")
-        if kind.name == "reactions.NAME.moment" and node in scene.nodes and not _moment_known(self.model, node):
+        if kind.table == "motions":
+            motion = scene.motions[node]
+            if name.component is not None and single_number(motion, kind.key):
+                raise SceneError(f"found {name.bare!r}, which is one number here, accepted: {name.quantity}")
+            node = motion.node if motion.between is None else ""
+        held = kind.table in ("reactions", "motions") and kind.key == "moment" and node in scene.nodes
+        if held and not _moment_known(self.model, node):
             raise SceneError("other supports of the same rigid body share it, accepted: reactions alone in it")
 
     # -- what they are ------------------------------------------------------------------------------
@@ -309,7 +323,9 @@ class _Told:
             return energies[key] * self._model.scales.moment
         if not key:
             return self._tangent(kind.table, record)
-        tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "springs": self._spring}
+        if kind.table == "springs":
+            return self._connection("springs", record, key)
+        tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
         return tables[kind.table](record, key)
 
     def _three(self, vectors: ca.MX) -> ca.MX:
@@ -353,19 +369,21 @@ class _Told:
         positions = model.positions
         if key == "force":
             on_places = self._shares(moments=False)[expressions.of_places :]
-            lam = self._lam[: len(positions.rows)]
+            lam = self._lam[: len(positions.rows), :]
             # By displacements of what the ground holds; what hangs on it by its members follows.
             force = times(constant(positions.B).T, on_places) + times(constant(positions.BZ).T, lam)
             place = model.segments.place(node)
             found = self._three(ca.reshape(force, expressions.axes, expressions.places)[:, place])
-            found -= self._across(node, found)
+            along = guide(model.scene, node)
+            # A guide does nothing along itself.
+            found -= 0.0 if along is None else ca.dot(ca.DM(along), found) * ca.DM(along)
             return found.T * model.scales.force
         turns = expressions.turns
         moments = ca.reshape(self._shares(moments=True)[: expressions.of_places], turns, -1)
         moments = moments if model.space else ca.vertcat(ca.MX.zeros(2, moments.shape[1]), moments)
         number = model.rotations.node_turn[node]
         if number is None:
-            return sum((moments[:, turn] for turn in self._pinned(node)), ca.MX.zeros(3)).T * model.scales.moment
+            return sum((moments[:, turn] for turn in pinned_turns(model, node)), ca.MX.zeros(3)).T * model.scales.moment
         found = moments[:, number]
         kind = model.rotations.kind[number]
         if kind == Turn.AXIS:
@@ -375,23 +393,16 @@ class _Told:
             found = ca.MX.zeros(3)
         return found.T * model.scales.moment
 
-    def _across(self, node: str, force: ca.MX) -> ca.MX:
-        """The share of a force along a guide, which does nothing along itself."""
-        scene = self._model.scene
-        record = scene.nodes[node]
-        driven = any(m.node == node and m.displacement is not None for m in scene.motions.values())
-        if not record.slides or driven:
-            return ca.MX.zeros(3)
-        along = np.asarray(record.direction, dtype=float)
-        along /= np.linalg.norm(along)
-        return ca.dot(ca.DM(along), force) * ca.DM(along)
-
-    def _pinned(self, node: str) -> list[int]:
-        model = self._model
-        if model.scene.nodes[node].joint != "hinge":
-            return []
-        members = model.scene.members.items()
-        return [model.rotations.ends[name][m.nodes.index(node)] for name, m in members if node in m.nodes]
+    def _motion(self, name: str, key: str) -> ca.MX:
+        """What makes a motion: the multiplier of a driven joint, or what the ground does, also about an axis alone."""
+        motion = self._model.scene.motions[name]
+        if motion.between is not None:
+            return self._connection("motions", name, key)
+        found = self._reaction(motion.node, key)
+        if not single_number(motion, key):
+            return found
+        axis = np.asarray(self._model.scene.nodes[motion.node].turn_axis, dtype=float)
+        return ca.mtimes(found, ca.DM(axis / np.linalg.norm(axis)))
 
     # -- members ------------------------------------------------------------------------------------
 
@@ -519,17 +530,15 @@ class _Told:
 
     # -- springs ------------------------------------------------------------------------------------
 
-    def _spring(self, spring: str, key: str) -> ca.MX:
-        return self._connection("springs", spring, key)
-
     def _connection(self, table: str, name: str, key: str) -> ca.MX:
         """What the connection of a name tells."""
         expressions, given = self._expressions, self._program.given
-        number, i = next(connections_of(self._model.connections, table, name))
-        group = self._model.connections[number]
+        groups = self._model.connections
+        number, i = next(x for x in connections_of(groups, table, name) if key in groups[x[0]].kind.answers)
+        group = groups[number]
         turns, places, rows, _, _ = group.kind.sizes
         turned, moved = expressions.sides(group, self._q, ca.vec(self._places))
-        first = len(self._model.positions.rows) + sum(len(g.rows) for g in self._model.connections[:number])
+        first = len(self._model.positions.rows) + sum(len(g.rows) for g in groups[:number])
         found = answers_of(group.kind)(
             turned[:, turns * i : turns * (i + 1)],
             moved[:, places * i : places * (i + 1)],
