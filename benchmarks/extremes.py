@@ -621,7 +621,7 @@ def flights() -> Iterator[Outcome]:
 
 def solve_motion(scene: Scene) -> Trajectory:
     """A motion, without conditions that end it."""
-    return simulate(scene, Settings(), lambda *_: 0.0)
+    return simulate(scene, Settings())
 
 
 def steps() -> Iterator[Outcome]:

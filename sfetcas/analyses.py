@@ -61,10 +61,9 @@ def solve(
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
     if scene.analysis.type == "dynamic":
-        from .checks import look_up
         from .dynamics.simulation import simulate
 
-        return simulate(scene, settings, look_up, progress)
+        return simulate(scene, settings, progress)
     check_loaded(scene)
     check_resistance(scene)
     if scene.analysis.type == "path":

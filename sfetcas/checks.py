@@ -9,18 +9,19 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
+from .description.answers import answer_name
 from .description.records import say
 from .description.scene import Expect, Scene, check_scene
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.quantities import entry_of, value_of
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
-from .paths.path import FlutterPoint, Path
+from .paths.path import Path
 
 if TYPE_CHECKING:
     from .dynamics.modes import Modes
 
-__all__ = ["Answer", "Check", "asked", "check", "look_up"]
+__all__ = ["Answer", "Check", "asked", "check"]
 
 
 Answer: TypeAlias = "Solution | Path | Trajectory | Modes"
@@ -132,26 +133,10 @@ def _numbered(entries: Sequence[Equilibrium], number: int, key: str) -> Equilibr
 
 def _value(solution: Answer, entry: Equilibrium | Instant, expect: Expect) -> Any:
     """What the answer says; of modes as of equilibria."""
-    kind, _, key = expect.quantity.partition(".")
-    if kind == "modes" and solution.scene.analysis.type == "modes":
-        return entry_of(cast("Modes", solution).values(), key)
-    return look_up(entry, expect.quantity, expect.at)
-
-
-def look_up(step: Equilibrium | Instant, quantity: str, at: float | None = None) -> Any:
-    """A quantity by its name in the answer, see :func:`~sfetcas.equilibria.quantities.value_of`."""
-
-    def further(kind: str, name: str) -> dict[str, Any]:
-        if isinstance(step, Instant):
-            if kind == "nodes":
-                return {"velocity": step.velocity(name)}
-            tables: dict[str, dict[str, Any]] = {"energy": step.energy, "momentum": step.momentum}
-            return tables.get(kind, {})
-        if kind == "certificate":
-            return step.certificate.to_dict()
-        return {"omega": step.omega} if kind == "omega" and isinstance(step, FlutterPoint) else {}
-
-    return value_of(step, quantity, at, further)
+    name = answer_name(expect.quantity)
+    if name.kind.table == "modes" and solution.scene.analysis.type == "modes":
+        return entry_of(cast("Modes", solution).values(), name.kind.key)
+    return value_of(entry, name, expect.at)
 
 
 def _assigned(scene: Scene, solution: Answer) -> dict[int, tuple[Equilibrium, bool]]:
@@ -203,7 +188,7 @@ def _matched(groups: list[list[Expect]], entries: list[Equilibrium]) -> list[tup
 
 def _met(expect: Expect, entry: Equilibrium) -> bool:
     try:
-        return _compared(expect, look_up(entry, expect.quantity, expect.at)).passed
+        return _compared(expect, value_of(entry, expect.quantity, expect.at)).passed
     except (SceneError, TypeError, ValueError):
         return False
 

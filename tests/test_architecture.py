@@ -39,6 +39,7 @@ ORDER = [
     "mathematics.relations",
     "description",
     "description.records",
+    "description.answers",
     "description.matrices",
     "description.sections",
     "description.shapes",

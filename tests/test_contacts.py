@@ -7,10 +7,10 @@ import pytest
 from scenes import SOFT, made
 
 from sfetcas import Scene, SceneError, SolveError, Status, load, solve
-from sfetcas.checks import look_up
 from sfetcas.contact.touches import Touched, edge_sides
 from sfetcas.description.obstacles import obstacle
 from sfetcas.description.scene import Contact
+from sfetcas.equilibria.quantities import value_of
 
 FLOOR = {"type": "plane", "point": [0, 0], "normal": [0, 1], "member": "m"}
 
@@ -428,8 +428,8 @@ def test_answer_by_name():
     entry = step.to_dict()["contacts"]["floor"]
     assert entry["member"] == "m"
     assert entry["at"] == 1.0
-    assert look_up(step, "contacts.floor.gap") == pytest.approx(0.0, abs=1e-12)
-    assert look_up(step, "contacts.floor.force")[1] == entry["force"][1]
+    assert value_of(step, "contacts.floor.gap") == pytest.approx(0.0, abs=1e-12)
+    assert value_of(step, "contacts.floor.force")[1] == entry["force"][1]
 
 
 @pytest.mark.parametrize(

@@ -434,7 +434,7 @@ def test_what_was_computed_is_kept():
             raise KeyboardInterrupt
 
     scene = Scene.from_dict(double_pendulum(accuracy=1e-2))
-    motion = simulate(scene, Settings(), lambda *_: 0.0, progress=interrupt)
+    motion = simulate(scene, Settings(), progress=interrupt)
     assert motion.status is Status.INTERRUPTED
     assert motion.times == pytest.approx(np.arange(0.0, 1.26, 0.25))
 

@@ -32,7 +32,7 @@ from sfetcas import (
     sweep,
 )
 from sfetcas.cli import main
-from sfetcas.equilibria.quantities import Quantity
+from sfetcas.description.answers import answer_name
 from sfetcas.processes import context_of
 from sfetcas.sweeps import feeding, work
 from sfetcas.sweeps.cases import Cases, read_cases
@@ -139,7 +139,7 @@ def test_names_with_spaces_and_words_of_selectors_are_names():
     tip, root = "nodes.x step 2.position", "members.the m at 1.force at 0"
     found = here(made(table), {"loads.tip.value.1": [1.0]}, [tip, root], settings=Settings(accuracy_of=root))
     assert list(found.table)[1:7] == [*(f"{tip}.{i}" for i in range(3)), *(f"{root[:-5]}.{i} at 0" for i in range(3))]
-    assert Quantity.named("nodes.x at 2.position") == Quantity("nodes.x at 2.position")
+    assert answer_name("nodes.x at 2.position").record == "x at 2"
 
 
 def test_of_several_equilibria_the_default_one_is_taken(no_solver):
@@ -515,20 +515,23 @@ def test_bad_cases_are_refused_in_a_sentence(cases, sentence):
         ([], "quantities: found [], accepted: a list of names"),
         (TIP, "quantities: found 'nodes.B.position', accepted: a list of names"),
         ([TIP, TIP], "found 'nodes.B.position' twice, accepted: each once"),
-        ([3], "found 3, accepted: names"),
+        ([3], "quantities: found 3, accepted: a name, as 'nodes.tip.position'"),
         (["nodes.C.position"], "quantities.nodes.C.position: found 'C', accepted: A, B"),
         (["nodes.B.positions"], "did you mean 'position'?"),
         (["node.B.position"], "did you mean 'nodes'?"),
         (["nodes.B"], "found 'nodes.B', accepted: nodes.NAME.KEY"),
         (["members.m.moment"], "found none, accepted: a place, as members.beam.moment at 0.5"),
-        (["members.m.moment at half"], "found 'half', accepted: a number after 'at'"),
+        (["members.m.moment at half"], "found 'members.m.moment at half', accepted: a number after 'at'"),
         (["members.m.moment at 1.5"], "found 1.5, accepted: a fraction of the length"),
-        (["nodes.B.position at 0.5"], "accepted: a place with members only"),
+        (["nodes.B.position at 0.5"], "found 0.5, accepted: a place along members only"),
         (["nodes.B.position step 2"], "found 2"),
-        (["nodes.B.velocity time 1"], "found the analysis 'static', accepted: 'dynamic' with this key"),
+        (["nodes.B.position time 1"], "found the analysis 'static', accepted: 'dynamic' with this key"),
         (["reactions.B.force"], "node 'B' is free: no ground acts on it"),
-        (["energy.kinetic"], "found 'kinetic'"),
-        (["certificate.stable"], "found 'stable', accepted: error_estimate, negative, residual, smallest"),
+        (
+            ["energy.kinetic"],
+            "'energy.kinetic', told of motion only, accepted of statics: energy.elastic, energy.loads",
+        ),
+        (["certificate.stable"], "found 'certificate.stable', accepted: a quantity made of numbers"),
     ],
 )
 def test_bad_quantities_are_refused_in_a_sentence(quantities, sentence):

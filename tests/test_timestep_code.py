@@ -118,8 +118,14 @@ def test_steps_are_cpp_and_pass_sanitizers(tmp_path):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"results": ["reactions.A.force"]}, "found 'reactions.A.force', accepted of a step"),
-        ({"results": ["members.m.moment"]}, "found 'members.m.moment', accepted of a step"),
+        (
+            {"results": ["reactions.A.force"]},
+            "found 'reactions.A.force', told of statics, motion, parameters only",
+        ),
+        (
+            {"results": ["members.m.moment"]},
+            "accepted of steps: members.*.position, members.*.quaternion",
+        ),
         ({"arguments": ["sections.s.rhoA"]}, "accepted"),
         ({"sensitivities": True}, "found a motion, accepted of an equilibrium only"),
     ],

@@ -309,7 +309,7 @@ def test_kinks_a_rounding_apart_are_one():
         histories={"h": command[TORQUE]},
         analysis={"type": "dynamic", "end": end},
     )
-    assert Simulation(scene, Settings(), None, None)._breaks(1.0) == [0.25, end]
+    assert Simulation(scene, Settings())._breaks(1.0) == [0.25, end]
 
 
 def test_a_search_that_broke_off_begins_again(flexible, monkeypatch):

@@ -252,8 +252,8 @@ class Writer(abc.ABC):
             entry = {"name": result.name, "constant": f"{self.name.upper()}_RES_{identifier}", "first": first}
             entry |= {"size": result.size, "shape": list(result.shape)}
             entry |= {"unit": result.unit, "meaning": result.meaning}
-            if result.name.startswith("members."):
-                entry["s"] = list(self.results.places[result.name.split(".")[1]])
+            if result.member:
+                entry["s"] = list(self.results.places[result.member])
             results.append(entry)
             first += result.size
         return {
@@ -304,17 +304,12 @@ class Writer(abc.ABC):
     def units(self, results: Sequence[Array]) -> Array:
         """What each result is compared by: the largest of its kind in all cases."""
         largest: dict[str, float] = {}
-        kinds = [kind for one in self.results.results for kind in [_kind(one.name)] * one.size]
+        kinds = [kind for one in self.results.results for kind in [one.asked.kind.key or one.name] * one.size]
         for values in results:
             for kind, value in zip(kinds, values.tolist(), strict=True):
                 if np.isfinite(value):
                     largest[kind] = max(largest.get(kind, 0.0), abs(value))
         return np.array([largest.get(kind) or 1.0 for kind in kinds])
-
-
-def _kind(name: str) -> str:
-    """Results that have a size in common."""
-    return name if name.startswith(("stiffness", "compliance")) else name.rpartition(".")[2]
 
 
 def _in_words(names: Sequence[str]) -> str:

@@ -14,6 +14,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from ..errors import SceneError
 from ..mathematics.quaternion import matrix
+from .answers import answer_name, check_answer
 from .contacts import Contact
 from .dimension import out_of_plane
 from .loads import History, Load, Motion
@@ -429,19 +430,15 @@ def _check_contacts(scene: Scene) -> None:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
 
 
-def _check_quantity(scene: Scene, quantity: str, *where: str) -> None:
-    """Refuse a place in the answer with a name that the scene does not have."""
-    tables = {
-        "nodes": scene.nodes,
-        "reactions": scene.nodes,
-        "members": scene.members,
-        "springs": scene.springs,
-        "motions": scene.motions,
-        "contacts": scene.contacts,
-    }
-    kind, _, rest = quantity.partition(".")
-    if kind in tables:
-        _known(rest.partition(".")[0], tables[kind], kind, *where, "quantity")
+def _check_quantity(scene: Scene, quantity: str, at: float | None, *where: str) -> None:
+    """Refuse a quantity that answers of this scene do not have."""
+    try:
+        name = answer_name(quantity)
+        check_answer(scene, name)
+    except SceneError as error:
+        raise SceneError(error.bare, (*where, "quantity")) from None
+    if name.kind.along and at is None and name.at is None:
+        raise SceneError(f"found {quantity!r}, accepted: with the key 'at'", (*where, "quantity"))
 
 
 _ANSWERS = {
@@ -457,12 +454,12 @@ _ANSWERS = {
 
 def _check_expect(scene: Scene) -> None:
     if scene.analysis.until is not None:
-        _check_quantity(scene, scene.analysis.until.quantity, "analysis", "until")
+        _check_quantity(scene, scene.analysis.until.quantity, None, "analysis", "until")
     for i, expect in enumerate(scene.expect):
         if expect.equilibrium is not None and scene.analysis.equilibria != "all":
             message = "found with analysis.equilibria = 'one', accepted: with analysis.equilibria = 'all'"
             raise SceneError(message, ("expect", str(i), "equilibrium"))
-        _check_quantity(scene, expect.quantity, "expect", str(i))
+        _check_quantity(scene, expect.quantity, expect.at, "expect", str(i))
         for key, types in _ANSWERS.items():
             if getattr(expect, key) is not None and scene.analysis.type not in types:
                 accepted = " or ".join(map(repr, types))

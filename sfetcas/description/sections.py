@@ -353,6 +353,15 @@ class CrossSection(Record):
         shear = self._value("G", x) if self.nu is None else young / (2.0 * (1.0 + self.nu))
         return np.stack([shear * torsion, young * about_2, young * about_3], axis=1)
 
+    def fibres(self, x: ArrayLike) -> Floats:
+        """E and the outermost fibre of a shape: x (n,) fractions -> (n, 3), N/m2 and m from the axes b2 and b3."""
+        half, names = {
+            "rectangle": (0.5, ("width", "height")),
+            "circle": (1.0, ("radius", "radius")),
+            "tube": (1.0, ("outer", "outer")),
+        }[self.shape or ""]
+        return np.stack([self._value("E", x), *(half * self._value(name, x) for name in names)], axis=1)
+
     def mass(self, x: ArrayLike) -> Floats:
         """Mass per length: x (n,) fractions of the length -> (n,) kg/m, nan where not known."""
         return self._value("rhoA", x) if self.shape is None else self._value("rho", x) * self._outline(x)[0]

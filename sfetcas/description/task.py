@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from ..errors import SceneError
+from .answers import selected
 from .records import Fraction, Number, Numbers, Positive, Record, listed, number, say
 
 __all__ = ["Analysis", "Expect", "Until", "checked_accuracy"]
@@ -230,7 +231,8 @@ class Expect(Record):
 
     Parameters
     ----------
-    quantity : place in the answer, as ``nodes.B.position``
+    quantity : place in the answer, as ``nodes.B.position``, ``nodes.B.position.y``; the keys from ``at`` on may stand
+        behind it instead, ``members.beam.moment at 0.5``
     value : number, nested list of numbers, true, false or a text, in the unit of the quantity
     tolerance : largest accepted absolute difference; may be left out for what is met exactly
     why : reason for the tolerance
@@ -256,6 +258,18 @@ class Expect(Record):
     limit_point: Count | None = None
     bifurcation: Count | None = None
     flutter_point: Count | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _selected(cls, values: Any) -> Any:
+        """Keys that stand behind the name of the quantity."""
+        if not isinstance(values, dict) or not isinstance(values.get("quantity"), str):
+            return values
+        name, found = selected(values["quantity"].strip())
+        twice = [key for key in found if values.get(key) is not None]
+        if twice:
+            raise SceneError(f"found {twice[0]!r} behind the name and as a key, accepted: one of them", ("quantity",))
+        return {**values, **found, "quantity": name}
 
     @model_validator(mode="after")
     def _check(self) -> Expect:

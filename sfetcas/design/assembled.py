@@ -49,8 +49,8 @@ def places_asked(formulation: Formulation) -> tuple[list[str], dict[str, tuple[f
     names = list(dict.fromkeys(one.name for one in asked))
     places: dict[str, set[float]] = {}
     for one in asked:
-        if one.name.startswith("members."):
-            places.setdefault(one.name.split(".")[1], set()).update(one.at)
+        if one.member:
+            places.setdefault(one.member, set()).update(one.at)
     return names, {name: tuple(sorted(x)) for name, x in places.items()}
 
 
@@ -171,9 +171,9 @@ class Assembled:
             if one.name == asked.name:
                 break
             first += one.size
-        if not asked.name.startswith("members."):
+        if not asked.member:
             return list(range(first, first + one.size))
-        every = list(results.places[asked.name.split(".")[1]])
+        every = list(results.places[asked.member])
         width = one.size // len(every)
         return [first + every.index(x) * width + k for x in asked.at for k in range(width)]
 

@@ -76,6 +76,8 @@ class Asked:
     ----------
     name : str
         ``nodes.tip.position``.
+    member : str
+        The member along which it is; empty of all else.
     label : str
         With the case: what rows are called.
     at : tuple of float
@@ -88,6 +90,7 @@ class Asked:
     """
 
     name: str
+    member: str
     label: str
     at: tuple[float, ...]
     cases: tuple[int, ...]
@@ -291,7 +294,7 @@ class Formulation:
             result = self.result(name, places)
             shape = (len(cases), result.size) if rows else result.shape or (1,)
             symbol = ca.MX.sym(label, *shape)
-            self.asked[key] = Asked(name, label, places, tuple(cases), symbol, shape, result.unit)
+            self.asked[key] = Asked(name, result.member, label, places, tuple(cases), symbol, shape, result.unit)
         return self.asked[key].symbol
 
     def result(self, name: str, places: Sequence[float]) -> Any:

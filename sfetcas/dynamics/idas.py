@@ -19,7 +19,9 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.quaternion import angular_velocity
 from ..mechanics.equations import State
+from ..mechanics.rotations import Turn
 from ..stopping import noted
 from .beginning import at_rest
 from .index_one import LINEAR, IndexOne
@@ -89,6 +91,11 @@ class _Piece:
     def factors(self, s: float) -> Array:
         """Factors of the groups of loads at a fraction."""
         return np.array([sum(c * s**k for k, c in enumerate(terms)) for terms in self.terms])
+
+    def rates(self, s: float) -> Array:
+        """Rates of these factors."""
+        slopes = [[k * c * s ** (k - 1) for k, c in enumerate(terms) if k] for terms in self.terms]
+        return np.array([sum(terms) for terms in slopes]) / self.length
 
 
 @final
@@ -207,6 +214,14 @@ class _Projection:
         """A state with its rates as differential unknowns."""
         return np.concatenate([state.q[self._one.turning].ravel(), state.y, rates, state.wound])
 
+    def _spin(self, rates: Array, turn: Array, faster: Array) -> Array:
+        """Angular velocities (rotations, turns) of the rates of all unknowns, and of what motions turn."""
+        system = self._one.system
+        unknown, weight = (part[: system.of_places] for part in (system.unknown, system.weight))
+        free = np.where(unknown >= 0, weight * rates[unknown], 0.0).reshape(-1, system.turns)
+        driven = angular_velocity(turn, faster)[:, 3 - system.turns :]
+        return free + np.where(system.model.rotations.kind[:, None] == Turn.HELD, driven, 0.0)
+
     def projected(self, x: Array, piece: _Piece, t: float, p: Array) -> tuple[Array, Sample]:
         """The unknowns and the sample at a time; what norms and closings missed before is kept."""
         one, equations = self._one, self._one.system.equations
@@ -225,4 +240,5 @@ class _Projection:
         x = self.packed(state, w)
         _, there, v, a, _ = (np.array(part).ravel() for part in one.answers(x, s, p))
         self.norm, self.gap = max(self.norm, norm), max(self.gap, gap)
-        return x, Sample(t, state.q, state.y, there, v, a, state.wound)
+        spin = self._spin(w, loading.turn, one.system.loading(piece.rates(s)).turn)
+        return x, Sample(t, state.q, state.y, there, v, a, spin, state.wound)

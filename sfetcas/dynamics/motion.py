@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ..description.answers import MOTION
 from ..description.records import plain
 from ..equilibria.solution import Posture, heading
 from ..errors import Status
@@ -79,6 +80,8 @@ class Instant(Posture):
         Rotations, quantities and their rates, dimensionless.
     """
 
+    where: ClassVar[str] = MOTION
+
     time: float
     sample: Sample = field(repr=False)
     energies: tuple[float, float, float] = field(repr=False)
@@ -90,6 +93,29 @@ class Instant(Posture):
         axes = self.model.element.axes
         rate = self.sample.v[axes * place : axes * (place + 1)]
         return three(rate) * self.model.scales.length / self.mover.time
+
+    def angular_velocity(self, node: str) -> Array | None:
+        """Angular velocity of a node about the fixed axes, (3,) rad/s; None where it has no rotation of its own."""
+        number = self.model.rotations.node_turn[self._known(node, self.model.nodes, "node")]
+        if number is None:
+            return None
+        found, spin = np.zeros(3), self.sample.spin[number]
+        found[3 - len(spin) :] = spin / self.mover.time
+        return found
+
+    def along(self, member: str, at: Any) -> dict[str, Array]:
+        """As of :meth:`Posture.along`; also ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
+
+        Not of small members, whose inside is not followed in time.
+        """
+        found, model = super().along(member, at), self.model
+        if member in model.members:
+            place, axes = model.segments.place(model.segments.ends[member, 0]), model.element.axes
+            start = self.sample.v[axes * place : axes * (place + 1)]
+            velocity, turning = self.fields.rates(member, np.atleast_1d(at), self.sample.spin, start)
+            found["velocity"] = velocity * model.scales.length / self.mover.time
+            found["angular_velocity"] = turning / self.mover.time
+        return found
 
     @property
     def energy(self) -> dict[str, float]:
@@ -107,29 +133,21 @@ class Instant(Posture):
         time, scales = self.mover.time, self.model.scales
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
 
+    def table(self, kind: str, name: str = "") -> dict[str, Any]:
+        """As of :meth:`Posture.table`; also energies and momenta."""
+        if kind == "momentum":
+            return dict(self.momentum)
+        return self.energy if kind == "energy" else super().table(kind, name)
+
+    def _node(self, name: str) -> dict[str, Any]:
+        found = {**super()._node(name), "velocity": self.velocity(name)}
+        turning = self.angular_velocity(name)
+        return found if turning is None else {**found, "angular_velocity": turning}
+
     def to_dict(self) -> dict[str, Any]:
         """Values of this time, as leaves of the JSON answer."""
-        scene = self.model.scene
-        nodes: dict[str, Any] = {}
-        for name in self.model.nodes:
-            entry: dict[str, Any] = {"position": self.position(name), "velocity": self.velocity(name)}
-            turned = self.quaternion(name)
-            if turned is not None:
-                entry["quaternion"] = turned
-                if not self.model.space:
-                    entry["angle"] = self.angle(name)
-            nodes[name] = entry
-        reactions = {}
-        for name, node in scene.nodes.items():
-            if node.support != "free":
-                force, moment = self.reaction(name)
-                reactions[name] = {"force": force, "moment": moment}
-        answer: dict[str, Any] = {"nodes": nodes, "reactions": reactions}
-        if scene.springs:
-            answer["springs"] = {name: self.spring(name).to_dict() for name in scene.springs}
-        if scene.motions:
-            answer["motions"] = {name: self.motion(name) for name in scene.motions}
-        return {**answer, "energy": self.energy, "momentum": self.momentum}
+        tables = self.tables("nodes", "reactions", "springs", "motions")
+        return {**tables, "energy": self.energy, "momentum": self.momentum}
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +207,10 @@ class Trajectory:
     def velocities(self, node: str) -> Array:
         """Velocities of a node over the times, (times, 3) m/s."""
         return np.array([step.velocity(node) for step in self.steps])
+
+    def angular_velocities(self, node: str) -> Array:
+        """Angular velocities of a node with a rotation of its own over the times, (times, 3) rad/s."""
+        return np.array([step.angular_velocity(node) for step in self.steps], dtype=float)
 
     def energies(self, kind: str = "total") -> Array:
         """Energies over the times, (times,) N m: kinetic, elastic, loads or total."""

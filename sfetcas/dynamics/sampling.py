@@ -38,6 +38,8 @@ class Sample:
     y : ndarray
     x, v, a : ndarray (quantities,)
         Quantities and their rates.
+    spin : ndarray (rotations, turns)
+        Angular velocities about the fixed axes.
     near : ndarray
         Angles that count turns.
     """
@@ -48,6 +50,7 @@ class Sample:
     x: Array
     v: Array
     a: Array
+    spin: Array
     near: Array
 
 
@@ -121,13 +124,15 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
     row = evaluation(at, here)
     middle = own.after.x + own.after.origin[1]
     quantities = np.array(x) - middle
-    q = _turned(begin.q, np.einsum("n,nra->ra", row[0], np.array(turns)))
+    turn = np.einsum("n,nra->ra", row[0], np.array(turns))
+    q, slope = _turned(begin.q, turn), np.einsum("n,nra->ra", (row @ differentiation(at))[0], np.array(turns)) / h
+    spin = slope if slope.shape[1] == 1 else quaternion.angular_velocity(turn, slope)
     v, a = _rates(at, here, quantities)
     # Without the node that is furthest.
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, own.after.near)
+    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, own.after.near)
     return sample, float(doubt) / h**2
 
 
@@ -144,10 +149,10 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
     turns = np.array([_from(near.q, sample.q) for sample in samples])
 
     def mean(part: str) -> Array:
-        return np.asarray(row @ np.array([getattr(sample, part) for sample in samples]))
+        return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = _turned(near.q, np.einsum("n,nra->ra", row, turns))
-    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), near.near)
+    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.near)
 
 
 def _turned(q: Array, turn: Array) -> Array:

@@ -33,7 +33,7 @@ from .integrators import Begun, Course, Integrator, Stages
 from .methods import GeneralisedAlpha, Radau
 from .motion import Instant, Mover, Trajectory
 from .stages import StageEquations
-from .watching import Measure, Watch, finer
+from .watching import Watch, finer
 
 __all__ = ["INTEGRATORS", "Simulation", "left", "simulate"]
 
@@ -71,15 +71,11 @@ ROUNDS = 6
 
 
 @single_threaded
-def simulate(
-    scene: Scene, settings: Settings, measure: Measure, progress: Callable[[float], Any] | None = None
-) -> Trajectory:
+def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] | None = None) -> Trajectory:
     """The motion of a scene.
 
     Parameters
     ----------
-    measure : callable
-        Looks quantities up that end a motion.
     progress : callable, optional
         Told the time reached, s, after each step.
 
@@ -90,7 +86,7 @@ def simulate(
     SolveError
         A step does not converge; ``reached`` is the motion up to there.
     """
-    return Simulation(scene, settings, measure, progress).motion()
+    return Simulation(scene, settings, progress).motion()
 
 
 @dataclass
@@ -114,10 +110,8 @@ SAME = 1e-12
 class Simulation:
     """A motion: its runs on finer and finer meshes."""
 
-    def __init__(
-        self, scene: Scene, settings: Settings, measure: Measure, progress: Callable[[float], Any] | None
-    ) -> None:
-        self.given, self.settings, self.measure, self.progress = scene, settings, measure, progress
+    def __init__(self, scene: Scene, settings: Settings, progress: Callable[[float], Any] | None = None) -> None:
+        self.given, self.settings, self.progress = scene, settings, progress
         self.scene = moving(scene)
         self.small = [name for name, member in scene.members.items() if member.type == "small"]
         if settings.gauss:
@@ -176,7 +170,7 @@ class Simulation:
         begun, notes = self.begun(system)
         mover = Mover(equations, Inertia(system), masses.time, system.factors)
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
-        watch = None if analysis.until is None else Watch(analysis.until, self.measure, mover)
+        watch = None if analysis.until is None else Watch(analysis.until, mover)
         times = self.times if watch is None else finer(self.times)
         course = Course(
             times=times / masses.time,
@@ -306,7 +300,7 @@ class Simulation:
         apart = 0.0
         try:
             for one, other in zip(coarse.instants, fine.instants, strict=False):
-                a, b = quantity.value(one, self.measure), quantity.value(other, self.measure)
+                a, b = quantity.value(one), quantity.value(other)
                 own.append(b)
                 apart = max(apart, quantity.apart(a, b) if one.time == other.time else 0.0)
         except SceneError as error:

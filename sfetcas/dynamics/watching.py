@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..description.task import Until
+from ..equilibria.quantities import value_of
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .motion import Instant, Mover
 from .sampling import between
 
-__all__ = ["Measure", "Watch", "finer"]
-
-Measure = Callable[[Instant, str], Any]
-"""A quantity of an instant by its name."""
+__all__ = ["Watch", "finer"]
 
 
 class Watch:
     """Looks for the end of a motion: the first time at which a quantity passes a value."""
 
-    def __init__(self, until: Until, measure: Measure, mover: Mover) -> None:
-        self._until, self._measure, self._mover = until, measure, mover
+    def __init__(self, until: Until, mover: Mover) -> None:
+        self._until, self._mover = until, mover
         self._values: list[float] = []
         self._last: int | None = None
         self.ended = False
@@ -41,7 +38,7 @@ class Watch:
         """How far the quantity is beyond its value."""
         until = self._until
         try:
-            value = np.asarray(self._measure(instant, until.quantity), dtype=float)
+            value = np.asarray(value_of(instant, until.quantity), dtype=float)
             if until.component is None and value.size != 1:
                 raise SceneError(f"found a quantity with {value.size} components, accepted: with the key 'component'")
             number = float(value.ravel()[until.component or 0])

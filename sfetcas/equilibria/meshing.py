@@ -72,7 +72,7 @@ class Meshing:
         self.accuracy = settings.accuracy or scene.analysis.accuracy
         self.asked = settings.accuracy is not None or "accuracy" in scene.analysis.model_fields_set
         name = settings.accuracy_of or scene.analysis.accuracy_of
-        self.quantity = Quantity.named(name) if name else None
+        self.quantity = Quantity.named(name, scene) if name else None
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..contact.touches import answers
+from ..description.answers import STATICS
 from ..description.records import counted, nearest, plain
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
@@ -93,6 +94,8 @@ class Posture:
         Unknowns and loads, dimensionless.
     """
 
+    where: ClassVar[str] = STATICS
+
     factor: float
     model: Model = field(repr=False)
     state: State = field(repr=False)
@@ -139,7 +142,15 @@ class Posture:
         found["quaternion"] = self._as_quaternions(rotation)
         if not self.model.space:
             found["angle"] = rotation[:, 0]
+        if self._outlined(name):
+            found["bending_strain"], found["bending_stress"] = self.fields.bending(name, places, found["curvature"])
         return found
+
+    def _outlined(self, member: str) -> bool:
+        """Whether the fibres of a member are known."""
+        scene = self.model.scene
+        record = scene.members[member]
+        return record.type == "flexible" and scene.sections[str(record.section)].shape is not None
 
     def places(self, member: str) -> Array:
         """Fractions of the length that the answer lists: nodes of the elements, or fewer."""
@@ -159,6 +170,60 @@ class Posture:
         smallest gap, where nothing touches.
         """
         return answers(self.fields) if self.model.scene.contacts else {}
+
+    def table(self, kind: str, name: str = "") -> dict[str, Any]:
+        """What is told of one thing, under the keys of the JSON answer.
+
+        Parameters
+        ----------
+        kind : str
+            A table of the answer, as ``nodes``; empty for what stands in none.
+        name : str
+            Of the node, member, ...; of a member what it has once, not that of its places, see :meth:`along`.
+
+        Raises
+        ------
+        SceneError
+            There is no such thing.
+        """
+        tables: dict[str, Callable[[], dict[str, Any]]] = {
+            "": lambda: {"factor": self.factor},
+            "nodes": lambda: self._node(name),
+            "reactions": lambda: dict(zip(("force", "moment"), self.reaction(name), strict=True)),
+            "members": lambda: self._member(name),
+            "springs": lambda: dict(self.spring(name).to_dict()),
+            "motions": lambda: self.motion(name),
+            "contacts": lambda: self.contacts.get(name, {}),
+        }
+        return tables[kind]() if kind in tables else {}
+
+    def _node(self, name: str) -> dict[str, Any]:
+        found: dict[str, Any] = {"position": self.position(name)}
+        turned = self.quaternion(name)
+        if turned is not None:
+            found["quaternion"] = turned
+            if not self.model.space:
+                found["angle"] = self.angle(name)
+        return found
+
+    def _member(self, name: str) -> dict[str, Any]:
+        """What a member has once: its strain energy and the most that bends its fibres."""
+        self._known(name, tuple(self.model.scene.members), "member")
+        found: dict[str, Any] = {}
+        if self.model.scene.members[name].type != "rigid":
+            found["energy"] = self.fields.strain_energy(name)
+        if self._outlined(name):
+            largest = self.fields.largest_bending(name)
+            found |= zip(("largest_bending_strain", "largest_bending_stress"), largest, strict=True)
+        return found
+
+    def tables(self, *kinds: str) -> dict[str, dict[str, Any]]:
+        """For each kind the tables of all of it that there are; kinds of which there is nothing are left out."""
+        scene = self.model.scene
+        names = {"nodes": self.model.nodes, "reactions": [n for n, r in scene.nodes.items() if r.support != "free"]}
+        names |= {kind: list(getattr(scene, kind)) for kind in kinds if kind not in names}
+        always = ("nodes", "reactions", "members")
+        return {k: {n: self.table(k, n) for n in names[k]} for k in kinds if names[k] or k in always}
 
     def _as_quaternions(self, rotation: Array) -> Array:
         if self.model.space:
@@ -200,36 +265,22 @@ class Equilibrium(Posture):
         elastic, total = self.strain * unit, self.potential * unit
         return {"elastic": elastic, "loads": total - elastic, "total": total}
 
+    def table(self, kind: str, name: str = "") -> dict[str, Any]:
+        """As of :meth:`Posture.table`; also energies and the certificate."""
+        if kind == "certificate":
+            return self.certificate.to_dict()
+        if kind == "energy":
+            return {**self.energy, "potential": self.energy["total"]}
+        return super().table(kind, name)
+
     def to_dict(self) -> dict[str, Any]:
         """As an entry of ``steps`` in the JSON answer."""
-        scene = self.model.scene
-        nodes: dict[str, Any] = {}
-        for name in self.model.nodes:
-            entry: dict[str, Any] = {"position": self.position(name).tolist()}
-            turned = self.quaternion(name)
-            if turned is not None:
-                entry["quaternion"] = turned.tolist()
-                if not self.model.space:
-                    entry["angle"] = self.angle(name)
-            nodes[name] = entry
-        reactions = {}
-        for name, node in scene.nodes.items():
-            if node.support != "free":
-                force, moment = self.reaction(name)
-                reactions[name] = {"force": force.tolist(), "moment": moment.tolist()}
-        members = {}
-        for name in scene.members:
+        tables = self.tables("nodes", "reactions", "members", "springs", "motions", "contacts")
+        for name, found in tables["members"].items():
             places = self.places(name)
-            found = self.along(name, places)
-            members[name] = {"s": places.tolist(), **{key: value.tolist() for key, value in found.items()}}
-        answer: dict[str, Any] = {"factor": self.factor, "nodes": nodes, "reactions": reactions, "members": members}
-        answer |= {"springs": {name: self.spring(name).to_dict() for name in scene.springs}} if scene.springs else {}
-        if scene.motions:
-            answer["motions"] = {name: plain(self.motion(name)) for name in scene.motions}
-        if self.contacts:
-            answer["contacts"] = {name: plain(entry) for name, entry in self.contacts.items()}
-        answer |= {"energy": self.energy, "certificate": self.certificate.to_dict()}
-        return {**answer, "notes": list(self.notes)}
+            tables["members"][name] = {"s": places, **self.along(name, places), **found}
+        proof = {"energy": self.energy, "certificate": self.certificate.to_dict()}
+        return {"factor": self.factor, **plain(tables), **proof, "notes": list(self.notes)}
 
 
 @dataclass(frozen=True, eq=False)

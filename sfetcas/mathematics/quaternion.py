@@ -20,6 +20,7 @@ from .arrays import TINY, Array
 
 __all__ = [
     "Components",
+    "angular_velocity",
     "conjugate",
     "cross_matrix",
     "from_rotation_vector",
@@ -121,6 +122,20 @@ def from_rotation_vector(phi: ArrayLike) -> Array:
     phi = np.asarray(phi, dtype=float)
     half = 0.5 * np.linalg.norm(phi, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * phi * np.sinc(half / np.pi)], axis=-1)
+
+
+def angular_velocity(phi: ArrayLike, rate: ArrayLike) -> Array:
+    """Angular velocity about the fixed axes of what has turned by rotation vectors (..., 3) that change at a rate.
+
+    ``w = phi' + (1 - cos a)/a^2 phi x phi' + (a - sin a)/a^3 phi x (phi x phi')`` with the angle a.
+    """
+    phi, rate = np.asarray(phi, dtype=float), np.asarray(rate, dtype=float)
+    angle = np.linalg.norm(phi, axis=-1, keepdims=True)
+    once = np.cross(phi, rate)
+    # Below this angle the differences lose digits, and the next terms of the series are rounding.
+    small, a = angle < 1e-3, np.maximum(angle, 1e-3)
+    second = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (a - np.sin(a)) / a**3)
+    return np.asarray(rate + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * once + second * np.cross(phi, once))
 
 
 def cross_matrix(v: ArrayLike) -> Array:

@@ -12,17 +12,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mathematics import quaternion
+from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
+from ..mathematics.keeping import kept
+from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap, smallest
+from .connections import connections_of
 from .equations import Equations, State
-from .joints import Body, DrivenSlide, DrivenTurn, LineSpring, Slide, TurnSpring, TurnStop, Universal
-from .joints import Spring as Tension
 from .loading import Loading
+from .model import Model
 from .rotations import STIFF, Turn, end_joints
-from .terms import GROUND, Group
+from .terms import GROUND, Group, answers_of
 
-__all__ = ["Balance", "SpringState", "three"]
+__all__ = ["Balance", "SpringState", "guide", "pinned_turns", "three"]
+
+GROUPS = 64
+"""Groups of connections of which something is kept at hand."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,26 @@ class SpringState:
 def three(a: Array) -> Array:
     """Vectors (..., 2) or (..., 3) as (..., 3)."""
     return a if a.shape[-1] == 3 else np.concatenate([a, np.zeros((*a.shape[:-1], 1))], axis=-1)
+
+
+def guide(scene: Scene, node: str) -> Array | None:
+    """Direction in which a support lets a node move; None where it does not, or a motion drives it."""
+    record = scene.nodes[node]
+    if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
+        return None
+    along = np.asarray(record.direction, dtype=float)
+    return np.asarray(along / np.linalg.norm(along))
+
+
+def pinned_turns(model: Model, node: str) -> list[int]:
+    """Rotations of member ends that a support itself pins, its node having none."""
+    scene, rotations, record = model.scene, model.rotations, model.scene.nodes[node]
+    if record.support == "free" or record.joint != "hinge":
+        return []
+    turns = [rotations.ends[n][m.nodes.index(node)] for n, m in scene.members.items() if node in m.nodes]
+    # A member that is rigid up to another support that holds it is held there.
+    elsewhere = {turn for n, turn in rotations.node_turn.items() if scene.nodes[n].turn not in ("free", "ball")}
+    return [turn for turn in turns if turn not in elsewhere]
 
 
 class Balance:
@@ -99,7 +124,7 @@ class Balance:
     @staticmethod
     def _is_ground(group: Group, number: int) -> bool:
         """A universal support: what it does is a reaction."""
-        return isinstance(group.kind, Universal) and bool((group.turns[number] == GROUND).any())
+        return group.kind.supports and bool((group.turns[number] == GROUND).any())
 
     def reaction(self, node: str) -> tuple[Array, Array]:
         """Force and moment about the node that the ground exerts."""
@@ -116,23 +141,14 @@ class Balance:
         for group, links in zip(model.connections, self._links, strict=True):
             for number, side in np.argwhere(group.places == place):
                 force = force + self._force_of(group, links, number, side)
-        along = self._guide(node)
+        along = guide(self.model.scene, node)
         # A guide does nothing along itself: what is left there is not exactly in balance.
         return force if along is None else force - (along @ force) * along
-
-    def _guide(self, node: str) -> Array | None:
-        """Direction in which a support lets a node move; None where it does not, or a motion drives it."""
-        scene = self.model.scene
-        record = scene.nodes[node]
-        if not record.slides or any(m.node == node and m.displacement is not None for m in scene.motions.values()):
-            return None
-        along = np.asarray(record.direction, dtype=float)
-        return unit(along)
 
     def _moment(self, node: str) -> Array:
         number = self.model.rotations.node_turn[node]
         if number is None:
-            return sum((self._totals[turn] for turn in self._pinned(node)), np.zeros(3))
+            return sum((self._totals[turn] for turn in pinned_turns(self.model, node)), np.zeros(3))
         if self._shared(number):
             return self._rigid[1].get(node, np.zeros(3))
         left = self._totals[number]
@@ -146,18 +162,6 @@ class Balance:
             axis = self.model.rotations.axis[number]
             return moment - (axis @ moment) * axis
         return np.zeros(3) if kind == Turn.FREE else moment
-
-    def _pinned(self, node: str) -> list[int]:
-        """Rotations of member ends that the support itself pins, the node having none."""
-        record = self.model.scene.nodes[node]
-        if record.support == "free" or record.joint != "hinge":
-            return []
-        rotations = self.model.rotations
-        turns = [rotations.ends[n][m.nodes.index(node)] for n, m in self.model.scene.members.items() if node in m.nodes]
-        # A member that is rigid up to another support that holds it is held there.
-        nodes = self.model.scene.nodes
-        elsewhere = {turn for n, turn in rotations.node_turn.items() if nodes[n].turn not in ("free", "ball")}
-        return [turn for turn in turns if turn not in elsewhere]
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
@@ -247,10 +251,10 @@ class Balance:
         """
         moment = np.zeros(3)
         for group, links in zip(self.model.connections, self._links, strict=True):
-            if isinstance(group.kind, Body):
+            if group.kind.table == "members":
                 continue
             for number, side in np.argwhere(group.turns != GROUND):
-                mine = isinstance(group.kind, ONE_SIDED) if turn is None else group.turns[number, side] == turn
+                mine = group.kind.one_sided if turn is None else group.turns[number, side] == turn
                 if mine and group.nodes[number] == node:
                     moment = moment + self._moment_of(links, number, side)
         return moment
@@ -284,7 +288,8 @@ class Balance:
 
     def spring(self, name: str) -> SpringState:
         """Angle and moment, or travel and force, and what its stop does, in SI units."""
-        state, record = self._spring(name), self.model.scene.springs[name]
+        found, record = self.answers("springs", name), self.model.scene.springs[name]
+        state = SpringState("angle" in found, *found.values())
         if record.stop is None:
             return state
         unit, row = self.model.scales.moment if state.rotational else self.model.scales.force, f"springs.{name}.stop"
@@ -292,66 +297,38 @@ class Balance:
         effort = -float(self._state.lam[names.index(row)]) * unit if row in names else 0.0
         return replace(state, stop=effort)
 
-    def drive(self, name: str) -> dict[str, float]:
-        """What drives a joint, in SI units: the derivatives of the energy by its angle and its travel."""
+    def answers(self, table: str, name: str) -> dict[str, float]:
+        """What connections of a name tell under the keys of the answer, in SI units."""
         found: dict[str, float] = {}
-        first = len(self.model.positions.rows)
-        for group, loads in zip(self.model.connections, self._loading.loads, strict=True):
-            if isinstance(group.kind, (DrivenTurn, DrivenSlide)) and name in group.names:
-                i = group.names.index(name)
-                effort = -float(self._state.lam[first + i])
-                if isinstance(group.kind, DrivenTurn):
-                    found["moment"] = self._way(group, i, float(loads[i, 0])) * effort * self.model.scales.moment
-                else:
-                    found["force"] = effort * self.model.scales.force
-            first += len(group.rows)
+        for number, i in connections_of(self.model.connections, table, name):
+            units = self.model.connections[number].kind.answers
+            values = self._answers(number)[i].tolist()
+            found |= {key: x * self.model.scales.of(unit) for (key, unit), x in zip(units.items(), values, strict=True)}
         return found
 
-    def _way(self, group: Group, number: int, angle: float) -> float:
-        """Sign of a driven turn's row, which in space is a sine: it changes with each whole turn."""
-        if not self.model.space:
-            return 1.0
-        a, b = (np.array([1.0, 0, 0, 0]) if turn == GROUND else self._state.q[turn] for turn in group.turns[number])
-        r = quaternion.multiply(quaternion.conjugate(a), b)
-        return float(np.sign(np.cos(0.5 * angle) * r[0] + np.sin(0.5 * angle) * (group.data[number] @ r[1:])))
-
-    def _spring(self, name: str) -> SpringState:
-        model, scales = self.model, self.model.scales
-        group, i = next((g, g.names.index(name)) for g in model.connections if name in g.names and _is_spring(g))
-        data, axes = group.data[i], model.element.axes
-        if isinstance(group.kind, TurnSpring):
-            stiffness, rest = data[group.kind.first :][:2].tolist()
-            angle = self._angle(group, i)
-            return SpringState(True, angle, -stiffness * (angle - rest) * scales.moment)
-        gap = [np.zeros(axes) if place == GROUND else self._places[place] for place in group.places[i]]
-        moved = gap[1] - gap[0]
-        if isinstance(group.kind, LineSpring):
-            travel = float(data[:axes] @ moved)
-            return SpringState(False, travel * scales.length, -data[axes] * (travel - data[axes + 1]) * scales.force)
-        travel = float(np.linalg.norm(data[:axes] + moved) - data[axes + 1])
-        return SpringState(False, travel * scales.length, -data[axes] * travel * scales.force)
-
-    def _angle(self, group: Group, number: int) -> float:
-        """Angle of a rotational spring, all turns counted."""
-        model, state = self.model, self._state
-        part = model.winding.parts[next(i for i, other in enumerate(model.terms) if other is group)]
+    @kept(GROUPS)
+    def _answers(self, number: int) -> Array:
+        """What all connections of a group tell, (n, answers), dimensionless."""
+        model, state, axes = self.model, self._state, self.model.element.axes
+        group, n = model.connections[number], len(model.connections[number].names)
+        first = len(model.positions.rows) + sum(len(other.rows) for other in model.connections[:number])
+        data, part = group.data.copy(), model.winding.parts[number + 1]
         if part is not None:
-            return float(model.winding.angles(state.q, state.wound)[part][number])
-        a, b = (0.0 if turn == GROUND else float(state.q[turn, 0]) for turn in group.turns[number])
-        return float(group.data[number, 2]) * (b - a)
+            data[:, -1] = model.winding.angles(state.q, state.wound)[part]
+        q = np.vstack([state.q, [[1.0, 0.0, 0.0, 0.0]] if model.space else [[0.0]]])
+        u = np.vstack([self._places, np.zeros((1, axes))])
+        batch, lam = Batch(answers_of(group.kind), n), state.lam[first : first + len(group.rows)]
+        for i, values in enumerate((q[group.turns], u[group.places], data, self._loading.loads[number], lam)):
+            if values.size:
+                batch.set(i, values)
+        return batch()[0].copy()
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:
         """Force and moment that the surroundings exert on each end of a small member."""
-        for group, links in zip(self.model.connections, self._links, strict=True):
-            if isinstance(group.kind, Body) and member in group.names:
-                i = group.names.index(member)
-                sides = range(group.kind.nodes)
-                return [(self._force_of(group, links, i, k), self._moment_of(links, i, k)) for k in sides]
-        raise KeyError(member)
-
-
-ONE_SIDED = (TurnSpring, TurnStop, Slide, DrivenSlide)
-"""Kinds whose moments on the rotations of a node do not add up to nothing."""
+        number, i = next(connections_of(self.model.connections, "members", member))
+        group, links = self.model.connections[number], self._links[number]
+        sides = range(group.places.shape[1])
+        return [(self._force_of(group, links, i, k), self._moment_of(links, i, k)) for k in sides]
 
 
 def _smallest(rows: Sequence[tuple[dict[int, float], float]], weights: Array) -> Array:
@@ -365,7 +342,3 @@ def _smallest(rows: Sequence[tuple[dict[int, float], float]], weights: Array) ->
 
 INSIDE = 1e-8
 """Weight of moments inside rigid members where reactions count 1: reactions are made small first."""
-
-
-def _is_spring(group: Group) -> bool:
-    return isinstance(group.kind, (TurnSpring, LineSpring, Tension))

@@ -28,6 +28,10 @@ class Scales:
         """Unit of force, N."""
         return self.moment / self.length
 
+    def of(self, unit: str) -> float:
+        """What a dimensionless number is times, in a unit of an answer: ``m``, ``N``, ``N m``, ``J`` or ``rad``."""
+        return {"m": self.length, "N": self.force, "N m": self.moment, "J": self.moment, "rad": 1.0}[unit]
+
 
 @dataclass(frozen=True, eq=False)
 class Beams:

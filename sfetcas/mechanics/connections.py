@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,21 +43,28 @@ from .parts import Parts
 from .positions import normals
 from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
 from .segments import Segments, cushioned
-from .terms import GROUND, One
+from .terms import GROUND, Group, One
 
-__all__ = ["anchored", "body_numbers", "connections_of", "freedoms", "touches_of"]
+__all__ = ["anchored", "body_numbers", "connections_in", "connections_of", "freedoms", "touches_in"]
 
 
-def connections_of(parts: Parts) -> Iterator[One]:
+def connections_in(parts: Parts) -> Iterator[One]:
     """Joints, driven joints, springs, small members and springs that stand at a stop."""
     maker = _Maker(parts.scene, parts.segments, parts.rotations, parts.element.space, parts.scales)
     yield from maker.all()
     yield from maker.stops(parts.mesh)
 
 
-def touches_of(parts: Parts) -> Iterator[One]:
+def touches_in(parts: Parts) -> Iterator[One]:
     """What touches obstacles."""
     yield from _Toucher(parts.scene, parts.mesh, parts.segments, parts.rotations, parts.element, parts.scales).all()
+
+
+def connections_of(groups: Sequence[Group], table: str, name: str) -> Iterator[tuple[int, int]]:
+    """Groups that have what a name of a table of the scene stands for, and its number in each."""
+    for number, group in enumerate(groups):
+        if group.kind.table == table and name in group.names:
+            yield number, group.names.index(name)
 
 
 @dataclass(frozen=True, eq=False)

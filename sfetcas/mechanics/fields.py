@@ -12,16 +12,20 @@ from typing import Any
 
 import numpy as np
 
+from ..description.answers import single_number
 from ..description.obstacles import obstacle
 from ..mathematics import curves, interpolation, quaternion
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.keeping import kept
+from ..mathematics.kernels import Batch
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .contact_joints import OnPlane, OnRound
 from .equations import Equations, State, turned_tangents
 from .loading import Loading
 from .mesh import Touch
+from .singles import fibre_strain
+from .terms import energies_of
 
 __all__ = ["Fields", "rotations_along", "transferred"]
 
@@ -109,12 +113,12 @@ class Fields:
         """
         motion = self.model.scene.motions[name]
         if motion.between is not None:
-            return dict(self.balance.drive(name))
+            return dict(self.balance.answers("motions", name))
         found: dict[str, Any] = {}
         force, moment = self.reaction(motion.node)
         if motion.rotation is not None:
             axis = np.asarray(self.model.scene.nodes[motion.node].turn_axis, dtype=float)
-            number = isinstance(motion.rotation, float)
+            number = single_number(motion, "moment")
             found["moment"] = float(moment @ axis / np.linalg.norm(axis)) if number else moment
         if motion.displacement is not None:
             found["force"] = force
@@ -150,6 +154,40 @@ class Fields:
             strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
         return result
+
+    def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
+        """Largest strain, and stress (Pa), by bending in sections that have a shape, (n,) each."""
+        scene = self.model.scene
+        section = scene.sections[str(scene.members[member].section)]
+        change, fibres = curvature - scene.center_lines[member].curvatures(x), section.fibres(x)
+        strain = fibre_strain(section.shape != "rectangle")(change.T, fibres[:, 1:].T).full().ravel()
+        return strain, fibres[:, 0] * strain
+
+    def largest_bending(self, member: str) -> tuple[float, float]:
+        """Largest strain, and stress (Pa), by bending along a member whose section has a shape.
+
+        The largest of places within elements, and between these of the parabola through the three that are nearest.
+        """
+        cuts = self.model.mesh.cuts[member]
+        x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * np.arange(PARTS) / PARTS).ravel(), cuts[-1])
+        strain, stress = self.bending(member, x, self.along(member, x)["curvature"])
+        return _largest(strain), _largest(stress)
+
+    def strain_energy(self, member: str) -> float:
+        """Strain energy of a member that is not rigid, N m."""
+        model = self.model
+        if member in model.members:
+            return float(self._strain_energies[model.elements_of(member)].sum()) * model.scales.moment
+        return self.balance.answers("members", member)["energy"]
+
+    @functools.cached_property
+    def _strain_energies(self) -> Array:
+        """Of all elements."""
+        elements = self.model.terms[0]
+        batch = Batch(energies_of(elements.kind), len(elements.data))
+        batch.set(0, self.q[elements.turns])
+        batch.set(2, elements.data)
+        return batch()[1].ravel()
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
@@ -283,10 +321,40 @@ class Fields:
         """Positions (n, 3) at fractions of the length, m."""
         model = self.model
         part = model.elements_of(member)
+        gained = self.turned[part] - model.beams.tangent[part]
+        moved = _three(self._summed(member, x, self._element_starts(member), gained))
+        return model.scene.center_lines[member].positions(x) + moved * model.scales.length
+
+    def _summed(self, member: str, x: Array, starts: Array, gained: Array) -> Array:
+        """What begins at elements and is gained at the integration points (elements, points, axes), at places."""
         e, to_x = self._located(member, x)
-        moved = np.einsum("nk,nka->na", to_x, (self.turned[part] - model.beams.tangent[part])[e])
-        start = self._element_starts(member)
-        return model.scene.center_lines[member].positions(x) + _three(start[e] + moved) * model.scales.length
+        return np.asarray(starts[e] + np.einsum("nk,nka->na", to_x, gained[e]))
+
+    def rates(self, member: str, x: Array, spin: Array, start: Array) -> tuple[Array, Array]:
+        """Velocity and angular velocity (n, 3) at fractions of the length of a member of elements, dimensionless.
+
+        Parameters
+        ----------
+        spin : angular velocities (rotations, turns)
+        start : velocity of the first end, (axes,)
+        """
+        model, part = self.model, self.model.elements_of(member)
+        turns, axes = model.rotations.turns[part], model.element.axes
+        e, xi = _located(model.mesh.cuts[member], x)
+        rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
+        about = np.zeros((*turns.shape, 3))
+        about[..., 3 - spin.shape[1] :] = spin[turns]
+        gained = np.cross(about, _three(self.turned[part]))[..., :axes]
+        starts = start + np.concatenate([np.zeros((1, axes)), np.cumsum(gained.sum(axis=1), axis=0)])
+        velocity = _three(self._summed(member, x, starts, gained))
+        if not model.space:
+            return velocity, np.einsum("nj,nja->na", rows, about[e])
+        # Of the interpolated quaternion, whatever its length: w = 2 q' conj(q) / q.q.
+        nodal = self.q[turns]
+        rate = 0.5 * quaternion.multiply(np.pad(about, ((0, 0), (0, 0), (1, 0))), nodal)
+        here, change = (np.einsum("nj,njc->nc", rows, values[e]) for values in (nodal, rate))
+        turned = 2.0 * quaternion.multiply(change, quaternion.conjugate(here))[:, 1:]
+        return velocity, turned / np.einsum("nc,nc->n", here, here)[:, None]
 
     def _located(self, member: str, x: Array) -> tuple[Any, Array]:
         """Element of each fraction of a member's length, and weights that integrate in it up to there."""
@@ -492,6 +560,20 @@ def _per_place(xi: Array, rows: Any) -> Array:
 
 FEW = 8
 """Places up to which looking for equal ones costs more than it saves."""
+
+
+PARTS = 16
+"""Parts of an element between whose ends the largest strain is looked for."""
+
+
+def _largest(values: Array) -> float:
+    """The largest of values at the ends of the parts of elements; at the ends of elements they may have kinks."""
+    i = int(values.argmax())
+    if i % PARTS == 0:
+        return float(values[i])
+    before, here, after = values[i - 1 : i + 2]
+    bend = 2.0 * here - before - after
+    return float(here + (after - before) ** 2 / (8.0 * bend)) if bend > 0.0 else float(here)
 
 
 def _cross(a: Array, b: Array) -> Array:

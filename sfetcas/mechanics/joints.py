@@ -11,6 +11,7 @@ A ball asks nothing, a rigid joint lets both sides share one rotation, and in th
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -59,6 +60,8 @@ class Hinge(Term):
 class Universal(Term):
     """An axis of either side that stay normal to each other; data: both, undeformed.  Space only."""
 
+    supports: ClassVar[bool] = True
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row."""
@@ -76,6 +79,8 @@ class DrivenTurn(Term):
     """The angle between two rotations about an axis is prescribed; data: axis, load: angle."""
 
     is_driven: ClassVar[bool] = True
+    table: ClassVar[str] = "motions"
+    answers: ClassVar[Mapping[str, str]] = {"moment": "N m"}
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -90,11 +95,20 @@ class DrivenTurn(Term):
         about, half = ca.dot(data, ca.vertcat(*r[1:])), 0.5 * load
         return [2.0 * (ca.cos(half) * about - ca.sin(half) * r[0])]
 
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The moment on the second side; in space the row is a sine, which changes its sign with each whole turn."""
+        if not self.space:
+            return [-lam]
+        r, half = self.relative(*q), 0.5 * load
+        return [-lam * ca.sign(ca.cos(half) * r[0] + ca.sin(half) * ca.dot(data, ca.vertcat(*r[1:])))]
+
 
 @final
 @dataclass(frozen=True)
 class Slide(Term):
     """A place that slides along a line carried by a rotation at another one; data: directions across the line."""
+
+    one_sided: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -114,6 +128,9 @@ class DrivenSlide(Term):
     """The travel of a slide is prescribed; data: direction of the line, load: travel."""
 
     is_driven: ClassVar[bool] = True
+    table: ClassVar[str] = "motions"
+    answers: ClassVar[Mapping[str, str]] = {"force": "N"}
+    one_sided: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -124,6 +141,10 @@ class DrivenSlide(Term):
         """Travel along the line less what it shall be."""
         gap = ca.vertcat(*self.back(q[0], [b - a for a, b in zip(*u, strict=True)]))
         return [ca.dot(data, gap) - load]
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The force on the second side along the line."""
+        return [-lam]
 
 
 @dataclass(frozen=True)
@@ -146,6 +167,8 @@ class Turning(Term):
     """
 
     crossed: bool = False
+
+    one_sided: ClassVar[bool] = True
 
     @property
     @abc.abstractmethod
@@ -183,6 +206,9 @@ class Turning(Term):
 class TurnSpring(Turning):
     """A rotational spring about an axis of the first side; its own data: stiffness, rest angle."""
 
+    table: ClassVar[str] = "springs"
+    answers: ClassVar[Mapping[str, str]] = {"angle": "rad", "moment": "N m"}
+
     @property
     def own(self) -> int:
         """Two."""
@@ -192,6 +218,11 @@ class TurnSpring(Turning):
         """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
         angle = self.angle(q, data)
         return 0.5 * data[self.first] * angle * (angle - 2.0 * data[self.first + 1])
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The angle, and the moment on the second side."""
+        angle = self.angle(q, data)
+        return [angle, -data[self.first] * (angle - data[self.first + 1])]
 
 
 @final
@@ -236,6 +267,9 @@ class LineStop(Term):
 class Spring(Term):
     """A spring between two places with a free length; data: their distance (vector), stiffness, free length."""
 
+    table: ClassVar[str] = "springs"
+    answers: ClassVar[Mapping[str, str]] = {"travel": "m", "force": "N"}
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """No row."""
@@ -246,6 +280,12 @@ class Spring(Term):
         n = self.axes
         gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
         return 0.5 * data[n] * (self._square(gap, data[n + 1]) - self._square(data[:n], data[n + 1]))
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The elongation and the force, below zero where it pulls."""
+        n = self.axes
+        travel = ca.norm_2(data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n + 1]
+        return [travel, -data[n] * travel]
 
     @staticmethod
     def _square(gap: ca.SX, free: ca.SX) -> ca.SX:
@@ -259,6 +299,9 @@ class Spring(Term):
 class LineSpring(Term):
     """A spring that acts along a direction fixed in space; data: direction, stiffness, rest travel."""
 
+    table: ClassVar[str] = "springs"
+    answers: ClassVar[Mapping[str, str]] = {"travel": "m", "force": "N"}
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """No row."""
@@ -269,6 +312,12 @@ class LineSpring(Term):
         n = self.axes
         travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
         return 0.5 * data[n] * travel * (travel - 2.0 * data[n + 1])
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The travel along the direction, and the force."""
+        n = self.axes
+        travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
+        return [travel, -data[n] * (travel - data[n + 1])]
 
 
 @final
@@ -288,6 +337,9 @@ class Body(Term):
     nodes, stiff : int
         Number of macro-nodes and of rows.
     """
+
+    table: ClassVar[str] = "members"
+    answers: ClassVar[Mapping[str, str]] = {"energy": "J"}
 
     nodes: int
     stiff: int
@@ -347,6 +399,10 @@ class Body(Term):
             unit = [ca.SX(float(k == i)) for i in range(axes)]
             work += ca.dot(lever_now[:, k], ca.vertcat(*self.forth(frame, unit))) - lever[k, k]
         return 0.5 * ca.dot(e, ca.mtimes(stiffness, e)) - work
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """The strain energy."""
+        return [self.energy(q, u, data, ca.SX.zeros(load.shape))]
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Deformations that do not exist."""

@@ -42,7 +42,7 @@ __all__ = [
     "elements_of",
     "followed_elements",
     "inner_cut",
-    "loads_of",
+    "loads_in",
     "present",
     "spread_of",
 ]
@@ -220,7 +220,7 @@ def cut_of(mesh: Mesh, load: Load) -> int:
     return mesh.cut_at(str(load.member), load.at or 0.0)
 
 
-def loads_of(parts: Parts) -> Iterator[One]:
+def loads_in(parts: Parts) -> Iterator[One]:
     """The loads of a scene that are terms, each by the name ``loads.NAME``.
 
     Raises

@@ -20,9 +20,9 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from .beams import Beams, Scales, beams_of, scales_of
-from .connections import connections_of, touches_of
+from .connections import connections_in, touches_in
 from .elements import Element, element_by_name
-from .load_terms import loads_of
+from .load_terms import loads_in
 from .loading import Loading, unit_loadings
 from .mesh import Mesh
 from .parts import Parts
@@ -37,7 +37,7 @@ from .winding import Winding, winding_of
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 
-SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_of, touches_of, loads_of]
+SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in]
 """Where the terms beside the elements come from; a further kind of energy is one more source."""
 
 

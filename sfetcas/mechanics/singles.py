@@ -16,6 +16,7 @@ __all__ = [
     "arms_product",
     "counted_angle",
     "exponential",
+    "fibre_strain",
     "moved_rotation",
     "rotation_between",
     "turned_vector",
@@ -96,6 +97,23 @@ def counted_angle() -> ca.Function:
     raw, period = share * ca.atan2(sine, cosine), 2.0 * ca.pi * share
     angle = raw + period * ca.floor((near - raw) / period + 0.5)
     return ca.Function("counted_angle", [a, b, axis, across, crossed, near], [angle])
+
+
+@functools.cache
+def fibre_strain(round_section: bool) -> ca.Function:
+    """(change, reach) -> largest strain of the fibres of a section by bending.
+
+    ``change`` of the curvature about b1, b2, b3; ``reach`` of the outermost fibre from b2 and from b3.  At a corner of
+    a rectangle both bendings add up, at the rim of what is round they add up as vectors.
+    """
+    change, reach = ca.SX.sym("change", 3), ca.SX.sym("reach", 2)
+    if round_section:
+        # With a derivative, zero, also where nothing is bent.
+        square = ca.dot(change[1:], change[1:])
+        strain = reach[0] * ca.sqrt(ca.fmax(square, 1e-300)) * (square > 0.0)
+    else:
+        strain = reach[0] * ca.fabs(change[1]) + reach[1] * ca.fabs(change[2])
+    return ca.Function(f"fibre_{'round' if round_section else 'rectangle'}", [change, reach], [strain])
 
 
 @functools.cache

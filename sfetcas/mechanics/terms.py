@@ -34,6 +34,7 @@ __all__ = [
     "One",
     "Side",
     "Term",
+    "answers_of",
     "by_turning",
     "curvatures_of",
     "energies_of",
@@ -62,6 +63,18 @@ class Term(Components, abc.ABC):
     """
 
     space: bool
+
+    table: ClassVar[str] = ""
+    """Table of the scene and of the answer in which it stands by its name; empty of what is told of in none."""
+
+    answers: ClassVar[Mapping[str, str]] = {}
+    """Keys of what :meth:`answer` says of it, with their units."""
+
+    one_sided: ClassVar[bool] = False
+    """Whether its moments on the rotations of one node do not add up to nothing."""
+
+    supports: ClassVar[bool] = False
+    """Whether what it does to the ground is a reaction of the support there."""
 
     follows: ClassVar[bool] = False
     """Whether it is a load that turns with what it acts on."""
@@ -98,6 +111,10 @@ class Term(Components, abc.ABC):
 
         What has a potential has none, or such as do no work on anything that its sides may do.
         """
+        return []
+
+    def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
+        """What the answer tells of it, in the order of :attr:`answers`, dimensionless; ``lam`` of its rows."""
         return []
 
     # -- what the sides say to each other --------------------------------------------------------
@@ -375,3 +392,12 @@ def rows_of(kind: Term) -> ca.Function:
     """(q, u, data, load) -> rows of a kind."""
     arguments, _, rows, _ = _said(kind)
     return ca.Function(f"rows_{name_of(kind)}", arguments[:4], [ca.densify(rows)], [*ARGUMENTS[:4]], ["rows"])
+
+
+@functools.cache
+def answers_of(kind: Term) -> ca.Function:
+    """(q, u, data, load, lam) -> what the answer tells of a term, in the order of its ``answers``."""
+    arguments, sides = _symbols(kind)
+    found = kind.answer(*sides, *arguments[2:])
+    name = f"answers_{name_of(kind)}"
+    return ca.Function(name, arguments, [ca.densify(ca.vertcat(ca.SX(0, 1), *found))], [*ARGUMENTS], ["answers"])

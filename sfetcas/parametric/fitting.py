@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..description.answers import AnswerName, answer_name
 from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
@@ -107,15 +108,12 @@ def fitting(
     twice = sorted(asked.keys() & spans.keys())
     if twice:
         raise SceneError(f"found {twice[0]} in a case, accepted: parameters that no case gives", ("parameters",))
-    places: dict[str, list[float]] = {}
-    names: list[str] = []
-    for i, one in enumerate(measurements):
-        name, place, _ = _named(one.quantity, i)
-        names += [name] if name not in names else []
-        if place is not None:
-            own = places.setdefault(name.split(".")[1], [])
-            own += [place] if place not in own else []
-    equilibrium = parametric(scene, asked | spans, names, places=places, settings=settings)
+    measured = [_named(one.quantity, i) for i, one in enumerate(measurements)]
+    names, places = dict.fromkeys(name.quantity for name in measured), dict[str, list[float]]()
+    for name in measured:
+        own = places.setdefault(name.record, []) if name.at is not None else []
+        own += [name.at] if name.at is not None and name.at not in own else []
+    equilibrium = parametric(scene, asked | spans, list(names), places=places, settings=settings)
     chosen = [i for i, one in enumerate(equilibrium.parameters) if one.name in asked]
     return Fitting(equilibrium, tuple(measurements), tuple(equilibrium.parameters[i].name for i in chosen))
 
@@ -140,20 +138,14 @@ def _numbers(value: ArrayLike, where: tuple[str, ...]) -> Array:
         raise SceneError(f"found {value!r}, accepted: numbers", where) from None
 
 
-def _named(quantity: str, number: int) -> tuple[str, float | None, int | None]:
-    """Name of the answer, place along a member, and component of what was measured."""
+def _named(quantity: str, number: int) -> AnswerName:
+    """What was measured: along a member with a place."""
     where = ("measurements", str(number), "quantity")
-    name, at, place = (part.strip() for part in quantity.partition(" at "))
-    head, _, last = name.rpartition(".")
-    component = int(last) if last.isdigit() and head.count(".") == 2 else None
-    name = name if component is None else head
-    if name.startswith("members.") != bool(at):
-        accepted = "members.NAME.QUANTITY at FRACTION, and no place for all others"
+    name = answer_name(quantity, *where)
+    if set(name.selectors) != ({"at"} if name.kind.along else set()):
+        accepted = f"{name.kind.name} at FRACTION" if name.kind.along else name.bare
         raise SceneError(f"found {quantity!r}, accepted: {accepted}", where)
-    try:
-        return name, float(place) if at else None, component
-    except ValueError:
-        raise SceneError(f"found {quantity!r}, accepted: a fraction of the length after 'at'", where) from None
+    return name
 
 
 class Fitting:
@@ -201,25 +193,22 @@ class Fitting:
     def _measured(self, one: Measurement, number: int) -> tuple[list[int], list[float], list[float]]:
         """Rows of the flat answers, values and deviations of one measurement."""
         where = ("measurements", str(number))
-        name, place, component = _named(one.quantity, number)
-        first = 0
+        name, first = _named(one.quantity, number), 0
         for answer in self.equilibrium.answers:
-            if answer.name == name:
+            if answer.name == name.quantity:
                 break
             first += answer.size
-        size = answer.shape[-1] if answer.shape else 1
-        if place is not None:
-            size = answer.size // answer.shape[0]
-            first += size * self.equilibrium.solver.results.places[name.split(".")[1]].index(place)
+        size = answer.size
+        if name.at is not None:
+            places = self.equilibrium.solver.results.places[name.record]
+            size //= len(places)
+            first += size * places.index(name.at)
         value = _numbers(one.value, (*where, "value"))
-        chosen = list(range(size))
-        if component is not None:
-            chosen = [component] if component < size else []
-        elif len(value) == 2 and size == 3 and not self.equilibrium.solver.model.space:
+        chosen = list(range(size)) if name.component is None else [name.component]
+        if len(value) == 2 and len(chosen) == 3 and not self.equilibrium.solver.model.space:
             chosen = [0, 1]
         if len(value) != len(chosen):
-            accepted = f"{len(chosen)} numbers" if chosen else f"a component from 0 to {size - 1}"
-            raise SceneError(f"found {one.value!r}, accepted: {accepted}", (*where, "value"))
+            raise SceneError(f"found {one.value!r}, accepted: {len(chosen)} numbers", (*where, "value"))
         deviation = _numbers(np.nan if one.deviation is None else one.deviation, (*where, "deviation"))
         spread = np.broadcast_to(deviation, value.shape) if np.size(deviation) in (1, len(value)) else np.zeros(1)
         if one.deviation is not None and not (np.isfinite(spread) & (spread > 0.0)).all():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -44,7 +43,7 @@ def motion_of(scene: Scene, settings: Settings) -> Simulation:
         It takes a search that has no derivatives, or cannot be modelled.
     """
     refuse_search(scene)
-    return Simulation(scene, settings, _nothing, None)
+    return Simulation(scene, settings)
 
 
 def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
@@ -73,11 +72,6 @@ def answers_of_motion(results: Results, arguments: Arguments, system: Parametric
     told = results.expression(program, arguments.undeformed(p), speeds)
     as_given = ca.substitute([told], [program.state_symbol, program.symbol], [state, arguments.given(p)])[0]
     return ca.Function("answers", [state, p, rates], [ca.densify(as_given)], ["state", "numbers", "v"], ["results"])
-
-
-def _nothing(*_: Any) -> float:
-    """Conditions that end a motion are not looked for."""
-    return 0.0
 
 
 def _same(one: Masses, other: Masses) -> bool:

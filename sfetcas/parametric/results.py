@@ -13,18 +13,20 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer, single_number
 from ..description.records import unknown
 from ..errors import SceneError
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.constants import constant, times
-from ..mechanics.joints import LineSpring, Spring, TurnSpring, Universal
+from ..mechanics.balance import guide, pinned_turns
+from ..mechanics.connections import connections_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
-from ..mechanics.singles import turned_vector
+from ..mechanics.singles import fibre_strain, turned_vector
 from ..mechanics.stationarity import Stationarity
-from ..mechanics.terms import GROUND
+from ..mechanics.terms import GROUND, answers_of
 from ..solvers.program import Program
 
 __all__ = ["Result", "Results", "default_motion_results", "default_results"]
@@ -37,12 +39,16 @@ class Result:
     Attributes
     ----------
     name : str
-        As in the JSON answer: ``nodes.tip.position``; along a member a row for each place.
+        As it was asked for: ``nodes.tip.position``.
+    asked : AnswerName
+        The same, read.
     shape : tuple of int
+        Along a member a row for each place, unless its name has one place.
     unit, meaning : str
     """
 
     name: str
+    asked: AnswerName
     shape: tuple[int, ...]
     unit: str
     meaning: str
@@ -52,9 +58,10 @@ class Result:
         """How many numbers."""
         return int(np.prod(self.shape, dtype=int))
 
-
-FIELDS = {"position": "m", "force": "N", "moment": "N m", "curvature": "1/m"}
-"""What is told along a member, beside its rotation."""
+    @property
+    def member(self) -> str:
+        """The member at whose places it has a row each; empty of all else."""
+        return self.asked.record if self.asked.kind.along and self.asked.at is None else ""
 
 
 def default_results(model: Model, *, unique: bool = True) -> list[str]:
@@ -82,11 +89,14 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
 
 def default_motion_results(model: Model) -> list[str]:
     """Of a motion: positions, rotations and velocities of all nodes, positions along the members, springs."""
-    every = [name for name in default_results(model) if name.rpartition(".")[2] not in STATIC]
-    names = [name for name in every if name.startswith(("nodes.", "springs.")) or name.endswith(".position")]
-    nodes = [f"nodes.{name}.velocity" for name in model.nodes]
-    springs = [name for name in names if name.startswith("springs.")]
-    return [*(name for name in names if name not in springs), *nodes, *springs]
+    every = [answer_name(name) for name in default_results(model, unique=False)]
+    moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
+    sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
+    return [*moving, *(f"nodes.{name}.velocity" for name in model.nodes), *sprung]
+
+
+TRAVELS = ("angle", "travel")
+"""How springs are told of in motions."""
 
 
 def _moment_known(model: Model, node: str) -> bool:
@@ -99,8 +109,18 @@ def _moment_known(model: Model, node: str) -> bool:
     return held in ([], [node])
 
 
-STATIC = ("moment", "force", "curvature", "potential")
-"""What is told of equilibria only; springs are told by their travel."""
+WHOSE = {
+    "nodes": "of the node",
+    "reactions": "that the ground exerts at the node",
+    "members": "of the member",
+    "springs": "of the spring",
+    "motions": "of the motion",
+    "energy": "energy",
+}
+"""How the meaning of a result goes on after its key."""
+
+BY_FORCES = ("force", "moment", "curvature", "bending_strain", "bending_stress")
+"""Keys of what section forces say along a member."""
 
 FREE = ("free", "ball")
 """How a support may leave a node to turn."""
@@ -114,7 +134,7 @@ class Results:
     model : Model
     names : sequence of str
     places : mapping of str to sequence of float
-        Of each member the fractions of its length at which it is told.
+        Of each member the fractions of its length at which it is told, unless a name says where.
     unique : bool
         Whether reactions and section forces are: not where closings depend on each other.
     motion : bool
@@ -137,6 +157,11 @@ class Results:
         self._motion, self._unique = motion, unique
         self.model, self.places = model, {name: tuple(x) for name, x in places.items()}
         self.results = tuple(self._result(name) for name in names)
+        # Where anything is told of, by whatever name.
+        self.every = dict(self.places)
+        for asked in (result.asked for result in self.results):
+            if asked.at is not None:
+                self.every[asked.record] = tuple(dict.fromkeys((*self.every[asked.record], asked.at)))
 
     @property
     def size(self) -> int:
@@ -145,139 +170,97 @@ class Results:
 
     # -- what there is ------------------------------------------------------------------------------
 
-    def _result(self, name: str) -> Result:
-        kind, _, rest = name.partition(".")
-        what, _, key = rest.rpartition(".")
-        if self._motion and (kind in ("reactions", "stiffness", "compliance") or key in STATIC):
-            accepted = (
-                "nodes.*.position, .angle or .quaternion, .velocity, members.*.position, springs.*, energy.elastic"
-            )
-            raise SceneError(f"found {name!r}, accepted of a step: {accepted}", ("results",))
-        if not self._unique and (
-            kind == "reactions" or (kind == "members" and key in ("force", "moment", "curvature"))
-        ):
-            message = f"found {name!r}, which is not unique as closings depend on each other, accepted: what is"
-            raise SceneError(message, ("results",))
-        tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "springs": self._spring}
-        if kind in tables and what:
-            return tables[kind](name, what, key)
-        if kind in ("stiffness", "compliance"):
-            self._known(rest, self.model.nodes, name)
-            if self.model.rotations.node_turn[rest] is None:
-                raise SceneError(f"found {name!r}, a node that has no rotation of its own", ("results",))
-            if kind == "stiffness" and self.model.scene.nodes[rest].support != "free":
-                message = f"found {name!r}, a node that the ground holds, accepted: a free one, or compliance.{rest}"
-                raise SceneError(message, ("results",))
-            n = 6 if self.model.space else 3
-            inverse = kind == "compliance"
-            what = "displacement and rotation by force and moment" if inverse else "force and moment by displacement"
-            mixed = "1/N, rad/(N m) and mixed" if inverse else "N/m, N m/rad and mixed"
-            return Result(name, (n, n), mixed, f"tangent {kind} of the node {rest}: {what}")
-        if name in ("energy.elastic", "energy.potential"):
-            return Result(
-                name, (), "J", "strain energy" if key == "elastic" else "potential energy of all that has one"
-            )
-        accepted = (
-            "nodes.*, reactions.*, members.*, springs.*, stiffness.*, compliance.*, energy.elastic, energy.potential"
-        )
-        raise SceneError(f"found {name!r}, accepted: {accepted}", ("results",))
+    def _result(self, text: str) -> Result:
+        name = answer_name(text, "results")
+        try:
+            self._check(name)
+        except SceneError as error:
+            message = error.bare if repr(name.quantity) in error.bare else f"{text}: {error.bare}"
+            raise SceneError(message, ("results",)) from None
+        kind, n = name.kind, 6 if self.model.space else 3
+        if not kind.key:
+            return Result(text, name, (n, n), kind.unit, f"tangent {kind.table} of {name.record}, {kind.meaning}")
+        rows = (len(self.places[name.record]),) if kind.along and name.at is None else ()
+        components = kind.components
+        if kind.table == "motions" and single_number(self.model.scene.motions[name.record], kind.key):
+            components = ()
+        columns = (len(components),) if name.component is None and components else ()
+        what = f"{kind.key.replace('_', ' ')} {WHOSE[kind.table]}" + (f" {name.record}" if kind.named else "")
+        more = "" if kind.meaning.startswith("of ") else f": {kind.meaning}"
+        return Result(text, name, (*rows, *columns), kind.unit or "1", what + more)
 
-    @staticmethod
-    def _known(what: str, known: Sequence[str], name: str) -> None:
-        if what not in known:
-            raise SceneError(f"{name}: {unknown(what, known)}", ("results",))
-
-    def _key(self, name: str, key: str, known: Sequence[str]) -> None:
-        if key not in known:
-            raise SceneError(f"{name}: {unknown(key, known)}", ("results",))
-
-    @property
-    def _rotation(self) -> str:
-        return "quaternion" if self.model.space else "angle"
-
-    def _node(self, name: str, node: str, key: str) -> Result:
-        self._known(node, self.model.nodes, name)
-        self._key(name, key, ("position", self._rotation, *(["velocity"] if self._motion else [])))
-        if key == "velocity":
-            return Result(name, (3,), "m/s", f"velocity of the node {node}")
-        if key == "position":
-            return Result(name, (3,), "m", f"position of the node {node}")
-        if self.model.rotations.node_turn[node] is None:
-            raise SceneError(f"found {name!r}, a node that has no rotation of its own", ("results",))
-        return self._turned(name, (), f"the node {node}")
-
-    def _turned(self, name: str, shape: tuple[int, ...], what: str) -> Result:
-        own = (4,) if self.model.space else ()
-        return Result(name, (*shape, *own), "1" if own else "rad", f"rotation of {what} since the undeformed scene")
-
-    def _reaction(self, name: str, node: str, key: str) -> Result:
-        supported = [n for n, record in self.model.scene.nodes.items() if record.support != "free"]
-        self._known(node, supported, name)
-        self._key(name, key, ("force", "moment"))
-        if key == "moment" and not _moment_known(self.model, node):
-            message = (
-                f"found {name!r}, which other supports of the same rigid body share, accepted: reactions alone in it"
-            )
-            raise SceneError(message, ("results",))
-        return Result(name, (3,), FIELDS[key], f"{key} that the ground exerts at the node {node}")
-
-    def _member(self, name: str, member: str, key: str) -> Result:
-        flexible = [n for n, record in self.model.scene.members.items() if record.type == "flexible"]
-        self._known(member, flexible, name)
-        self._key(name, key, ("position", self._rotation, "force", "moment", "curvature"))
-        count = len(self.places[member])
-        if key == self._rotation:
-            return self._turned(name, (count,), f"the sections of {member}")
-        whose = "" if key == "position" else ", of what is beyond a place on what is before"
-        if key == "curvature":
-            whose = " about the axes b1, b2, b3 of its sections"
-        return Result(name, (count, 3), FIELDS[key], f"{key} along the member {member}{whose}")
-
-    def _spring(self, name: str, spring: str, key: str) -> Result:
-        self._known(spring, list(self.model.scene.springs), name)
-        turning = self.model.scene.springs[spring].type == "rotational"
-        units = {"angle": "rad", "moment": "N m"} if turning else {"travel": "m", "force": "N"}
-        self._key(name, key, tuple(units))
-        return Result(name, (), units[key], f"{key} of the spring {spring}")
+    def _check(self, name: AnswerName) -> None:
+        """Refuse what is not told of such a model."""
+        kind, node, scene = name.kind, name.record, self.model.scene
+        if kind.table == "stiffness" and node in scene.nodes and scene.nodes[node].support != "free":
+            raise SceneError(f"found a node that the ground holds, accepted: a free one, or compliance.{node}")
+        check_answer(scene, name, STEPS if self._motion else PARAMETERS)
+        if set(name.selectors) - {"at"} or (name.at is not None and not kind.along):
+            raise SceneError(f"found {name.text!r}, accepted: {name.bare}")
+        if not self._unique and (kind.table in ("reactions", "motions") or (kind.along and kind.key in BY_FORCES)):
+            raise SceneError("not unique as closings depend on each other, accepted: what is")
+        if kind.along:
+            flexible = [n for n, record in scene.members.items() if record.type == "flexible"]
+            if node not in flexible:
+                raise SceneError(unknown(node, flexible, "flexible members"))
+            if name.at is not None and not 0.0 <= name.at <= 1.0:
+                raise SceneError(f"found {name.at:g}, accepted: fractions of the length, from 0 to 1")
+        turns = kind.table == "nodes" and kind.key in ("quaternion", "angle")
+        if (turns or not kind.key) and node in scene.nodes and self.model.rotations.node_turn[node] is None:
+            raise SceneError("found a node that has no rotation of its own")
+        if kind.table == "motions":
+            motion = scene.motions[node]
+            if name.component is not None and single_number(motion, kind.key):
+                raise SceneError(f"found {name.bare!r}, which is one number here, accepted: {name.quantity}")
+            node = motion.node if motion.between is None else ""
+        held = kind.table in ("reactions", "motions") and kind.key == "moment" and node in scene.nodes
+        if held and not _moment_known(self.model, node):
+            raise SceneError("other supports of the same rigid body share it, accepted: reactions alone in it")
 
     # -- what they are ------------------------------------------------------------------------------
 
     @property
     def curved(self) -> list[str]:
-        """Members whose curvature is told."""
-        names = [result.name.split(".") for result in self.results if result.name.endswith(".curvature")]
-        return [name[1] for name in names]
+        """Members whose curvature is told, or follows into what is."""
+        bent = (result.asked for result in self.results if result.asked.kind.key in BY_FORCES[2:])
+        return list(dict.fromkeys(name.record for name in bent))
 
     def rest(self, model: Model) -> Array:
         """Undeformed positions (m) of all nodes, then of the places of all members, flat; then what curvatures need."""
         scene = model.scene
         nodes = [np.asarray(scene.nodes[name].position, dtype=float) for name in model.nodes]
-        along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.places.items()]
+        along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]
         sections = [self._sections(model, name).ravel() for name in self.curved]
         return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])
 
     def _sections(self, model: Model, member: str) -> Array:
-        """Stiffness over that of the first model, curvature times size and axes b1, b2, b3 at places, (places, 15)."""
-        scene, x = model.scene, np.array(self.places[member])
+        """Of a member at its places, (places, 18).
+
+        Stiffness over that of the first model, curvature times size, axes b1, b2, b3, and of a shape E and the reach
+        of its fibres.
+        """
+        scene, x = model.scene, np.array(self.every[member])
         line, section = scene.center_lines[member], scene.sections[str(scene.members[member].section)]
         stiffness = section.stiffness(x) / self._stiffness(member)
         axes = np.moveaxis(quaternion.matrix(line.quaternions(x)), 2, 1).reshape(len(x), 9)
-        return np.concatenate([np.nan_to_num(stiffness), line.curvatures(x) * self.model.scene.size, axes], axis=1)
+        curved = line.curvatures(x) * self.model.scene.size
+        fibres = np.zeros((len(x), 3)) if section.shape is None else section.fibres(x)
+        return np.concatenate([np.nan_to_num(stiffness), curved, axes, fibres], axis=1)
 
     def _stiffness(self, member: str) -> Array:
         """Of the first model at the places of a member, (places, 3); infinite where it is not known."""
         scene = self.model.scene
-        values = scene.sections[str(scene.members[member].section)].stiffness(np.array(self.places[member]))
+        values = scene.sections[str(scene.members[member].section)].stiffness(np.array(self.every[member]))
         return np.where(np.isnan(values), np.inf, values)
 
-    def curvature(self, member: str, moment: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
-        """Curvature about the axes of the sections, (places, 3), 1/m.
+    def bent(self, member: str, moment: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
+        """Change of the curvature about the axes of the sections, (3, places), 1/m.
 
         Parameters
         ----------
         moment : (3, places), N m, fixed axes
         axes : what turns vectors (3, places) as the sections turn
-        sections : what :meth:`rest` tells of them, (15, places)
+        sections : what :meth:`rest` tells of them, (18, places)
         """
         known, found = self._stiffness(member), []
         for k in range(3):
@@ -286,8 +269,8 @@ class Results:
             # What is not known is not bent: there is no moment about that axis.
             inverse = ca.DM(np.where(finite, 1.0 / known[:, k], 0.0)).T
             relative = sections[k, :] * ca.DM(finite.astype(float)).T + ca.DM((~finite).astype(float)).T
-            found.append(sections[3 + k, :] / self.model.scene.size + along * inverse / relative)
-        return ca.vertcat(*found).T
+            found.append(along * inverse / relative)
+        return ca.vertcat(*found)
 
     def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
         """All results one after the other, rows before columns, in SI units.
@@ -295,7 +278,7 @@ class Results:
         ``speeds`` (axes, places) are those of a motion; of what is ``short`` derivatives are, too.
         """
         told = _Told(self, program, rest, speeds, program.forces if short else program.stationarity)
-        return ca.vertcat(*(ca.densify(ca.vec(told.value(result.name).T)) for result in self.results))
+        return ca.vertcat(*(ca.densify(ca.vec(told.value(result.asked).T)) for result in self.results))
 
 
 class _Told:
@@ -313,32 +296,39 @@ class _Told:
         self._places = ca.reshape(places, expressions.axes, expressions.places)
         self._found = found
         count = len(model.nodes)
-        along = [len(x) for x in results.places.values()]
-        curved = [15 * len(results.places[name]) for name in results.curved]
+        along = [len(x) for x in results.every.values()]
+        curved = [18 * len(results.every[name]) for name in results.curved]
         bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved]).tolist()
         nodes, *members = ca.vertsplit(rest, bounds)
         sections = members[len(along) :]
-        self._sections = {n: ca.reshape(x, 15, -1) for n, x in zip(results.curved, sections, strict=True)}
+        self._sections = {n: ca.reshape(x, 18, -1) for n, x in zip(results.curved, sections, strict=True)}
         self._rest = ca.reshape(nodes, 3, count)
-        self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.places, members, strict=False)}
+        self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.every, members, strict=False)}
         if expressions.elements:
             self._tangents = expressions.tangents(self._q, program.given)
 
-    def value(self, name: str) -> ca.MX:
+    def value(self, name: AnswerName) -> ca.MX:
         """A result as a matrix of its rows and columns."""
-        kind, _, rest = name.partition(".")
-        what, _, key = rest.rpartition(".")
-        if kind == "nodes":
-            return self._node(what, key)
-        if kind == "reactions":
-            return self._reaction(what, key)
-        if kind == "members":
-            return self._member(what, key)
-        if kind == "springs":
-            return self._spring(what, key)
-        if kind == "energy":
-            return (self._program.strain if key == "elastic" else self._program.potential) * self._model.scales.moment
-        return self._tangent(kind, rest)
+        found = self._whole(name)
+        if name.kind.along:
+            places = self._results.every[name.record]
+            told = self._results.places[name.record] if name.at is None else [name.at]
+            found = found[[places.index(x) for x in told], :]
+        return found if name.component is None else found[:, name.component]
+
+    def _whole(self, name: AnswerName) -> ca.MX:
+        """A result at all places, with all components."""
+        kind, record, key = name.kind, name.record, name.kind.key
+        if kind.table == "energy":
+            strain, total = self._program.strain, self._program.potential
+            energies = {"elastic": strain, "loads": total - strain, "total": total, "potential": total}
+            return energies[key] * self._model.scales.moment
+        if not key:
+            return self._tangent(kind.table, record)
+        if kind.table == "springs":
+            return self._connection("springs", record, key)
+        tables = {"nodes": self._node, "reactions": self._reaction, "members": self._member, "motions": self._motion}
+        return tables[kind.table](record, key)
 
     def _three(self, vectors: ca.MX) -> ca.MX:
         return vectors if self._model.space else ca.vertcat(vectors, ca.MX.zeros(1, vectors.shape[1]))
@@ -353,7 +343,14 @@ class _Told:
             return (self._rest[:, number] + moved).T
         turn = self._model.rotations.node_turn[node]
         assert turn is not None
-        return self._q[:, turn].T
+        return self._rotated(self._q[:, turn].T, key)
+
+    def _rotated(self, rotations: ca.MX, key: str) -> ca.MX:
+        """Rotations (n, components) as quaternions, also in the plane, or as angles."""
+        if key == "angle" or self._model.space:
+            return rotations
+        nothing = ca.MX.zeros(rotations.shape[0], 2)
+        return ca.horzcat(ca.cos(0.5 * rotations), nothing, ca.sin(0.5 * rotations))
 
     # -- reactions ----------------------------------------------------------------------------------
 
@@ -362,7 +359,7 @@ class _Told:
         expressions, found = self._expressions, self._found
         total = ca.densify(ca.vertcat(ca.MX(expressions.of_places, 1), found.on_places))
         for group, (sides, values) in zip(self._model.terms, found.shares, strict=True):
-            ground = isinstance(group.kind, Universal) & (group.turns == GROUND).any(axis=1) & moments
+            ground = group.kind.supports & (group.turns == GROUND).any(axis=1) & moments
             cells = np.where(ground[:, None], -1, sides).ravel()
             used = np.flatnonzero(cells >= 0)
             onto = ca.DM(ca.Sparsity.triplet(expressions.of_rows, len(cells), cells[used].tolist(), used.tolist()), 1.0)
@@ -374,19 +371,21 @@ class _Told:
         positions = model.positions
         if key == "force":
             on_places = self._shares(moments=False)[expressions.of_places :]
-            lam = self._lam[: len(positions.rows)]
+            lam = self._lam[: len(positions.rows), :]
             # By displacements of what the ground holds; what hangs on it by its members follows.
             force = times(constant(positions.B).T, on_places) + times(constant(positions.BZ).T, lam)
             place = model.segments.place(node)
             found = self._three(ca.reshape(force, expressions.axes, expressions.places)[:, place])
-            found -= self._across(node, found)
+            along = guide(model.scene, node)
+            # A guide does nothing along itself.
+            found -= 0.0 if along is None else ca.dot(ca.DM(along), found) * ca.DM(along)
             return found.T * model.scales.force
         turns = expressions.turns
         moments = ca.reshape(self._shares(moments=True)[: expressions.of_places], turns, -1)
         moments = moments if model.space else ca.vertcat(ca.MX.zeros(2, moments.shape[1]), moments)
         number = model.rotations.node_turn[node]
         if number is None:
-            return sum((moments[:, turn] for turn in self._pinned(node)), ca.MX.zeros(3)).T * model.scales.moment
+            return sum((moments[:, turn] for turn in pinned_turns(model, node)), ca.MX.zeros(3)).T * model.scales.moment
         found = moments[:, number]
         kind = model.rotations.kind[number]
         if kind == Turn.AXIS:
@@ -396,29 +395,22 @@ class _Told:
             found = ca.MX.zeros(3)
         return found.T * model.scales.moment
 
-    def _across(self, node: str, force: ca.MX) -> ca.MX:
-        """The share of a force along a guide, which does nothing along itself."""
-        scene = self._model.scene
-        record = scene.nodes[node]
-        driven = any(m.node == node and m.displacement is not None for m in scene.motions.values())
-        if not record.slides or driven:
-            return ca.MX.zeros(3)
-        along = np.asarray(record.direction, dtype=float)
-        along /= np.linalg.norm(along)
-        return ca.dot(ca.DM(along), force) * ca.DM(along)
-
-    def _pinned(self, node: str) -> list[int]:
-        model = self._model
-        if model.scene.nodes[node].joint != "hinge":
-            return []
-        members = model.scene.members.items()
-        return [model.rotations.ends[name][m.nodes.index(node)] for name, m in members if node in m.nodes]
+    def _motion(self, name: str, key: str) -> ca.MX:
+        """What makes a motion: the multiplier of a driven joint, or what the ground does, also about an axis alone."""
+        motion = self._model.scene.motions[name]
+        if motion.between is not None:
+            return self._connection("motions", name, key)
+        found = self._reaction(motion.node, key)
+        if not single_number(motion, key):
+            return found
+        axis = np.asarray(self._model.scene.nodes[motion.node].turn_axis, dtype=float)
+        return ca.mtimes(found, ca.DM(axis / np.linalg.norm(axis)))
 
     # -- members ------------------------------------------------------------------------------------
 
     def _located(self, member: str) -> tuple[Array, Array, Array]:
         """Elements of the places of a member, places within them, and weights that integrate up to there."""
-        model, x = self._model, np.array(self._results.places[member])
+        model, x = self._model, np.array(self._results.every[member])
         cuts, element = model.mesh.cuts[member], model.element
         e = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
         xi = (x - cuts[e]) / (cuts[e + 1] - cuts[e])
@@ -459,12 +451,21 @@ class _Told:
             moved += ca.repmat(start, 1, moved.shape[1])
             return (self._along[member] + self._three(moved) * scales.length).T
         if key in ("quaternion", "angle"):
-            return self._rotations(member)
-        if key == "curvature":
-            return self._curvature(member)
+            return self._rotated(self._rotations(member), key)
+        if key == "energy":
+            return self._strain_energy(member)
+        if key in BY_FORCES[2:]:
+            return self._curvature(member, key)
         return (self._force(member) * scales.force if key == "force" else self._moment(member) * scales.moment).T
 
-    def _curvature(self, member: str) -> ca.MX:
+    def _strain_energy(self, member: str) -> ca.MX:
+        if member not in self._model.members:
+            return self._connection("members", member, "energy")
+        return ca.sum2(self._program.strains[:, self._model.elements_of(member)]) * self._model.scales.moment
+
+    def _curvature(self, member: str, key: str) -> ca.MX:
+        """Curvature (places, 3), or strain or stress by its change (places,)."""
+
         def turned(vectors: ca.MX) -> ca.MX:
             if not self._model.space:
                 # About z nothing in the plane counts, and z turns to itself.
@@ -473,7 +474,13 @@ class _Told:
             return function(self._rotations(member).T, vectors)
 
         moment = self._moment(member) * self._model.scales.moment
-        return self._results.curvature(member, moment, turned, self._sections[member])
+        sections, scene = self._sections[member], self._model.scene
+        change = self._results.bent(member, moment, turned, sections)
+        if key == "curvature":
+            return (sections[3:6, :] / scene.size + change).T
+        shape = scene.sections[str(scene.members[member].section)].shape
+        strain = self._expressions.many(fibre_strain(shape != "rectangle"), change.shape[1])(change, sections[16:, :])
+        return (strain * sections[15, :] if key == "bending_stress" else strain).T
 
     def _rotations(self, member: str) -> ca.MX:
         model, element = self._model, self._model.element
@@ -519,26 +526,23 @@ class _Told:
 
     # -- springs ------------------------------------------------------------------------------------
 
-    def _spring(self, spring: str, key: str) -> ca.MX:
-        model, scales = self._model, self._model.scales
-        kinds = (TurnSpring, LineSpring, Spring)
-        number = next(i for i, g in enumerate(model.terms) if spring in g.names and isinstance(g.kind, kinds))
-        group = model.terms[number]
-        i, axes = group.names.index(spring), self._expressions.axes
-        turned, moved = self._expressions.sides(group, self._q, ca.vec(self._places))
-        data = self._expressions.data(number, self._program.given, self._near)[:, i]
-        if isinstance(group.kind, TurnSpring):
-            angle = _angle(group.kind)(turned[:, 2 * i : 2 * i + 2], data)
-            first = group.kind.first
-            return angle if key == "angle" else -data[first] * (angle - data[first + 1]) * scales.moment
-        gap = moved[:, 2 * i + 1] - moved[:, 2 * i]
-        if isinstance(group.kind, LineSpring):
-            travel = ca.dot(data[:axes], gap)
-            force = -data[axes] * (travel - data[axes + 1])
-        else:
-            travel = ca.norm_2(data[:axes] + gap) - data[axes + 1]
-            force = -data[axes] * travel
-        return travel * scales.length if key == "travel" else force * scales.force
+    def _connection(self, table: str, name: str, key: str) -> ca.MX:
+        """What the connection of a name tells."""
+        expressions, given = self._expressions, self._program.given
+        groups = self._model.terms
+        number, i = next(x for x in connections_of(groups, table, name) if key in groups[x[0]].kind.answers)
+        group = groups[number]
+        turns, places, _, _, _ = group.kind.sizes
+        turned, moved = expressions.sides(group, self._q, ca.vec(self._places))
+        found = answers_of(group.kind)(
+            turned[:, turns * i : turns * (i + 1)],
+            moved[:, places * i : places * (i + 1)],
+            expressions.data(number, given, self._near)[:, i],
+            expressions.load(number, given)[:, i],
+            expressions.multipliers(number, self._lam)[:, i],
+        )
+        k = list(group.kind.answers).index(key)
+        return found[k] * self._model.scales.of(group.kind.answers[key])
 
     # -- stiffness ----------------------------------------------------------------------------------
 
@@ -558,9 +562,3 @@ class _Told:
         loads = np.repeat([model.scales.force, model.scales.moment], [axes, expressions.turns])
         found = ca.DM(units[:, None] / loads[None, :]) * compliance
         return found if kind == "compliance" else ca.solve(found, ca.DM.eye(len(units)), "qr", {"eps": 1e-300})
-
-
-def _angle(kind: TurnSpring) -> ca.Function:
-    """(q, data) -> the angle of a rotational spring."""
-    q, data = ca.SX.sym("q", kind.components, 2), ca.SX.sym("data", kind.sizes[3])
-    return ca.Function("angle", [q, data], [kind.angle([ca.vertsplit(q[:, i]) for i in range(2)], data)])

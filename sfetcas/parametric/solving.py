@@ -87,7 +87,7 @@ def parametric(
     except SceneError as error:
         raise _renamed(error) from None
     if not answers:
-        own = [one.name for one in solver.results.results if not one.name.startswith("members.")]
+        own = [one.name for one in solver.results.results if not one.member]
         solver = solver.with_results(own)
     return ParametricEquilibrium(solver, settings or Settings())
 

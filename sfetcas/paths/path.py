@@ -44,6 +44,11 @@ class FlutterPoint(Equilibrium):
 
     omega: float = field(kw_only=True)
 
+    def table(self, kind: str, name: str = "") -> dict[str, Any]:
+        """As of :meth:`Equilibrium.table`; also the frequency."""
+        found = super().table(kind, name)
+        return found if kind else {**found, "omega": self.omega}
+
     def to_dict(self) -> dict[str, Any]:
         """As an entry of ``flutter_points`` in the JSON answer."""
         return {**super().to_dict(), "omega": self.omega}

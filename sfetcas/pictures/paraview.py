@@ -29,7 +29,7 @@ def save_vtk(answer: Solution | Path | Trajectory, folder: str | os.PathLike[str
 
     Each member is a polyline, its number in ``member``; at its points stand ``s`` (fraction of the length),
     ``quaternion`` (w, x, y, z), ``force`` N, ``moment`` N m, ``curvature`` 1/m about the section axes and, of a
-    motion, ``velocity`` m/s: that of the ends of elements, linear between them.  The time of the collection is that
+    motion, ``velocity`` m/s.  The time of the collection is that
     of a motion, s; of steps and of the points of a path it is their number, and ``factor`` their factor.
     """
     File(folder).mkdir(exist_ok=True)
@@ -96,22 +96,12 @@ def _line(step: Posture, member: str) -> dict[str, Array]:
     found = step.along(member, s)
     table = {"s": s, **{key: found[key] for key in ("position", "quaternion", "force", "moment", "curvature")}}
     if isinstance(step, Instant):
-        table["velocity"] = _velocities(step, member, s)
+        table["velocity"] = found["velocity"] if "velocity" in found else _velocities(step, member, s)
     return {key: np.ascontiguousarray(values, dtype=float) for key, values in table.items()}
 
 
 def _velocities(step: Instant, member: str, s: Array) -> Array:
-    """Velocities (n, 3) along a member: of the ends of its elements, and between them linear."""
-    model, nodes = step.model, step.model.scene.members[member].nodes
-    if member not in model.mesh.cuts:
-        ends = np.array([step.velocity(nodes[0]), step.velocity(nodes[-1])])
-        return (1.0 - s)[:, None] * ends[0] + s[:, None] * ends[1]
-    parts = [part for part in model.segments.parts if part.member == member]
-    cuts, first, axes = model.mesh.cuts[member], model.beams.first[member], model.element.axes
-    stops = [(parts[0].elements.start, parts[0].start), *((part.elements.stop, part.end) for part in parts)]
-    known = np.zeros((len(stops), 3))
-    for row, (_, name) in zip(known, stops, strict=True):
-        place = model.segments.place(name)
-        row[:axes] = step.sample.v[axes * place : axes * (place + 1)] * model.scales.length / step.mover.time
-    at = cuts[[stop - first for stop, _ in stops]]
-    return np.stack([np.interp(s, at, column) for column in known.T], axis=1)
+    """Velocities (n, 3) along a small member, linear between its ends."""
+    nodes = step.model.scene.members[member].nodes
+    ends = np.array([step.velocity(nodes[0]), step.velocity(nodes[-1])])
+    return (1.0 - s)[:, None] * ends[0] + s[:, None] * ends[1]

@@ -25,7 +25,7 @@ from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
-from ..mechanics.terms import GROUND
+from ..mechanics.terms import GROUND, energies_of
 from .newton import TINY
 
 __all__ = ["Program", "data_of", "is_data"]
@@ -150,6 +150,15 @@ class Program:
     def _energies(self) -> tuple[ca.MX, ca.MX]:
         q, y, _, near = self.parts
         return self.expressions.energies(q, self.expressions.kept_places(y, self.given), self.given, near)
+
+    @functools.cached_property
+    def strains(self) -> ca.MX:
+        """Elastic energy of each element, (1, elements)."""
+        expressions, (q, y, _, near) = self.expressions, self.parts
+        if not expressions.elements:
+            return ca.MX(1, 0)
+        arguments = expressions.arguments(0, q, expressions.kept_places(y, self.given), self.given, near)
+        return expressions.many(energies_of(self.model.element), expressions.elements)(*arguments)[1]
 
     @property
     def strain(self) -> ca.MX:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..description.answers import selected
 from ..description.records import counted, say, unknown
 from ..description.scene import Scene
 from ..errors import SceneError
@@ -21,7 +22,7 @@ from ..files import write_file
 from ..mathematics.arrays import Array
 from ..quoting import csv_cell
 from .cases import Cases
-from .quantities import Wanted, parted
+from .quantities import Wanted
 from .work import SHORT, SOLVED, Outcome
 
 __all__ = ["ENDINGS", "Failure", "Sweep", "check_table", "gathered"]
@@ -242,7 +243,7 @@ def gathered(
     return Sweep(scene, cases, MappingProxyType(quantities), tuple(outcomes), wall, interrupted)
 
 
-def _component(name: str, number: int) -> str:
+def _component(text: str, number: int) -> str:
     """A component of a quantity: its number stands before its place, ``members.beam.moment.2 at 0``."""
-    quantity, _ = parted(name)
-    return f"{quantity}.{number}{name[len(quantity) :]}"
+    name, _ = selected(text)
+    return f"{name}.{number}{text[len(name) :]}"

@@ -153,7 +153,7 @@ def _measured(scene: Scene, variant: Variant, repeats: int, longest: float) -> M
     whole, answer = _repeated(lambda: solve(asked, settings), answer, repeats, longest, first)
     last = answer.last
     name = settings.accuracy_of or scene.analysis.accuracy_of
-    quantity = Quantity.named(name) if name else None
+    quantity = Quantity.named(name, scene) if name else None
     single = refinable(asked, answer)
     return Measurement(
         variant,

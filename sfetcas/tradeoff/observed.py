@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import Answer, check
+from ..description.answers import answer_name
 from ..description.scene import Scene
 from ..dynamics.modes import Modes
 from ..dynamics.motion import Trajectory
@@ -158,7 +159,7 @@ def expected_error(scene: Scene, answer: Answer) -> tuple[float, int, int] | Non
         return None
     worst, met = 0.0, 0
     for found in check(wanted, answer):
-        key = found.expect.quantity.rpartition(".")[2]
+        key = answer_name(found.expect.quantity).kind.key
         size = float(np.abs(np.asarray(found.expect.value, dtype=float)).max())
         unit = {"position": scene.size, "quaternion": 1.0, "angle": 1.0}.get(key, size or 1.0)
         worst = max(worst, found.error / unit)

@@ -251,7 +251,7 @@ class _Replays:
         kept = {key: getattr(analysis, key) for key in ("initial", "cut", "release") if analysis.type == "dynamic"}
         given = {"type": "dynamic", "end": self.end, "step": step, "integrator": self.integrator, **kept}
         one = self.scene.model_copy(update={"analysis": type(analysis)(**given), "expect": ()})
-        simulation = _Timed(one, self.settings, _nothing, None)
+        simulation = _Timed(one, self.settings)
         simulation.wanted = self.times
         run = simulation.run(self.mesh or simulation.mesh.refined(), 0)
         if run.failure is not None:
@@ -268,8 +268,3 @@ class _Replays:
 def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float:
     """Largest distance of nodes."""
     return max(float(np.linalg.norm(one[name] - other[name], axis=1).max()) for name in one)
-
-
-def _nothing(*_: Any) -> float:
-    """Nothing ends a replay early."""
-    return 0.0

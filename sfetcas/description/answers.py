@@ -1,0 +1,414 @@
+"""What can be asked of an answer: every quantity once, with its name, unit, components and meaning.
+
+One grammar of names for expectations, ``accuracy_of``, ``until``, sweeps, parameters, measurements, design, generated C
+and the JSON answer::
+
+    nodes.tip.position                    a table, the name of a record, a key
+    nodes.tip.position.1                  one component, counted from 0
+    nodes.tip.position.y                  the same by its name: x y z, w x y z, or b1 b2 b3 about the axes of a section
+    members.beam.moment at 0.5            at a fraction of the length of a member
+    energy.elastic step 2                 of one of several answers: step, time, crossing, limit_point, ...
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ..errors import SceneError
+from .records import say, unknown
+
+__all__ = [
+    "ANSWERS",
+    "COUNTED",
+    "MOTION",
+    "PARAMETERS",
+    "STATICS",
+    "STEPS",
+    "AnswerKind",
+    "AnswerName",
+    "answer_name",
+    "answers_table",
+    "check_answer",
+    "selected",
+    "single_number",
+]
+
+STATICS, MOTION, PARAMETERS, STEPS = "statics", "motion", "parameters", "steps"
+"""Where quantities are told: equilibria; times of a motion; equilibria as expressions of parameters, in
+:func:`~sfetcas.parametric`, design and generated C; motions as expressions, in optimal control and generated C."""
+
+MODES = "modes"
+"""Small vibrations."""
+
+ANALYSES = {"dynamic": [MOTION], "modes": [STATICS, MODES]}
+"""What answers of types of the analysis tell, if not of statics alone."""
+
+EVERYWHERE = (STATICS, MOTION, PARAMETERS, STEPS)
+
+
+@dataclass(frozen=True)
+class AnswerKind:
+    """A quantity of answers.
+
+    Attributes
+    ----------
+    name : str
+        With NAME in the place of the name of a record: ``nodes.NAME.position``.
+    unit : str
+        Empty for what has none.
+    meaning : str
+    where : tuple of str
+        Where it is told, see :data:`EVERYWHERE`.
+    components : tuple of str
+        Names of the components of a vector; empty for a single value.
+    along : bool
+        It has a value at each place of a member.
+    applies : callable
+        (scene, record) -> whether a record of its table has it.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    where: tuple[str, ...]
+    components: tuple[str, ...]
+    along: bool
+    applies: Callable[[Any, Any], bool] = field(repr=False)
+
+    @property
+    def table(self) -> str:
+        """Its table: ``nodes``; empty for what stands in none."""
+        return self.name.partition(".")[0] if "." in self.name else ""
+
+    @property
+    def key(self) -> str:
+        """Its key: ``position``; empty where the name of the record is the last word."""
+        last = self.name.rpartition(".")[2]
+        return "" if last == "NAME" else last
+
+    @property
+    def numeric(self) -> bool:
+        """Whether it is made of numbers."""
+        return self.name not in ("certificate.stable", "contacts.NAME.member")
+
+    @property
+    def named(self) -> bool:
+        """Whether it is of a record of the scene."""
+        return "NAME" in self.name.split(".")
+
+
+def _in_plane(scene: Any, record: Any) -> bool:
+    return bool(scene.resolved_dimension == "plane")
+
+
+def _supported(scene: Any, record: Any) -> bool:
+    return bool(record.support != "free")
+
+
+def _outlined(scene: Any, record: Any) -> bool:
+    """A flexible member whose section has a shape, so that its fibres are known."""
+    return record.type == "flexible" and scene.sections[str(record.section)].shape is not None
+
+
+TABLE = """
+factor | | | statics, motion | factor of the loads and motions; of a motion its time
+omega | rad/s | | statics | at flutter points: angular frequency of the motion that grows
+nodes.NAME.position | m | x y z | all | of the node
+nodes.NAME.quaternion | | w x y z | all | rotation since the undeformed scene, where the node has one of its own
+nodes.NAME.angle | rad | | all | the same in the plane, counting turns
+nodes.NAME.velocity | m/s | x y z | motion, steps | of the node
+nodes.NAME.angular_velocity | rad/s | x y z | motion | of the node, where it has a rotation of its own
+reactions.NAME.force | N | x y z | statics, motion, parameters | at a supported node: what the ground does
+reactions.NAME.moment | N m | x y z | statics, motion, parameters | the same about the node
+members.NAME.position at | m | x y z | all | of the centre line
+members.NAME.quaternion at | | w x y z | all | rotation of the sections since the undeformed scene
+members.NAME.angle at | rad | | all | the same in the plane, counting turns
+members.NAME.force at | N | x y z | statics, motion, parameters | section force: of what is beyond on what is before
+members.NAME.moment at | N m | x y z | statics, motion, parameters | section moment, likewise
+members.NAME.curvature at | 1/m | b1 b2 b3 | statics, motion, parameters | whole curvature about b1 (twist), b2, b3
+members.NAME.bending_strain at | | | statics, motion, parameters | largest in the section, where that has a shape
+members.NAME.bending_stress at | Pa | | statics, motion, parameters | E times that strain
+members.NAME.velocity at | m/s | x y z | motion | of the centre line; not of small members
+members.NAME.angular_velocity at | rad/s | x y z | motion | of the sections; not of small members
+members.NAME.energy | J | | statics, motion, parameters | strain energy of a member that is not rigid
+members.NAME.largest_bending_strain | | | statics, motion | along the whole member
+members.NAME.largest_bending_stress | Pa | | statics, motion | along the whole member
+springs.NAME.angle | rad | | all | of a rotational one, counting turns
+springs.NAME.moment | N m | | all | of a rotational one
+springs.NAME.travel | m | | all | of a translational one
+springs.NAME.force | N | | all | of a translational one
+springs.NAME.stop | N m, N | | statics | of one with a stop: what that adds; zero away from it
+motions.NAME.moment | N m | x y z | statics, motion, parameters | what makes a rotation; a number where that is one
+motions.NAME.force | N | x y z | statics, motion, parameters | what makes a displacement; a number at a driven joint
+contacts.NAME.force | N | x y z | statics | on the member; of a stretch its resultant
+contacts.NAME.at | | | statics | fraction of the length, or [from, to]; null where nothing touches
+contacts.NAME.gap | m | | statics | smallest distance
+contacts.NAME.member | | | statics | which it touches; all four are lists where it touches more than once
+energy.elastic | J | | all | of members and springs
+energy.loads | J | | statics, motion, parameters | from the undeformed scene
+energy.total | J | | statics, motion, parameters | sum of all that there are
+energy.potential | J | | statics, parameters | another name of the total of an equilibrium
+energy.kinetic | J | | motion | of all masses
+momentum.linear | kg m/s | x y z | motion | of all masses
+momentum.angular | kg m²/s | x y z | motion | about the centre of mass
+certificate.residual | | | statics | relative, of all equations
+certificate.stable | | | statics | true, false, "neutral", or "not defined"
+certificate.negative | | | statics | ways out
+certificate.smallest | N | | statics | smallest eigenvalue
+certificate.error_estimate | | | statics | of positions over the size, or of what `certificate.error_of` names
+modes.omega | rad/s | | modes | rising
+modes.rigid | | | modes | motions that nothing resists
+modes.damping | | | modes | damping ratios, where anything damps
+modes.growing | 1/s | | modes | rates of what leaves an unstable equilibrium
+modes.buckling | | | modes | factors at which it buckles, a linear estimate
+modes.error_estimate | | | modes | largest relative one of the frequencies
+stiffness.NAME | N/m and mixed | | parameters | of a free node: force and moment by displacement and rotation
+compliance.NAME | 1/N and mixed | | parameters | of a node: displacement and rotation by force and moment
+"""
+"""The table of the README: name (with ``at`` along members), unit, components, where it is told, meaning."""
+
+APPLIES: dict[str, Callable[[Any, Any], bool]] = {
+    "nodes.NAME.angle": _in_plane,
+    "members.NAME.angle": _in_plane,
+    "reactions.NAME.force": _supported,
+    "reactions.NAME.moment": _supported,
+    "members.NAME.bending_strain": _outlined,
+    "members.NAME.bending_stress": _outlined,
+    "members.NAME.largest_bending_strain": _outlined,
+    "members.NAME.largest_bending_stress": _outlined,
+    "members.NAME.velocity": lambda scene, member: member.type != "small",
+    "members.NAME.angular_velocity": lambda scene, member: member.type != "small",
+    "members.NAME.energy": lambda scene, member: member.type != "rigid",
+    "springs.NAME.angle": lambda scene, spring: spring.type == "rotational",
+    "springs.NAME.moment": lambda scene, spring: spring.type == "rotational",
+    "springs.NAME.travel": lambda scene, spring: spring.type == "translational",
+    "springs.NAME.force": lambda scene, spring: spring.type == "translational",
+    "springs.NAME.stop": lambda scene, spring: spring.stop is not None,
+    "motions.NAME.moment": lambda scene, motion: motion.rotation is not None,
+    "motions.NAME.force": lambda scene, motion: motion.displacement is not None,
+    "stiffness.NAME": lambda scene, node: node.support == "free",
+}
+"""Whether a record has a quantity, where not all of its table have it: (scene, record) -> bool."""
+
+
+def _kind(row: str) -> AnswerKind:
+    name, unit, components, where, meaning = (cell.strip() for cell in row.split(" |"))
+    name, _, at = name.partition(" ")
+    told = EVERYWHERE if where == "all" else tuple(where.split(", "))
+    applies = APPLIES.get(name, lambda scene, record: True)
+    return AnswerKind(name, unit, meaning, told, tuple(components.split()), bool(at), applies)
+
+
+ANSWERS = tuple(_kind(row) for row in TABLE.strip().splitlines())
+"""All quantities, in the order of the table in the README."""
+
+RECORDS = {"reactions": "nodes", "stiffness": "nodes", "compliance": "nodes"}
+"""Tables of the scene whose names stand in a table of the answer, where it has another name."""
+
+SELECTORS = ("at", "step", "time", "crossing", "limit_point", "bifurcation", "flutter_point")
+"""Words that say where and of which answer."""
+
+COUNTED = SELECTORS[3:]
+"""Those that whole numbers follow."""
+
+VALUE = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[^\s.]+"
+"""A number or a word behind a selector; a dot in another place is one of the name, which may have spaces."""
+
+SELECTED = re.compile(rf"(?P<name>.*\S)\s+(?P<key>{'|'.join(SELECTORS)})\s+(?P<value>{VALUE})\s*")
+
+
+@dataclass(frozen=True)
+class AnswerName:
+    """The name of one quantity of an answer, read.
+
+    Attributes
+    ----------
+    kind : AnswerKind
+    record : str
+        Name of the node, member, ... that it is of; empty without one.
+    component : int or None
+        Which component of a vector.
+    selectors : mapping
+        Place along a member (``at``), and of which answer: ``step``, ``time``, ``crossing``, ...
+    """
+
+    kind: AnswerKind
+    record: str = ""
+    component: int | None = None
+    selectors: Mapping[str, float] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+    @property
+    def at(self) -> float | None:
+        """The fraction of the length of a member."""
+        return self.selectors.get("at")
+
+    @property
+    def quantity(self) -> str:
+        """The name without component and selectors: ``members.beam.moment``."""
+        words = [self.record if word == "NAME" else word for word in self.kind.name.split(".")]
+        return ".".join(words)
+
+    @property
+    def bare(self) -> str:
+        """The name without selectors: ``members.beam.moment.2``."""
+        return self.quantity if self.component is None else f"{self.quantity}.{self.component}"
+
+    @property
+    def text(self) -> str:
+        """The whole name: ``members.beam.moment.2 at 0.5``."""
+        return " ".join([self.bare, *(f"{key} {_shortest(value)}" for key, value in self.selectors.items())])
+
+    def of_component(self, component: int) -> AnswerName:
+        """The name of one component of it."""
+        return replace(self, component=component)
+
+
+def _shortest(value: float) -> str:
+    """A number with all its digits, 2.0 as 2."""
+    return f"{value:g}" if float(f"{value:g}") == value else repr(value)
+
+
+def answer_name(text: Any, *where: str) -> AnswerName:
+    """Read a name; whether the scene has such a record says :func:`check_answer`.
+
+    Parameters
+    ----------
+    text : str
+    where : str
+        Where it stands, for messages.
+
+    Raises
+    ------
+    SceneError
+        No quantity has this name.
+
+    >>> answer_name("members.my beam.moment.z at 0.5 step 2").text
+    'members.my beam.moment.2 at 0.5 step 2'
+    """
+    if not isinstance(text, str):
+        raise SceneError(f"found {say(text)}, accepted: a name, as 'nodes.tip.position'", where)
+    try:
+        name, selectors = selected(text.strip())
+        return replace(_named(name), selectors=selectors)
+    except SceneError as error:
+        raise SceneError(error.bare, where) from None
+
+
+def selected(text: str) -> tuple[str, dict[str, float]]:
+    """A name and its selectors, in the order in which they stand.
+
+    Raises
+    ------
+    SceneError
+        No number stands after one of them.
+
+    >>> selected("members.my beam.moment at 0.5 step 2")
+    ('members.my beam.moment', {'at': 0.5, 'step': 2.0})
+    """
+    found: dict[str, float] = {}
+    while match := SELECTED.fullmatch(text):
+        key, value = match["key"], match["value"]
+        try:
+            number = float(int(value)) if key in COUNTED else float(value)
+        except ValueError:
+            raise SceneError(f"found {text!r}, accepted: a number after {key!r}") from None
+        text, found = match["name"], {key: number, **found}
+    return text, found
+
+
+def _named(text: str) -> AnswerName:
+    """A name without selectors."""
+    words = text.split(".")
+    kinds = [kind for kind in ANSWERS if (kind.table or kind.name) == words[0]]
+    if not kinds:
+        raise SceneError(unknown(words[0], dict.fromkeys(kind.table or kind.name for kind in ANSWERS)))
+    first = kinds[0]
+    if not first.table:
+        return AnswerName(first) if len(words) == 1 else _refused(text, first)
+    record = words[1] if first.named and len(words) > 1 else ""
+    rest = words[2:] if first.named else words[1:]
+    if first.key:
+        if not rest or (first.named and not record):
+            return _refused(text, first)
+        by_key = {kind.key: kind for kind in kinds}
+        if rest[0] not in by_key:
+            raise SceneError(unknown(rest[0], by_key))
+        first, rest = by_key[rest[0]], rest[1:]
+    if len(rest) > 1 or (first.named and not record):
+        return _refused(text, first)
+    return AnswerName(first, record, _component(first, rest[0]) if rest else None)
+
+
+def _refused(text: str, kind: AnswerKind) -> AnswerName:
+    words = kind.name.split(".")
+    accepted = ".".join("KEY" if kind.table and word == kind.key else word for word in words)
+    raise SceneError(f"found {text!r}, accepted: {accepted}")
+
+
+def _component(kind: AnswerKind, word: str) -> int:
+    """The number of a component by its number or name."""
+    if word in kind.components:
+        return kind.components.index(word)
+    if word.isdecimal() and int(word) < max(len(kind.components), 1):
+        return int(word)
+    if not kind.components:
+        raise SceneError(f"found the component {word!r}, accepted: none, as {kind.name} is one number")
+    numbers = [str(i) for i in range(len(kind.components))]
+    raise SceneError(f"found the component {word!r}, accepted: {', '.join([*kind.components, *numbers])}")
+
+
+def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
+    """Refuse a name of what the scene does not have, or its answers do not tell.
+
+    Parameters
+    ----------
+    where : str
+        Where it shall be told; empty: in the answers of the analysis of the scene.
+
+    Raises
+    ------
+    SceneError
+        Which names or keys it has.
+    """
+    kind = name.kind
+    told = [where] if where else ANALYSES.get(scene.analysis.type, [STATICS])
+    if not set(told) & set(kind.where):
+        known = [one for one in ANSWERS if set(told) & set(one.where)]
+        same = [f"{one.table}.*.{one.key}" if one.named else one.name for one in known if one.table == kind.table]
+        tables = dict.fromkeys(f"{one.table}.*" if one.table else one.name for one in known)
+        message = f"found {name.quantity!r}, told of {', '.join(kind.where)} only, accepted of {told[0]}: "
+        raise SceneError(message + ", ".join(filter(None, same) if kind.table and same else tables))
+    if not kind.named:
+        return
+    records = getattr(scene, RECORDS.get(kind.table, kind.table))
+    if name.record not in records:
+        raise SceneError(unknown(name.record, records, RECORDS.get(kind.table, kind.table)))
+    record = records[name.record]
+    if kind.table == "reactions" and record.support == "free":
+        raise SceneError(f"node {name.record!r} is free: no ground acts on it")
+    if not kind.applies(scene, record):
+        accepted = [one.key for one in ANSWERS if one.table == kind.table and one.applies(scene, record)]
+        found = f"found {name.quantity!r}"
+        raise SceneError(f"{found}, accepted of {name.record!r}: {', '.join(filter(None, accepted)) or 'none'}")
+
+
+def single_number(motion: Any, key: str) -> bool:
+    """Whether what makes a motion is one number: at a driven joint, and a moment about the axis of a hinge."""
+    return motion.between is not None or (key == "moment" and isinstance(motion.rotation, float))
+
+
+HEAD = "name | unit | components | told of | what it is"
+
+
+def answers_table() -> str:
+    """The quantities as the table of Markdown that stands in the README."""
+    rows = [row.split(" |") for row in (HEAD, *TABLE.strip().splitlines())]
+    cells = [[cell.strip() for cell in row] for row in rows]
+    quoted = [cells[0], ["---"] * 5, *([f"`{name.removesuffix(' at')}`", *rest] for name, *rest in cells[1:])]
+    return "".join(f"| {' | '.join(row)} |\n" for row in quoted)
