@@ -222,11 +222,15 @@ class Equations:
 
     def _closing_pulls(self, lam: Array) -> Array:
         positions = self.model.positions
-        return np.asarray((positions.Z.T @ lam[: len(positions.rows)]).reshape(len(self._first), -1))
+        return np.asarray(
+            (positions.Z.T @ lam[: len(positions.rows)]).reshape(len(self._first), self.model.element.axes)
+        )
 
     def _hanging_pulls(self, loading: Loading) -> Array:
         """What forces on places do that hang on segments."""
-        return np.asarray((self.model.positions.E.T @ loading.force.ravel()).reshape(len(self._first), -1))
+        return np.asarray(
+            (self.model.positions.E.T @ loading.force.ravel()).reshape(len(self._first), self.model.element.axes)
+        )
 
     def displacements(self, state: State, loading: Loading, gained: Array) -> tuple[Array, Array]:
         """Displacements of the places (places * axes,) and closing gaps, from what the chords of elements gained."""
@@ -240,7 +244,7 @@ class Equations:
         """Displacements (places, axes) of the places that terms act upon: unknown or prescribed; of others wrong."""
         positions = self.model.positions
         moved = positions.Y @ state.y + positions.B @ loading.shift
-        return np.asarray(moved.reshape(len(self.model.segments.places), -1))
+        return np.asarray(moved.reshape(len(self.model.segments.places), self.model.element.axes))
 
     def _evaluated(self, state: State, loading: Loading) -> list[list[Array]]:
         """Results of the terms of all groups at a state; to be read before they are evaluated again."""
@@ -339,8 +343,12 @@ class Equations:
         found = self._evaluated(state, loading)[0]
         sides = tables.sides[0]
         spin = found[5].reshape(*sides.shape, self.model.element.axes)
-        maps = positions.E.rows(chosen).full().reshape(len(chosen), len(self._first), -1)[:, self._owner]
-        values = np.einsum("rea,eca->rec", maps, spin).reshape(len(chosen), -1) * tables.weight[sides.ravel()]
+        maps = (
+            positions.E.rows(chosen)
+            .full()
+            .reshape(len(chosen), len(self._first), self.model.element.axes)[:, self._owner]
+        )
+        values = np.einsum("rea,eca->rec", maps, spin).reshape(len(chosen), sides.size) * tables.weight[sides.ravel()]
         jacobian = np.zeros((len(chosen), self.unknowns))
         unknown = tables.unknown[sides.ravel()]
         np.add.at(jacobian.T, unknown[unknown >= 0], values.T[unknown >= 0])

@@ -111,7 +111,8 @@ class Model:
     def terms(self) -> tuple[Group, ...]:
         """All terms of the Lagrangian by their kinds: the elements, then the connections."""
         n, beams = len(self.rotations.turns), self.beams
-        data = np.hstack([beams.stiffness.reshape(n, -1), beams.tangent.reshape(n, -1)])
+        parts = (part.reshape(n, int(np.prod(part.shape[1:]))) for part in (beams.stiffness, beams.tangent))
+        data = np.hstack(list(parts))
         nothing, unnamed = np.zeros((n, 0), np.intp), ("",) * n
         elements = Group(self.element, self.rotations.turns, nothing, data, (), unnamed, unnamed)
         return (elements, *self.connections)

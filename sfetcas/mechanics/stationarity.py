@@ -70,13 +70,13 @@ class Stationarity:
         self.on_places, self._rows = forces.on_places - given.force, []
         self.spin = ca.MX(expressions.axes, 0)
         for number, group in enumerate(model.terms):
-            arguments = [*expressions.arguments(number, q, places, given, near), expressions.multipliers(number, lam)]
-            if number == 0:
-                arguments[3] += ca.reshape(ca.MX(forces.pull) + ca.MX.zeros(given.pull.shape), *arguments[3].shape)
             n, function = len(group.data), by_turning(group.kind) if entries else forces_by_turning(group.kind)
             if not n:
                 self.shares.append((tables.sides[number], ca.MX(tables.sides[number].shape[1], 0)))
                 continue
+            arguments = [*expressions.arguments(number, q, places, given, near), expressions.multipliers(number, lam)]
+            if number == 0:
+                arguments[3] += ca.reshape(ca.MX(forces.pull) + ca.MX.zeros(given.pull.shape), *arguments[3].shape)
             found = expressions.many(function, n)(*arguments)
             gaps, acting, *stiff = found[2:] if entries else found
             self.shares.append((tables.sides[number], acting))

@@ -129,7 +129,9 @@ class Tables:
         self.sides = [self.sides_of(group) for group in model.terms]
         self.labels, first = [np.zeros((len(model.terms[0].data), 0), np.intp)], len(model.positions.rows)
         for group in model.connections:
-            self.labels.append(self.of_rows + first + np.arange(len(group.rows)).reshape(len(group.data), -1))
+            self.labels.append(
+                self.of_rows + first + np.arange(len(group.rows)).reshape(len(group.data), group.kind.sizes[2])
+            )
             first += len(group.rows)
 
     def _number(self) -> None:
@@ -177,9 +179,10 @@ class Tables:
         """Full coordinates of the sides of a group (n, width), -1 of the ground."""
         n = len(group.data)
         turning = self.width * group.turns[:, :, None] + np.arange(self.width)
-        moving = self.place_cells(group.places.ravel()).reshape(n, -1)
-        ground = np.repeat(group.places < 0, self.model.element.axes, axis=1)
-        turning = np.where(group.turns[:, :, None] < 0, -1, turning).reshape(n, -1)
+        axes = self.model.element.axes
+        moving = self.place_cells(group.places.ravel()).reshape(n, axes * group.places.shape[1])
+        ground = np.repeat(group.places < 0, axes, axis=1)
+        turning = np.where(group.turns[:, :, None] < 0, -1, turning).reshape(n, self.width * group.turns.shape[1])
         return np.concatenate([turning, np.where(ground, -1, moving)], axis=1)
 
     # -- loop closures ------------------------------------------------------------------------------
