@@ -110,9 +110,9 @@ class Instant(Posture):
         """
         found, model = super().along(member, at), self.model
         if member in model.members:
-            place, axes = model.segments.place(model.segments.ends[member, 0]), model.element.axes
-            start = self.sample.v[axes * place : axes * (place + 1)]
-            velocity, turning = self.fields.rates(member, np.atleast_1d(at), self.sample.spin, start)
+            places, axes = len(model.segments.places), model.element.axes
+            known = self.sample.v[: axes * places].reshape(places, axes)
+            velocity, turning = self.fields.rates(member, np.atleast_1d(at), self.sample.spin, known)
             found["velocity"] = velocity * model.scales.length / self.mover.time
             found["angular_velocity"] = turning / self.mover.time
         return found

@@ -103,8 +103,11 @@ class Sampler:
                 found.append(_interpolated(self._steps[first : first + around], self._steps[k], t, chosen))
         ends_only, doubt = found[0]
         sample = ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
-        # How it begins is known.
-        return replace(sample, v=self._steps[0].begin.rates[0]) if t == 0.0 else sample
+        if t != 0.0:
+            return sample
+        # How it begins is known; from rest nothing turns.
+        v = self._steps[0].begin.rates[0]
+        return replace(sample, v=v, spin=sample.spin if v.any() else np.zeros_like(sample.spin))
 
 
 def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> tuple[Sample, float]:

@@ -330,13 +330,14 @@ class Fields:
         e, to_x = self._located(member, x)
         return np.asarray(starts[e] + np.einsum("nk,nka->na", to_x, gained[e]))
 
-    def rates(self, member: str, x: Array, spin: Array, start: Array) -> tuple[Array, Array]:
+    def rates(self, member: str, x: Array, spin: Array, known: Array) -> tuple[Array, Array]:
         """Velocity and angular velocity (n, 3) at fractions of the length of a member of elements, dimensionless.
 
         Parameters
         ----------
         spin : angular velocities (rotations, turns)
-        start : velocity of the first end, (axes,)
+        known : velocities of all places, (places, axes)
+            Between them what turns says how velocities differ; what it misses is spread evenly.
         """
         model, part = self.model, self.model.elements_of(member)
         turns, axes = model.rotations.turns[part], model.element.axes
@@ -345,8 +346,14 @@ class Fields:
         about = np.zeros((*turns.shape, 3))
         about[..., 3 - spin.shape[1] :] = spin[turns]
         gained = np.cross(about, _three(self.turned[part]))[..., :axes]
-        starts = start + np.concatenate([np.zeros((1, axes)), np.cumsum(gained.sum(axis=1), axis=0)])
-        velocity = _three(self._summed(member, x, starts, gained))
+        parts, segments, cuts = model.segments.parts, model.segments, model.mesh.cuts[member]
+        mine = [one for one in parts if one.member == member]
+        ends = np.array([mine[0].elements.start, *(one.elements.stop for one in mine)]) - part.start
+        there = known[[segments.place(name) for name in (mine[0].start, *(one.end for one in mine))]]
+        starts = there[0] + np.concatenate([np.zeros((1, axes)), np.cumsum(gained.sum(axis=1), axis=0)])
+        missed = (there - starts[ends]).T
+        spread = np.stack([np.interp(x, cuts[ends], column) for column in missed], axis=-1)
+        velocity = _three(self._summed(member, x, starts, gained) + spread)
         if not model.space:
             return velocity, np.einsum("nj,nja->na", rows, about[e])
         # Of the interpolated quaternion, whatever its length: w = 2 q' conj(q) / q.q.
