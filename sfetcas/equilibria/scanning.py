@@ -134,7 +134,8 @@ def _member(prepared: Prepared) -> str | None:
     """The member of a scene that has one, flexible, with a free end and the other one clamped or hinged."""
     model, scene = prepared.model, prepared.model.scene
     others = scene.contacts or scene.springs or scene.rotating is not None
-    if model.space or others or len(scene.members) != 1 or not model.has_potential or model.connections:
+    joined = any(not group.kind.is_load for group in model.connections)
+    if model.space or others or len(scene.members) != 1 or not model.has_potential or joined:
         return None
     (name, member), *_ = scene.members.items()
     if member.type != "flexible" or set(member.release) != {"rigid"}:

@@ -186,9 +186,12 @@ class Equations:
         self._used = np.flatnonzero(unknown >= 0)
         self._onto, self._share = unknown[self._used], tables.weight[cells[self._used]]
 
-    def _matrix(self, values: list[Array]) -> Array:
-        """Entries of the matrix from those that the terms give, in the order of their tables."""
-        given = np.concatenate([part.ravel() for part in (*values, TIES)])
+    def _matrix(self, values: list[Array], ties: float = 1.0) -> Array:
+        """Entries of the matrix from those that the terms give, in the order of their tables.
+
+        After them come the ties between displacements and loop closures, and the whole diagonal.
+        """
+        given = np.concatenate([*(part.ravel() for part in values), [ties, 0.0]])
         # Without any unknown the sum is of whole numbers.
         found = np.bincount(self._to_entry, weights=given[self._entry] * self._weight, minlength=len(self.row))
         return found.astype(float, copy=False)
@@ -361,7 +364,7 @@ class Equations:
         rest = replace(self.start(nothing), q=at_rest(self.model.element, len(self.model.rotations.kind)))
         found = self._evaluated(rest, nothing)
         pairs = zip(self._terms, found, strict=True)
-        return self._matrix([group.entries([*part[:5], 0.0 * part[5]]) for group, part in pairs])
+        return self._matrix([group.entries([*part[:5], 0.0 * part[5]]) for group, part in pairs], ties=0.0)
 
     def effective(self, state: State, loading: Loading) -> Loading:
         """The loading with what follows the state as it is there."""
@@ -411,10 +414,6 @@ class Equations:
         y = state.y + step[self.turning_unknowns : self.unknowns]
         wound = self.model.winding.moved(state.q, state.wound, turn, q)
         return State(q, y, state.lam + step[self.unknowns :], wound)
-
-
-TIES = np.array([1.0, 0.0])
-"""Entries beside those of the terms: of the ties between displacements and loop closures, and of the whole diagonal."""
 
 
 def at_rest(element: Element, count: int) -> Array:
