@@ -53,6 +53,7 @@ ORDER = [
     "description.scenefile",
     "mechanics",
     "mechanics.elements",
+    "mechanics.stations",
     "mechanics.joints",
     "mechanics.contact_joints",
     "mechanics.carried",
