@@ -160,7 +160,7 @@ class Results:
         self.every = dict(self.places)
         for asked in (result.asked for result in self.results):
             if asked.at is not None:
-                self.every[asked.record] = tuple(dict.fromkeys((*self.every[asked.record], asked.at)))
+                self.every[asked.record] = tuple(dict.fromkeys((*self.every.get(asked.record, ()), asked.at)))
 
     @property
     def size(self) -> int:
