@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from .checks import Answer, Check
+from .description.answers import answer_name
 from .description.records import counted
 from .dynamics.motion import Instant, Trajectory
 from .equilibria.solution import Equilibrium
@@ -28,9 +29,6 @@ WAYS = ("way out", "ways out")
 
 MOST_NODES = 20
 """Nodes in the printed report at most."""
-
-UNITS = {"moment": "N m", "force": "N"}
-"""Of what makes a motion."""
 
 
 def report(solution: Answer, seconds: float) -> None:
@@ -218,16 +216,16 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
             force, moment = step.reaction(name)
             print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
     for name in step.model.scene.springs:
-        state = step.spring(name)
-        travel, *efforts = state.to_dict().items()
-        unit, unit_of_effort = ("rad", "N m") if state.rotational else ("m", "N")
-        told = [
-            f"{travel[0]} {travel[1]:.9g} {unit}",
-            *(f"{key} {value:.9g} {unit_of_effort}" for key, value in efforts),
-        ]
-        print(f"  spring {name}: {', '.join(told)}")
+        found = step.spring(name).to_dict()
+        units = {key: answer_name(f"springs.{name}.{key}").kind.unit for key in found}
+        # What a stop adds is of the kind of the spring.
+        units |= {"stop": units.get("moment", "N")}
+        print(f"  spring {name}: {', '.join(f'{key} {value:.9g} {units[key]}' for key, value in found.items())}")
     for name in step.model.scene.motions:
-        told = [f"{key} {_effort(value)} {UNITS[key]}" for key, value in step.motion(name).items()]
+        told = [
+            f"{key} {_effort(value)} {answer_name(f'motions.{name}.{key}').kind.unit}"
+            for key, value in step.motion(name).items()
+        ]
         print(f"  motion {name}: {', '.join(told)}")
     for name, entry in step.contacts.items():
         _report_contact(name, entry)

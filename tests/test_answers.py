@@ -295,6 +295,26 @@ def test_a_free_rod_turns_evenly_and_moves_as_a_rigid_body(dimension, integrator
     assert value_of(motion.last, "members.m.velocity.y at 0") == pytest.approx(motion.last.velocity("A")[1], abs=1e-12)
 
 
+@pytest.mark.parametrize("integrator", ["radau-3", "idas"])
+@pytest.mark.parametrize("dimension", ["plane", "space"])
+def test_a_driven_hinge_turns_at_the_rate_of_its_history(dimension, integrator):
+    finely = {"accuracy": 1e-4} if integrator == "idas" else {"step": 0.01}
+    smooth = {"t": [0, 1], "polynomial": [[0, 0, 0, 10, -15, 6]]}
+    scene = beam(
+        TURNED,
+        dimension,
+        nodes={"A": {"position": [0, 0, 0], "support": "hinge"}, "B": {"position": [2, 0, 0]}},
+        members={"m": {"nodes": ["A", "B"], "section": "s", "element": "SFET3", "elements": 2}},
+        histories={"h": smooth},
+        motions={"drive": {"node": "A", "rotation": 0.4, "history": "h"}},
+        analysis={"type": "dynamic", "end": 0.6, "output": 0.1, "integrator": integrator, **finely},
+    )
+    for step in solve(scene).steps:
+        rate = 0.4 * 30.0 * step.time**2 * (1.0 - step.time) ** 2
+        # The angle is prescribed at the steps, its rate by a polynomial of degree 6 through these: 1e-2^6.
+        assert step.angular_velocity("A") == pytest.approx([0, 0, rate], abs=1e-9)
+
+
 def test_velocities_along_a_bent_beam_are_those_of_its_positions():
     """A whipping beam in space: differences of positions over the times; ends are those of the nodes."""
     spin = {"nodes": ["A", "B"], "section": "s", "spin": [0, 1.0, 2.0], "element": "SFET3", "elements": 3}

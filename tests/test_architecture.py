@@ -57,6 +57,7 @@ ORDER = [
     "mechanics",
     "mechanics.terms",
     "mechanics.elements",
+    "mechanics.stations",
     "mechanics.joints",
     "mechanics.contact_joints",
     "mechanics.carried",

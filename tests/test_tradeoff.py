@@ -385,7 +385,7 @@ def test_command_line_prints_the_short_table_and_writes_all(few, tmp_path, capsy
         (["--json", "no/such/out.json"], "no/such/out.json"),
         (["--json", "same.out", "--csv", "same.out"], "found twice, accepted: different files"),
         (["--repeats", "-3"], "repeats: found -3"),
-        (["--accuracy-of", "nodes.Q.position"], "found node 'Q'"),
+        (["--accuracy-of", "nodes.Q.position"], "found 'Q', accepted"),
     ],
 )
 def test_bad_options_are_told_before_anything_is_written(options, sentence, tmp_path, capsys, monkeypatch):

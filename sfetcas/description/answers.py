@@ -32,6 +32,7 @@ __all__ = [
     "answer_name",
     "answers_table",
     "check_answer",
+    "outlined",
     "selected",
     "single_number",
 ]
@@ -108,8 +109,8 @@ def _supported(scene: Any, record: Any) -> bool:
     return bool(record.support != "free")
 
 
-def _outlined(scene: Any, record: Any) -> bool:
-    """A flexible member whose section has a shape, so that its fibres are known."""
+def outlined(scene: Any, record: Any) -> bool:
+    """Whether a member is flexible and its section has a shape, so that its fibres are known."""
     return record.type == "flexible" and scene.sections[str(record.section)].shape is not None
 
 
@@ -175,10 +176,10 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
     "members.NAME.angle": _in_plane,
     "reactions.NAME.force": _supported,
     "reactions.NAME.moment": _supported,
-    "members.NAME.bending_strain": _outlined,
-    "members.NAME.bending_stress": _outlined,
-    "members.NAME.largest_bending_strain": _outlined,
-    "members.NAME.largest_bending_stress": _outlined,
+    "members.NAME.bending_strain": outlined,
+    "members.NAME.bending_stress": outlined,
+    "members.NAME.largest_bending_strain": outlined,
+    "members.NAME.largest_bending_stress": outlined,
     "members.NAME.velocity": lambda scene, member: member.type != "small",
     "members.NAME.angular_velocity": lambda scene, member: member.type != "small",
     "members.NAME.energy": lambda scene, member: member.type != "rigid",
@@ -240,9 +241,6 @@ class AnswerName:
     component: int | None = None
     selectors: Mapping[str, float] = field(default_factory=dict)
 
-    def __hash__(self) -> int:
-        return hash(self.text)
-
     @property
     def at(self) -> float | None:
         """The fraction of the length of a member."""
@@ -263,10 +261,6 @@ class AnswerName:
     def text(self) -> str:
         """The whole name: ``members.beam.moment.2 at 0.5``."""
         return " ".join([self.bare, *(f"{key} {_shortest(value)}" for key, value in self.selectors.items())])
-
-    def of_component(self, component: int) -> AnswerName:
-        """The name of one component of it."""
-        return replace(self, component=component)
 
 
 def _shortest(value: float) -> str:

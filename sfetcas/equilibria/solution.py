@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..contact.touches import answers
-from ..description.answers import STATICS
+from ..description.answers import STATICS, outlined
 from ..description.records import counted, nearest, plain
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
@@ -142,15 +142,9 @@ class Posture:
         found["quaternion"] = self._as_quaternions(rotation)
         if not self.model.space:
             found["angle"] = rotation[:, 0]
-        if self._outlined(name):
+        if outlined(self.model.scene, self.model.scene.members[name]):
             found["bending_strain"], found["bending_stress"] = self.fields.bending(name, places, found["curvature"])
         return found
-
-    def _outlined(self, member: str) -> bool:
-        """Whether the fibres of a member are known."""
-        scene = self.model.scene
-        record = scene.members[member]
-        return record.type == "flexible" and scene.sections[str(record.section)].shape is not None
 
     def places(self, member: str) -> Array:
         """Fractions of the length that the answer lists: nodes of the elements, or fewer."""
@@ -212,7 +206,7 @@ class Posture:
         found: dict[str, Any] = {}
         if self.model.scene.members[name].type != "rigid":
             found["energy"] = self.fields.strain_energy(name)
-        if self._outlined(name):
+        if outlined(self.model.scene, self.model.scene.members[name]):
             largest = self.fields.largest_bending(name)
             found |= zip(("largest_bending_strain", "largest_bending_stress"), largest, strict=True)
         return found

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..description.answers import single_number
 from ..description.obstacles import obstacle
-from ..mathematics import curves, interpolation, quaternion
+from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.keeping import kept
 from ..mathematics.kernels import Batch
@@ -25,6 +25,7 @@ from .equations import Equations, State, turned_tangents
 from .loading import Loading
 from .mesh import Touch
 from .singles import fibre_strain
+from .stations import Stations
 from .terms import energies_of
 
 __all__ = ["Fields", "rotations_along", "transferred"]
@@ -193,13 +194,12 @@ class Fields:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
         model = self.model
         part = model.elements_of(member)
-        e, to_x = self._located(member, x)
-        turned, spread = self.turned[part], self._loading.spread[part]
+        at, pull = self._stations(member, x), self._pull[part]
+        e, spread = at.elements, self._loading.spread[part]
         position, moments = self.positions(member, x), self._element_moments(member)
-        force = _three(self._start_forces(part)[e] - np.einsum("nk,nka->na", to_x, spread[e]))
+        force = _three(np.einsum("nk,nka->na", at.spread, spread[e]) - pull[e, 0])
         # m' = -r' x n; the pull at the points is minus the force there.
-        couple = _cross(turned, self._pull[part])
-        moment = moments[e] + np.einsum("nk,nka->na", to_x, couple[e])
+        moment = _summed(at, moments, _cross(self.turned[part], pull))
         rotation = rotations_along(model, self.state.q, member, x)
         for touch in model.mesh.touches if pressed else ():
             if touch.member == member and touch.to is not None:
@@ -243,8 +243,7 @@ class Fields:
         spread, turned = self._loading.spread[part], self.turned[part]
         pushed = np.einsum("eka,eka->ek", spread, turned) / np.linalg.norm(turned, axis=2)
         sums = np.concatenate([[0.0], np.cumsum(pushed.sum(axis=1))])
-        e, to_x = self._located(touch.member, x)
-        gained = sums[e] - sums[first] + np.einsum("nk,nk->n", to_x, pushed[e])
+        gained = _summed(self._stations(touch.member, x), sums[:, None], pushed[..., None])[:, 0] - sums[first]
         if first == 0:
             begin = float(_three(self._start_forces(part)[0]) @ self._tangent_at(touch.member, 0.0))
         else:
@@ -292,8 +291,7 @@ class Fields:
         lost[np.isin(cuts[1:-1], [at for t in model.mesh.touches if t.member == member for at in t.places])] = 0.0
         points = np.where(x[:, None] >= cuts[None, 1:-1], 1.0, 0.0) @ lost
         sums = np.concatenate([np.zeros((1, element.axes)), np.cumsum(spread.sum(axis=1), axis=0)])
-        e, to_x = self._located(member, x)
-        return _three(sums[e] + points + np.einsum("nk,nka->na", to_x, spread[e]))
+        return _three(points + _summed(self._stations(member, x), sums, spread))
 
     def stiffness(self, member: str, x: float) -> float:
         """Smallest bending stiffness of the section at a place, dimensionless."""
@@ -322,13 +320,8 @@ class Fields:
         model = self.model
         part = model.elements_of(member)
         gained = self.turned[part] - model.beams.tangent[part]
-        moved = _three(self._summed(member, x, self._element_starts(member), gained))
+        moved = _three(_summed(self._stations(member, x), self._element_starts(member), gained))
         return model.scene.center_lines[member].positions(x) + moved * model.scales.length
-
-    def _summed(self, member: str, x: Array, starts: Array, gained: Array) -> Array:
-        """What begins at elements and is gained at the integration points (elements, points, axes), at places."""
-        e, to_x = self._located(member, x)
-        return np.asarray(starts[e] + np.einsum("nk,nka->na", to_x, gained[e]))
 
     def rates(self, member: str, x: Array, spin: Array, known: Array) -> tuple[Array, Array]:
         """Velocity and angular velocity (n, 3) at fractions of the length of a member of elements, dimensionless.
@@ -341,8 +334,8 @@ class Fields:
         """
         model, part = self.model, self.model.elements_of(member)
         turns, axes = model.rotations.turns[part], model.element.axes
-        e, xi = _located(model.mesh.cuts[member], x)
-        rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
+        at = self._stations(member, x)
+        e, rows = at.elements, at.nodal
         about = np.zeros((*turns.shape, 3))
         about[..., 3 - spin.shape[1] :] = spin[turns]
         gained = np.cross(about, _three(self.turned[part]))[..., :axes]
@@ -353,7 +346,7 @@ class Fields:
         starts = there[0] + np.concatenate([np.zeros((1, axes)), np.cumsum(gained.sum(axis=1), axis=0)])
         missed = (there - starts[ends]).T
         spread = np.stack([np.interp(x, cuts[ends], column) for column in missed], axis=-1)
-        velocity = _three(self._summed(member, x, starts, gained) + spread)
+        velocity = _three(_summed(at, starts, gained) + spread)
         if not model.space:
             return velocity, np.einsum("nj,nja->na", rows, about[e])
         # Of the interpolated quaternion, whatever its length: w = 2 q' conj(q) / q.q.
@@ -363,12 +356,8 @@ class Fields:
         turned = 2.0 * quaternion.multiply(change, quaternion.conjugate(here))[:, 1:]
         return velocity, turned / np.einsum("nc,nc->n", here, here)[:, None]
 
-    def _located(self, member: str, x: Array) -> tuple[Any, Array]:
-        """Element of each fraction of a member's length, and weights that integrate in it up to there."""
-        element = self.model.element
-        e, xi = _located(self.model.mesh.cuts[member], x)
-        rows = _per_place(xi, lambda places: interpolation.integration(element.points, places))
-        return e, rows / element.weights
+    def _stations(self, member: str, x: Array) -> Stations:
+        return Stations(self.model.element, self.model.mesh.cuts[member], x)
 
     def _curvature(self, touch: Touch) -> float:
         """Signed curvature that an obstacle gives to a stretch, 1/m."""
@@ -392,17 +381,16 @@ class Fields:
 
     def _pressed_in_space(self, touch: Touch, x: Array) -> tuple[Array, Array]:
         """The same on a plane in space: what bends about the axis in the plane across the member."""
-        model, element = self.model, self.model.element
+        model = self.model
         normal = np.asarray(model.scene.contacts[touch.contact].normal, dtype=float)
         cuts, part = model.mesh.cuts[touch.member], model.elements_of(touch.member)
         # At the border of the stretch its own element says how it is bent.
         middle = np.clip(x, np.nextafter(touch.at, 1.0), np.nextafter(float(touch.to or 1.0), 0.0))
-        e, xi = _located(cuts, middle)
-        nodal = self.q[model.rotations.turns[part]][e]
-        rows = _per_place(xi, lambda places: interpolation.differentiation(element.nodes, places))
+        at = Stations(model.element, cuts, middle)
+        e, nodal = at.elements, self.q[model.rotations.turns[part]][at.elements]
         rotation = rotations_along(model, self.state.q, touch.member, middle)
         lengths = model.beams.weight[part].sum(axis=1)[e] * model.scales.length
-        slope = np.einsum("nj,njc->nc", rows, nodal) / lengths[:, None]
+        slope = np.einsum("nj,njc->nc", at.slopes, nodal) / lengths[:, None]
         spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
         line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
         strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
@@ -551,22 +539,9 @@ class Fields:
         return np.asarray(moments)
 
 
-def _located(cuts: Array, x: Array) -> tuple[Any, Array]:
-    """Element of each fraction, and the place in it."""
-    e = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
-    return e, (x - cuts[e]) / (cuts[e + 1] - cuts[e])
-
-
-def _per_place(xi: Array, rows: Any) -> Array:
-    """Rows of a matrix for places that, where they are many, often repeat."""
-    if len(xi) < FEW:
-        return np.asarray(rows(xi))
-    places, inverse = np.unique(xi, return_inverse=True)
-    return np.asarray(rows(places)[inverse])
-
-
-FEW = 8
-"""Places up to which looking for equal ones costs more than it saves."""
+def _summed(at: Stations, starts: Array, gained: Array) -> Array:
+    """What begins at elements (elements, axes) and is gained at their points (elements, points, axes), at stations."""
+    return np.asarray(starts[at.elements] + np.einsum("nk,nka->na", at.gained, gained[at.elements]))
 
 
 PARTS = 16
@@ -590,10 +565,9 @@ def _cross(a: Array, b: Array) -> Array:
 
 def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
     """Rotations at fractions x of a member, (n, 4) unit or (n, 1)."""
-    e, xi = _located(model.mesh.cuts[member], x)
+    at = Stations(model.element, model.mesh.cuts[member], x)
     nodal = q[model.rotations.turns[model.elements_of(member)]]
-    rows = _per_place(xi, lambda places: interpolation.evaluation(model.element.nodes, places))
-    values = np.einsum("nj,njc->nc", rows, nodal[e])
+    values = np.einsum("nj,njc->nc", at.nodal, nodal[at.elements])
     return values / np.linalg.norm(values, axis=-1, keepdims=True) if model.space else values
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, check_answer, single_number
 from ..description.records import unknown
 from ..errors import SceneError
-from ..mathematics import interpolation, quaternion
+from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from ..mathematics.constants import constant, times
 from ..mechanics.balance import guide, pinned_turns
@@ -26,6 +26,7 @@ from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
 from ..mechanics.singles import fibre_strain, turned_vector
 from ..mechanics.stationarity import Stationarity
+from ..mechanics.stations import Stations
 from ..mechanics.terms import GROUND, answers_of
 from ..solvers.program import Program
 
@@ -161,7 +162,7 @@ class Results:
         self.every = dict(self.places)
         for asked in (result.asked for result in self.results):
             if asked.at is not None:
-                self.every[asked.record] = tuple(dict.fromkeys((*self.every[asked.record], asked.at)))
+                self.every[asked.record] = tuple(dict.fromkeys((*self.every.get(asked.record, ()), asked.at)))
 
     @property
     def size(self) -> int:
@@ -408,14 +409,8 @@ class _Told:
 
     # -- members ------------------------------------------------------------------------------------
 
-    def _located(self, member: str) -> tuple[Array, Array, Array]:
-        """Elements of the places of a member, places within them, and weights that integrate up to there."""
-        model, x = self._model, np.array(self._results.every[member])
-        cuts, element = model.mesh.cuts[member], model.element
-        e = np.clip(np.searchsorted(cuts, x, side="right") - 1, 0, len(cuts) - 2)
-        xi = (x - cuts[e]) / (cuts[e + 1] - cuts[e])
-        to_x = np.concatenate([interpolation.integration(element.points, np.array([one])) for one in xi])
-        return e, xi, to_x / element.weights
+    def _stations(self, member: str) -> Stations:
+        return Stations(self._model.element, self._model.mesh.cuts[member], np.array(self._results.every[member]))
 
     def _points(self, values: ca.MX, member: str, weights: Array) -> ca.MX:
         """Sums over the points of the elements of a member, (axes, places), by weights (places, points of all)."""
@@ -425,18 +420,15 @@ class _Told:
 
     def _up_to(self, member: str) -> Array:
         """Weights that integrate from the start of a member to its places, (places, points of all elements)."""
-        e, _, to_x = self._located(member)
-        n = self._expressions.points
-        part = self._model.elements_of(member)
-        weights = np.zeros((len(e), (part.stop - part.start) * n))
-        for row, (element, own) in enumerate(zip(e, to_x, strict=True)):
+        at, n = self._stations(member), self._expressions.points
+        weights = self._within(member, at.gained)
+        for row, element in enumerate(at.elements.tolist()):
             weights[row, : element * n] = 1.0
-            weights[row, element * n : (element + 1) * n] = own
         return weights
 
     def _within(self, member: str, rows: Array) -> Array:
         """Weights of the points of the element of each place, (places, points of all elements)."""
-        e, _, _ = self._located(member)
+        e = self._stations(member).elements
         n, part = self._expressions.points, self._model.elements_of(member)
         weights = np.zeros((len(e), (part.stop - part.start) * n))
         for row, (element, own) in enumerate(zip(e, rows, strict=True)):
@@ -483,11 +475,9 @@ class _Told:
         return (strain * sections[15, :] if key == "bending_stress" else strain).T
 
     def _rotations(self, member: str) -> ca.MX:
-        model, element = self._model, self._model.element
-        e, xi, _ = self._located(member)
-        rows = np.concatenate([interpolation.evaluation(element.nodes, np.array([one])) for one in xi])
-        turns = model.rotations.turns[model.elements_of(member)][e]
-        found = [ca.mtimes(self._q[:, t.tolist()], ca.DM(row)) for t, row in zip(turns, rows, strict=True)]
+        model, at = self._model, self._stations(member)
+        turns = model.rotations.turns[model.elements_of(member)][at.elements]
+        found = [ca.mtimes(self._q[:, t.tolist()], ca.DM(row)) for t, row in zip(turns, at.nodal, strict=True)]
         found = [one / ca.norm_2(one) for one in found] if model.space else found
         return ca.horzcat(*found).T
 
@@ -499,29 +489,22 @@ class _Told:
 
     def _force(self, member: str) -> ca.MX:
         """Internal force at the places, (3, places)."""
-        element = self._model.element
-        e, _, to_x = self._located(member)
+        at, n = self._stations(member), self._expressions.points
         spread, pull = self._spread
-        first = np.zeros(self._expressions.points)
-        first[0] = 1.0
-        # The pull at the first point is minus the force there; the spread load is distributed as in its adjoint.
-        beyond = element.to_points[:, 0] / element.weights[0]
-        from_spread = self._points(spread, member, self._within(member, 1.0 - beyond - to_x))
-        return self._three(from_spread - self._points(pull, member, self._within(member, np.tile(first, (len(e), 1)))))
+        first = (n * (self._model.elements_of(member).start + at.elements)).tolist()
+        return self._three(self._points(spread, member, self._within(member, at.spread)) - pull[:, first])
 
     def _moment(self, member: str) -> ca.MX:
         """Section moment at the places, (3, places): that at the first node of the element, and what forces add."""
         expressions, model = self._expressions, self._model
-        e, _, to_x = self._located(member)
-        width = expressions.points * expressions.turns
-        starts = (model.elements_of(member).start + e) * width
+        at = self._stations(member)
+        own = self._found.moments(expressions.points * (model.elements_of(member).start + at.elements))
         pull = self._spread[1]
-        own = self._found.moments(starts // expressions.turns)
         if model.space:
             crossed = ca.cross(self._tangents, pull, 1)
         else:
             crossed = self._tangents[0, :] * pull[1, :] - self._tangents[1, :] * pull[0, :]
-        gained = self._points(crossed, member, self._within(member, to_x)) - own
+        gained = self._points(crossed, member, self._within(member, at.gained)) - own
         return gained if model.space else ca.vertcat(ca.MX.zeros(2, gained.shape[1]), gained)
 
     # -- springs ------------------------------------------------------------------------------------
