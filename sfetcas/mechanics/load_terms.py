@@ -71,6 +71,10 @@ class Follower(Term):
         nothing = [ca.SX(0)] * self.turns
         return [*nothing, *[-f for f in self.forth(q[0], ca.vertsplit(load))]]
 
+    def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Minus the turned force times the displacement."""
+        return -ca.dot(ca.vertcat(*self.forth(q[0], ca.vertsplit(load))), ca.vertcat(*u[0]))
+
 
 @final
 @dataclass(frozen=True)
@@ -102,21 +106,35 @@ class FollowingSpread(Term):
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Moments of what acts beyond each node, and minus the sum of the forces on the place."""
-        nodes, weights = interpolation.lobatto(self.nodes)
-        beyond = interpolation.integration(nodes, nodes)
-        n = self.axes
+        tangents, forces, carried = self._now(q, data, load)
+        moments = []
+        for tangent, force in zip(tangents, carried, strict=True):
+            levers = ca.cross(tangent, force) if self.space else tangent[0] * force[1] - tangent[1] * force[0]
+            moments += [-m for m in ca.vertsplit(levers)]
+        total = sum(forces[1:], forces[0])
+        return [*moments, *[-f for f in ca.vertsplit(total)]]
+
+    def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Minus the turned forces times the displacements of the nodes."""
+        tangents, forces, carried = self._now(q, data, load)
+        total = -ca.dot(sum(forces[1:], forces[0]), ca.vertcat(*u[0]))
+        for k, (tangent, force) in enumerate(zip(tangents, carried, strict=True)):
+            total -= ca.dot(force, tangent - data[self.axes * k : self.axes * (k + 1)])
+        return total
+
+    def _now(self, q: list[Side], data: ca.SX, load: ca.SX) -> tuple[list[ca.SX], list[ca.SX], list[ca.SX]]:
+        """Turned tangents and forces, and the share of the forces beyond each node that its tangent carries."""
+        (nodes, weights), n = interpolation.lobatto(self.nodes), self.axes
+        beyond = interpolation.integration(nodes, nodes) / weights
         tangents, forces = (
             [ca.vertcat(*self.forth(side, ca.vertsplit(part[n * k : n * k + n]))) for k, side in enumerate(q)]
             for part in (data, load)
         )
-        moments = []
-        for k, tangent in enumerate(tangents):
-            carried = sum((float(beyond[j, k]) * force for j, force in enumerate(forces)), ca.SX.zeros(n))
-            arm = tangent / float(weights[k])
-            levers = ca.cross(arm, carried) if self.space else arm[0] * carried[1] - arm[1] * carried[0]
-            moments += [-m for m in ca.vertsplit(levers)]
-        total = sum(forces[1:], forces[0])
-        return [*moments, *[-f for f in ca.vertsplit(total)]]
+        carried = [
+            sum((float(beyond[j, k]) * force for j, force in enumerate(forces)), ca.SX.zeros(n))
+            for k in range(self.nodes)
+        ]
+        return tangents, forces, carried
 
 
 @final

@@ -113,6 +113,10 @@ class Term(Components, abc.ABC):
         """
         return []
 
+    def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
+        """Minus the present generalised forces times the displacements: told with the energy, never differentiated."""
+        return ca.SX(0)
+
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """What the answer tells of it, in the order of :attr:`answers`, dimensionless; ``lam`` of its rows."""
         return []
@@ -283,6 +287,11 @@ def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
     return arguments, energy, rows, forces
 
 
+def _work(kind: Term, arguments: list[ca.SX]) -> ca.SX:
+    q, u = ([ca.vertsplit(part[:, i]) for i in range(part.shape[1])] for part in arguments[:2])
+    return kind.work(q, u, arguments[2], arguments[3])
+
+
 @functools.cache
 def by_turning(kind: Term) -> ca.Function:
     """(q, u, data, load, lam) -> energy, its share without loads, rows, gradient, stiffness, and the rows' derivative.
@@ -322,7 +331,7 @@ def _by_turning(kind: Term) -> ca.Function:
         gradient += forces
         stiffness += ca.mtimes(ca.jacobian(forces, x), basis) + _halves(forces, q.shape[1], kind.space)
     results = [
-        energy,
+        energy + _work(kind, arguments),
         ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape)),
         ca.densify(rows),
         ca.densify(gradient),
@@ -381,10 +390,10 @@ def _curvatures(kind: Term) -> ca.Function:
 @functools.cache
 def energies_of(kind: Term) -> ca.Function:
     """(q, u, data, load) -> energy of a kind, and its share without loads."""
-    (q, u, data, load, _), energy, _, _ = _said(kind)
-    stored = ca.substitute(energy, load, ca.SX.zeros(load.shape))
-    name, names = f"energies_{name_of(kind)}", ["energy", "stored"]
-    return ca.Function(name, [q, u, data, load], [energy, stored], [*ARGUMENTS[:4]], names, {"cse": True})
+    arguments, energy, _, _ = _said(kind)
+    stored = ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape))
+    results, names = [energy + _work(kind, arguments), stored], ["energy", "stored"]
+    return ca.Function(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names, {"cse": True})
 
 
 @functools.cache
