@@ -22,7 +22,7 @@ from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
-from .joints import Connection, LineSpring, Spring, TurnSpring
+from .joints import Connection, Spring, TurnSpring
 from .observed import Axes, Gap, SpringAngle, Strains, Travel
 
 __all__ = ["Masses", "Observables", "masses_of"]
@@ -286,7 +286,7 @@ class _Weigher:
         for number, group in enumerate(self.model.connections):
             kind, axes = group.kind, self.axes
             units = self.model.scales.moment * time, self.model.scales.force / self.model.scales.length * time
-            if not isinstance(kind, (TurnSpring, Spring, LineSpring)):
+            if kind.table != "springs":
                 continue
             damping = np.array([self.scene.springs[name].damping for name in group.names])
             chosen = np.flatnonzero(damping)
