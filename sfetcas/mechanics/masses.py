@@ -22,7 +22,7 @@ from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
-from .joints import LineSpring, Spring, TurnSpring
+from .joints import Spring, TurnSpring
 from .observed import Axes, Gap, SpringAngle, Strains, Travel
 from .terms import Term
 
@@ -41,7 +41,7 @@ class Observables:
     data : ndarray (n, data)
     mass, damping : ndarray (n, rows)
     spring : int or None
-        The group of connections whose angles these are, in which the counted turns stand.
+        The group of terms whose angles these are, in which the counted turns stand.
     numbers : ndarray (n,) or None
         Which of that group.
     at : ndarray (n, 2) or None
@@ -284,10 +284,10 @@ class _Weigher:
     def _springs(self, time: float) -> list[Observables]:
         """Dampers beside springs."""
         found = []
-        for number, group in enumerate(self.model.connections):
+        for number, group in enumerate(self.model.terms):
             kind, axes = group.kind, self.axes
             units = self.model.scales.moment * time, self.model.scales.force / self.model.scales.length * time
-            if not isinstance(kind, (TurnSpring, Spring, LineSpring)):
+            if kind.table != "springs":
                 continue
             damping = np.array([self.scene.springs[name].damping for name in group.names])
             chosen = np.flatnonzero(damping)
