@@ -82,6 +82,7 @@ ORDER = [
     "mechanics.spinning",
     "mechanics.model",
     "mechanics.tables",
+    "mechanics.batches",
     "mechanics.equations",
     "mechanics.expressions",
     "mechanics.stationarity",

@@ -8,14 +8,13 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.constants import mapped
-from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
+from ..mechanics.batches import GroupBatch
 from ..mechanics.body_points import BodyPoints
 from ..mechanics.equations import Equations, State
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Loading
-from ..mechanics.masses import Observables
 from ..mechanics.observed import Axes
 from ..mechanics.terms import by_turning
 from .stages import StageEquations
@@ -43,7 +42,9 @@ class Inertia:
         for name in model.members:
             self._place(name)
         self._rest /= model.scales.length
-        self._batches = [Batch(by_turning(group.kind), len(group.data)) for group in masses.observables]
+        self._batches = [
+            GroupBatch(model, group, by_turning(group.kind), system.angles_of(group)) for group in masses.observables
+        ]
 
     def _place(self, name: str) -> None:
         """Where the places and inner nodes of a member are in the undeformed scene."""
@@ -133,9 +134,9 @@ class Inertia:
         pull, carried_to = carried(spread, model.segments, model.element)
         moment, own = np.zeros_like(loading.moment), on_places.copy()
         couple, jump = loading.couple.copy(), loading.jump.copy()
-        places = equations.places(state, loading)
+        places = equations.places(state, loading).reshape(system.places, system.axes)
         for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
-            shares = -self._shares(equations, state, places, group, batch, forces[begin:end])
+            shares = -batch(state.q, places, state.wound, None, forces[begin:end])[3]
             width = system.turns
             for side, turns in enumerate(group.turns.T):
                 used = turns >= 0
@@ -160,23 +161,3 @@ class Inertia:
             couple=couple,
             jump=jump,
         )
-
-    def _shares(
-        self, equations: Equations, state: State, places: Array, group: Observables, batch: Batch, forces: Array
-    ) -> Array:
-        """Moments on the rotations and forces on the places of a group, (n, width)."""
-        model, n = self._model, len(group.data)
-        rest = np.array([1.0, 0.0, 0.0, 0.0]) if model.space else np.zeros(1)
-        q = np.vstack([state.q, rest])
-        u = np.vstack([places.reshape(-1, model.element.axes), np.zeros((1, model.element.axes))])
-        data = group.data
-        if group.spring is not None and model.winding.parts[group.spring] is not None:
-            part = model.winding.parts[group.spring]
-            assert part is not None
-            data = data.copy()
-            data[:, -1] = model.winding.angles(state.q, state.wound)[part][group.numbers]
-        for i, values in enumerate((q[group.turns], u[group.places], data)):
-            if values.size:
-                batch.set(i, values)
-        batch.set(4, forces.reshape(n, -1))
-        return np.asarray(batch()[3].copy())

@@ -20,10 +20,10 @@ import numpy as np
 
 from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.constants import sparse
-from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap, SparseSolver, places_of
 from ..mathematics.quaternion import cross_matrix
 from ..mathematics.spectra import largest
+from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, Point, State, turned_tangents
 from ..mechanics.loading import Loading
 from ..mechanics.masses import masses_of
@@ -181,16 +181,10 @@ class SmallMotion:
         parts = [ca.mtimes(system.by_place, onto)]
         if system.elements:
             parts[0] += ca.mtimes(system.by_tangent, tangents)
-        places = np.vstack([self._nodal, np.zeros((1, axes))])
-        q = np.vstack([q, [[1.0, 0.0, 0.0, 0.0]] if model.space else [[0.0]]])
         for group, sides in zip(self.masses.observables, system.observed, strict=True):
             rows, n = group.kind.sizes[2], len(group.data)
-            batch = Batch(by_turning(group.kind), n)
-            given = (q[group.turns], places[group.places], group.data, None, np.zeros((n, rows)))
-            for i, values in enumerate(given):
-                if values is not None and values.size:
-                    batch.set(i, values)
-            slopes = batch()[5].reshape(n, sides.shape[1], rows)
+            batch = GroupBatch(model, group, by_turning(group.kind), system.angles_of(group))
+            slopes = batch(q, self._nodal, self.state.wound)[5].reshape(n, sides.shape[1], rows)
             r = np.broadcast_to(np.arange(n * rows).reshape(n, 1, rows), slopes.shape)
             c = np.broadcast_to(sides[:, :, None], slopes.shape)
             used = c >= 0

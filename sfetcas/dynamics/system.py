@@ -207,14 +207,15 @@ class System(Expressions):
         """All quantities X of rotations and displacements."""
         return self.quantities(q, self.displacements(q, y, given), given, near)
 
+    def angles_of(self, group: Observables) -> Index | None:
+        """Which counted angles stand last in the data of observables; None where none does."""
+        part = None if group.spring is None else self.model.winding.parts[group.spring]
+        return None if part is None or group.numbers is None else part.start + group.numbers
+
     def seen_data(self, group: Observables, near: ca.MX) -> ca.MX:
         """Data of observables; the last of those that count turns is the value near which they do."""
-        data = ca.MX(ca.DM(group.data.T))
-        part = None if group.spring is None else self.model.winding.parts[group.spring]
-        if part is None:
-            return data
-        counted = [int(i) for i in part.start + group.numbers]
-        return ca.vertcat(data[:-1, :], near[counted].T)
+        data, counted = ca.MX(ca.DM(group.data.T)), self.angles_of(group)
+        return data if counted is None else ca.vertcat(data[:-1, :], near[counted.tolist()].T)
 
     # -- one Newton iteration ---------------------------------------------------------------------------
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
 from ..mathematics.keeping import kept
-from ..mathematics.kernels import Batch
 from ..mathematics.linear import SparseMap, smallest
+from .batches import GroupBatch
 from .connections import connections_of
 from .equations import Equations, State
 from .loading import Loading
@@ -309,19 +309,11 @@ class Balance:
     @kept(GROUPS)
     def _answers(self, number: int) -> Array:
         """What all connections of a group tell, (n, answers), dimensionless."""
-        model, state, axes = self.model, self._state, self.model.element.axes
-        group, n = model.connections[number], len(model.connections[number].names)
+        model, state, group = self.model, self._state, self.model.connections[number]
         first = len(model.positions.rows) + sum(len(other.rows) for other in model.connections[:number])
-        data, part = group.data.copy(), model.winding.parts[number + 1]
-        if part is not None:
-            data[:, -1] = model.winding.angles(state.q, state.wound)[part]
-        q = np.vstack([state.q, [[1.0, 0.0, 0.0, 0.0]] if model.space else [[0.0]]])
-        u = np.vstack([self._places, np.zeros((1, axes))])
-        batch, lam = Batch(answers_of(group.kind), n), state.lam[first : first + len(group.rows)]
-        for i, values in enumerate((q[group.turns], u[group.places], data, self._loading.loads[number], lam)):
-            if values.size:
-                batch.set(i, values)
-        return batch()[0].copy()
+        batch = GroupBatch(model, group, answers_of(group.kind), model.winding.parts[number + 1])
+        lam = state.lam[first : first + len(group.rows)]
+        return batch(state.q, self._places, state.wound, self._loading.loads[number], lam)[0]
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:
         """Force and moment that the surroundings exert on each end of a small member."""

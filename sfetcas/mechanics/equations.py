@@ -18,9 +18,9 @@ import numpy as np
 
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.kernels import Batch, Kernels, chosen
+from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseSolver
-from .elements import Element
+from .batches import GroupBatch, at_rest
 from .joints import Body
 from .load_terms import present
 from .loading import Loading
@@ -30,7 +30,7 @@ from .spinning import SpunPair, SpunVectors
 from .tables import Tables
 from .terms import Group, by_turning
 
-__all__ = ["UNLOADED", "Equations", "Point", "State", "at_rest", "turned_tangents"]
+__all__ = ["UNLOADED", "Equations", "Point", "State", "turned_tangents"]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -416,13 +416,6 @@ class Equations:
         return State(q, y, state.lam + step[self.unknowns :], wound)
 
 
-def at_rest(element: Element, count: int) -> Array:
-    """Rotations (count, components) of the undeformed scene."""
-    rest = np.zeros((count, element.components))
-    rest[:, 0] = 1.0 if element.space else 0.0
-    return rest
-
-
 def turned_tangents(model: Model, q: Array) -> Array:
     """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
     element, q = model.element, q[model.rotations.turns]
@@ -445,11 +438,8 @@ class _Terms:
         labels, n = tables.labels[number] - tables.of_rows, len(group.data)
         # Elements have their multipliers from those of the loop closures.
         self._rows = slice(int(labels[0, 0]), int(labels[-1, -1]) + 1) if labels.size else slice(0, 0)
-        self._batch = Batch(chosen(by_turning(group.kind), evaluations * n, kernels), n)
-        self._data, self._angles = group.data.copy(), model.winding.parts[number]
-        self._batch.set(2, self._data)
-        self._rest = at_rest(model.element, 1)
-        self._grounded = bool((group.turns < 0).any()), bool((group.places < 0).any())
+        function = chosen(by_turning(group.kind), evaluations * n, kernels)
+        self._batch = GroupBatch(model, group, function, model.winding.parts[number])
 
     def add_noise(self, noise: Array) -> None:
         """Judge the sides of a body by its largest stiffness: rounding of a stiff direction has levers."""
@@ -465,22 +455,8 @@ class _Terms:
 
         ``places`` are the displacements (places, axes), ``constant`` the multipliers of elements.
         """
-        group, q = self.group, state.q
-        if group.turns.size:
-            self._batch.set(0, (np.vstack([q, self._rest]) if self._grounded[0] else q)[group.turns])
-        if group.places.size:
-            u = np.vstack([places, np.zeros((1, places.shape[1]))]) if self._grounded[1] else places
-            self._batch.set(1, u[group.places])
-        if self._angles is not None:
-            self._data[:, -1] = state.wound[self._angles]
-            self._batch.set(2, self._data)
-        if load.size:
-            self._batch.set(3, load)
-        if self._closed is not None:
-            self._batch.set(4, constant)
-        elif group.rows:
-            self._batch.set(4, state.lam[self._rows])
-        return self._batch()
+        lam = constant if self._closed is not None else state.lam[self._rows]
+        return self._batch(state.q, places, state.wound, load, lam)
 
     def entries(self, found: list[Array], *, convex: bool = False) -> Array:
         """What it adds to Newton's matrix, in the order of its tables."""

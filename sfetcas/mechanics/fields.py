@@ -17,9 +17,9 @@ from ..description.obstacles import obstacle
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.keeping import kept
-from ..mathematics.kernels import Batch
 from .balance import Balance, SpringState
 from .balance import three as _three
+from .batches import GroupBatch
 from .contact_joints import OnPlane, OnRound
 from .equations import Equations, State, turned_tangents
 from .loading import Loading
@@ -185,10 +185,9 @@ class Fields:
     def _strain_energies(self) -> Array:
         """Of all elements."""
         elements = self.model.terms[0]
-        batch = Batch(energies_of(elements.kind), len(elements.data))
-        batch.set(0, self.q[elements.turns])
-        batch.set(2, elements.data)
-        return batch()[1].ravel()
+        return GroupBatch(self.model, elements, energies_of(elements.kind))(self.q, self._nodal, self.state.wound)[
+            1
+        ].ravel()
 
     def _along(self, member: str, x: Array, *, pressed: bool = True) -> dict[str, Array]:
         """Position (m), rotation, force and moment, dimensionless; without what obstacles press if so wanted."""
