@@ -249,25 +249,26 @@ class Equations:
         moved = positions.Y @ state.y + positions.B @ loading.shift
         return np.asarray(moved.reshape(len(self.model.segments.places), self.model.element.axes))
 
-    def _evaluated(self, state: State, loading: Loading) -> list[list[Array]]:
+    def _evaluated(self, state: State, loading: Loading) -> _Results:
         """Results of the terms of all groups at a state; to be read before they are evaluated again."""
         places = self.kept_places(state, loading)
         pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
         constant = self._closing_pulls(state.lam)[self._owner]
-        return [
+        found = [
             group(state, places, pull if number == 0 else loading.loads[number - 1], constant)
             for number, group in enumerate(self._terms)
         ]
+        return _Results(found, places, pull + constant[:, None, :])
 
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
         """The equations at a state; with ``convex`` the matrices of terms without rows made positive."""
         positions, turning = self.model.positions, self.turning_unknowns
-        found = self._evaluated(state, loading)
-        force, nodal = loading.force.ravel(), self.kept_places(state, loading).ravel()
+        results = self._evaluated(state, loading)
+        found, force, nodal = results.groups, loading.force.ravel(), results.places.ravel()
         potential = sum(float(part[0].sum()) for part in found) - float(force @ nodal)
         stored = sum(float(part[1].sum()) for part in found)
         residual = self._gathered([part[3] for part in found])
-        scale = self._gathered_sizes([part[3] for part in found], state, loading) + self.noise
+        scale = self._gathered_sizes([part[3] for part in found], results.pull) + self.noise
         if loading.further.any():
             residual -= self._of_moments(loading.further)
         lam = state.lam[: len(positions.rows)]
@@ -293,9 +294,8 @@ class Equations:
         found = np.bincount(unknown[used], weights=given[used], minlength=self.total)
         return found.astype(float, copy=False)
 
-    def _gathered_sizes(self, gradients: list[Array], state: State, loading: Loading) -> Array:
+    def _gathered_sizes(self, gradients: list[Array], pull: Array) -> Array:
         """What a node adds up: moments of its terms, and within elements the forces times the length they act on."""
-        pull = loading.pull + self.segment_pulls(state.lam, loading)[self._owner][:, None, :]
         carried = (np.abs(pull).sum(axis=2) * self.model.beams.weight).sum(axis=1)
         sizes = [np.abs(part) for part in gradients]
         sizes[0] += carried[:, None]
@@ -333,7 +333,7 @@ class Equations:
         links : list of ndarray (n, width)
             For each group of connections moments on its rotations, then forces on its places; none of loads.
         """
-        moments, *links = (part[3].copy() for part in self._evaluated(state, self.acting(state, loading)))
+        moments, *links = (part[3].copy() for part in self._evaluated(state, self.acting(state, loading)).groups)
         turns = self.model.element.turns
         three = np.zeros((len(moments), len(self.model.element.nodes), 3))
         three[:, :, 3 - turns :] = moments.reshape(*three.shape[:2], turns)
@@ -343,7 +343,7 @@ class Equations:
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
         positions, tables = self.model.positions, self.tables
-        found = self._evaluated(state, loading)[0]
+        found = self._evaluated(state, loading).groups[0]
         sides = tables.sides[0]
         spin = found[5].reshape(*sides.shape, self.model.element.axes)
         maps = (
@@ -362,8 +362,7 @@ class Equations:
         """Entries of the Newton matrix of the strain energy alone at the undeformed state, without closings."""
         nothing = self.model.loading(0.0, 0.0)
         rest = replace(self.start(nothing), q=at_rest(self.model.element, len(self.model.rotations.kind)))
-        found = self._evaluated(rest, nothing)
-        pairs = zip(self._terms, found, strict=True)
+        pairs = zip(self._terms, self._evaluated(rest, nothing).groups, strict=True)
         return self._matrix([group.entries([*part[:5], 0.0 * part[5]]) for group, part in pairs], ties=0.0)
 
     def effective(self, state: State, loading: Loading) -> Loading:
@@ -424,6 +423,15 @@ def turned_tangents(model: Model, q: Array) -> Array:
     return quaternion.turned_by(
         q / np.linalg.norm(q, axis=-1, keepdims=True) if model.space else q, model.beams.tangent
     )
+
+
+@dataclass(frozen=True)
+class _Results:
+    """Results of the terms by groups, displacements (places, axes) that they saw, and the whole pull of elements."""
+
+    groups: list[list[Array]]
+    places: Array
+    pull: Array
 
 
 class _Terms:
