@@ -97,11 +97,11 @@ class StageEquations(System):
 
     def static_matrix(self, stage: _Stage) -> ca.MX:
         """Derivative of a stage's residual by its unknowns at given inertia and damping forces, (total, total)."""
-        return summed(self.total, self.tables.tied(self._probe.static), stage.entries)
+        return summed((self.total,) * 2, self.tables.tied(self._probe.static), stage.entries)
 
     def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
         """Its derivative by rates (c) and accelerations (b) of the unknowns, (total, total)."""
-        return summed(self.total, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
+        return summed((self.total,) * 2, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
 
     @functools.cached_property
     def _probe(self) -> StagePlaces:

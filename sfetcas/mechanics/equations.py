@@ -21,7 +21,6 @@ from ..mathematics.arrays import Array, Index
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseSolver
 from .batches import GroupBatch, at_rest
-from .joints import Body
 from .load_terms import present
 from .loading import Loading
 from .model import Model
@@ -450,12 +449,9 @@ class _Terms:
         self._batch = GroupBatch(model, group, function, model.winding.parts[number])
 
     def add_noise(self, noise: Array) -> None:
-        """Judge the sides of a body by its largest stiffness: rounding of a stiff direction has levers."""
-        kind = self.group.kind
-        if isinstance(kind, Body):
-            first = kind.nodes * kind.axes
-            largest = np.abs(self.group.data[:, first : first + kind.freedoms * (kind.freedoms + 1) // 2]).max(axis=1)
-            used = self._unknown >= 0
+        """Judge the sides of what is stiff in some directions by the stiffest one."""
+        largest, used = self.kind.stiffest(self.group.data), self._unknown >= 0
+        if largest is not None:
             np.maximum.at(noise, self._unknown[used], (0.01 * largest[:, None] * used)[used])
 
     def __call__(self, state: State, places: Array, load: Array, constant: Array) -> list[Array]:

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 import casadi as ca
+import numpy as np
 
+from ..mathematics.arrays import Array
 from .terms import Side, Term
 
 __all__ = [
@@ -355,6 +357,11 @@ class Body(Term):
         n, axes = self.freedoms, self.axes
         data = self.nodes * axes + n * (n + 1) // 2 + self.stiff * n
         return self.nodes, self.nodes, self.stiff, data, axes + axes * axes + axes * axes * n
+
+    def stiffest(self, data: Array) -> Array | None:
+        """Of the stiffness matrix."""
+        first = self.nodes * self.axes
+        return np.asarray(np.abs(data[:, first : first + self.freedoms * (self.freedoms + 1) // 2]).max(axis=1))
 
     def frame(self, q: list[Side]) -> Side:
         """Mean rotation of the nodes."""

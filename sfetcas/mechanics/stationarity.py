@@ -12,7 +12,6 @@ import numpy as np
 
 from ..mathematics.arrays import Index
 from ..mathematics.constants import picked, sparse, times
-from ..mathematics.linear import pattern
 from .expressions import Expressions, Given
 from .load_terms import FollowingSpread, elements_of
 from .tables import Places
@@ -126,9 +125,10 @@ class Stationarity:
         return self.gathered([])
 
 
-def summed(total: int, places: Places, entries: ca.MX) -> ca.MX:
-    """The matrix (total, total) of entries by their rows, columns, weights and numbers."""
+def summed(shape: tuple[int, int], places: Places, entries: ca.MX) -> ca.MX:
+    """The sparse matrix of entries by their rows, columns, weights and numbers."""
     row, column, weight, entry = places
-    cells, inverse = np.unique(column * total + row, return_inverse=True)
+    cells, inverse = np.unique(column * shape[0] + row, return_inverse=True)
     sums = sparse(inverse.ravel(), entry, weight, (len(cells), entries.shape[0]))
-    return ca.MX(pattern(total, cells % total, cells // total), ca.mtimes(sums, entries))
+    starts = np.searchsorted(cells // shape[0], np.arange(shape[1] + 1)).tolist()
+    return ca.MX(ca.Sparsity(*shape, starts, (cells % shape[0]).tolist()), times(sums, entries))

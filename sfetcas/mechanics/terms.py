@@ -113,6 +113,10 @@ class Term(Components, abc.ABC):
         """
         return []
 
+    def stiffest(self, data: Array) -> Array | None:
+        """Largest stiffness (n,) of each term, where rounding of a stiff direction has levers on the others."""
+        return None
+
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Minus the present generalised forces times the displacements: told with the energy, never differentiated."""
         return ca.SX(0)

@@ -24,7 +24,8 @@ from ..mechanics.expressions import Given, SymbolicTerms, data_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
-from ..mechanics.tables import Places, Tables
+from ..mechanics.stationarity import summed
+from ..mechanics.tables import Tables
 from ..mechanics.terms import curvatures_of, slopes_of
 
 __all__ = ["EquilibriumProblem"]
@@ -170,7 +171,7 @@ class EquilibriumProblem:
             np.concatenate([entry, np.full(len(w.row), count), count + 1 + np.arange(len(norm_rows))]),
         )
         given = ca.vertcat(*values, ca.MX(1), picked(self.x, norm_columns))
-        return _matrix(places, given, (norms + tables.rows, tables.unknowns))
+        return summed((norms + tables.rows, tables.unknowns), places, given)
 
     def _hessian(self, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
         tables, norms = self._tables, len(self._unit)
@@ -188,7 +189,7 @@ class EquilibriumProblem:
             np.concatenate([weight, np.full(len(norm_rows), 2.0)]),
             np.concatenate([entry, tables.second.count + norm_rows]),
         )
-        return _matrix(places, ca.vertcat(ca.MX(0, 1), *values, lam_g[:norms, :]), (tables.unknowns,) * 2)
+        return summed((tables.unknowns,) * 2, places, ca.vertcat(ca.MX(0, 1), *values, lam_g[:norms, :]))
 
     # -- expressions by place ---------------------------------------------------------------------
 
@@ -272,12 +273,3 @@ class EquilibriumProblem:
     def multipliers(self, state: State) -> Array:
         """Multipliers of all rows at a state, those of the norms zero."""
         return np.concatenate([np.zeros(len(self._unit)), state.lam])
-
-
-def _matrix(places: Places, values: ca.MX, shape: tuple[int, int]) -> ca.MX:
-    """Sparse matrix of values by their rows, columns, weights and numbers."""
-    row, column, weight, entry = places
-    cells, inverse = np.unique(column * shape[0] + row, return_inverse=True)
-    sums = sparse(inverse.ravel(), entry, weight, (len(cells), values.shape[0]))
-    starts = np.searchsorted(cells // shape[0], np.arange(shape[1] + 1)).tolist()
-    return ca.MX(ca.Sparsity(*shape, starts, (cells % shape[0]).tolist()), times(sums, values))

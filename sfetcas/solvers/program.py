@@ -283,7 +283,7 @@ class Program:
     def _matrix(self, entries: list[ca.MX]) -> ca.MX:
         """The matrix with its whole diagonal, which regularisation and shifts are put on."""
         tables = self.expressions.tables
-        return summed(self.expressions.total, tables.whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
+        return summed((self.expressions.total,) * 2, tables.whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
 
     @functools.cached_property
     def potential(self) -> ca.MX:
