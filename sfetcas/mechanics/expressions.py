@@ -99,13 +99,17 @@ class SymbolicTerms:
         self.axes, self.turns = self.model.element.axes, self.model.element.turns
         self.places, self.rotations = len(self.model.segments.places), len(self.model.rotations.kind)
         self._calls, self._kernels = calls, kernels
-        self.reaching = self._by_tangents(self.model.positions.E)
 
     def many(self, function: ca.Function, n: int) -> ca.Function:
         """A function of single things for n of them, compiled where that pays."""
         return chosen(function, self._calls * n, self._kernels).map(n)
 
     # -- linear maps --------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def reaching(self) -> ca.DM:
+        """What takes the turned tangents of all points to the displacements of the places."""
+        return self._by_tangents(self.model.positions.E)
 
     def onto_unknowns(self, sides: Index) -> ca.DM:
         """What takes values on sides to the unknowns."""
@@ -159,12 +163,15 @@ class SymbolicTerms:
 
     def gaps(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> ca.MX:
         """What is left open of the loop closures and of the rows of joints."""
-        places, closed, rows = self.kept_places(y, given), self.open_gaps(y, given), []
-        for number, group in enumerate(self.model.terms):
+        return self.gaps_of(self.every(q, y, given, near), y, given)
+
+    def gaps_of(self, arguments: list[list[ca.MX]], y: ca.MX, given: Given) -> ca.MX:
+        """The same from the arguments of :meth:`every`."""
+        closed, rows = self.open_gaps(y, given), []
+        for number, (group, own) in enumerate(zip(self.model.terms, arguments, strict=True)):
             if not len(group.data) or not (group.rows or number == 0):
                 continue
-            function = self.many(rows_of(group.kind), len(group.data))
-            found = ca.vec(function(*self.arguments(number, q, places, given, near)))
+            found = ca.vec(self.many(rows_of(group.kind), len(group.data))(*own))
             if number == 0:
                 closed += times(self.closing, found)
             else:
@@ -228,13 +235,18 @@ class SymbolicTerms:
         sides = self.sides(self.model.terms[number], q, places)
         return [*sides, self.data(number, given, near), self.load(number, given)]
 
-    def energies(self, q: ca.MX, places: ca.MX, given: Given, near: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Energy of all terms, and its elastic part."""
+    def every(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> list[list[ca.MX]]:
+        """Arguments of all groups of terms; of a group without any term nothing."""
+        places = self.kept_places(y, given)
+        groups = enumerate(self.model.terms)
+        return [self.arguments(i, q, places, given, near) if len(group.data) else [] for i, group in groups]
+
+    def energies(self, arguments: list[list[ca.MX]]) -> tuple[ca.MX, ca.MX]:
+        """Energy of all terms, and its elastic part; arguments of :meth:`every`."""
         total, stored = ca.MX(0), ca.MX(0)
-        for number, group in enumerate(self.model.terms):
-            if len(group.data):
-                function = self.many(energies_of(group.kind), len(group.data))
-                energy, elastic = function(*self.arguments(number, q, places, given, near))
+        for group, own in zip(self.model.terms, arguments, strict=True):
+            if own:
+                energy, elastic = self.many(energies_of(group.kind), len(group.data))(*own)
                 total, stored = total + ca.sum2(energy), stored + ca.sum2(elastic)
         return total, stored
 

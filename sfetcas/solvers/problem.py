@@ -51,7 +51,7 @@ class EquilibriumProblem:
         self.terms = SymbolicTerms(Tables(model, components=True), kernels, CALLS)
         self._tables = self.terms.tables
         self._symbols()
-        gaps = self.terms.gaps(self._q, self._y, self._given, self._near)
+        gaps = self.terms.gaps_of(self._arguments, self._y, self._given)
         self.nlp = NLP(
             x=self.x,
             p=self.p,
@@ -98,6 +98,7 @@ class EquilibriumProblem:
         turned = held + times(self._spread, self.x) if tables.of_places else held
         self._q = ca.reshape(turned, element.components, len(model.rotations.kind))
         self._places = self.terms.kept_places(self._y, self._given)
+        self._arguments = self.terms.every(self._q, self._y, self._given, self._near)
         norms = [f"norm of rotation {i}" for i in self._unit]
         self.row_names = (*norms, *model.row_names)
 
@@ -121,13 +122,10 @@ class EquilibriumProblem:
         rows = np.broadcast_to(np.arange(len(numbers))[:, None], numbers.shape)
         return rows[numbers >= 0], numbers[numbers >= 0]
 
-    def _arguments(self, number: int) -> list[ca.MX]:
-        return self.terms.arguments(number, self._q, self._places, self._given, self._near)
-
     # -- functions and first derivatives ---------------------------------------------------------
 
     def _objective(self) -> ca.MX:
-        energy, _ = self.terms.energies(self._q, self._places, self._given, self._near)
+        energy, _ = self.terms.energies(self._arguments)
         return energy - ca.dot(self._given.force, self._places)
 
     @functools.cached_property
@@ -137,7 +135,7 @@ class EquilibriumProblem:
         for number, group in enumerate(self.model.terms):
             slopes = (ca.MX(0, 1), ca.MX(0, 1))
             if len(group.data):
-                gradient, rows = self.terms.many(slopes_of(group.kind), len(group.data)).call(self._arguments(number))
+                gradient, rows = self.terms.many(slopes_of(group.kind), len(group.data)).call(self._arguments[number])
                 slopes = gradient, rows
             found.append(slopes)
         return found
@@ -179,7 +177,7 @@ class EquilibriumProblem:
         for number, group in enumerate(self.model.terms):
             n = len(group.data)
             if n:
-                arguments = [*self._arguments(number), self.terms.multipliers(number, lam), ca.repmat(lam_f, 1, n)]
+                arguments = [*self._arguments[number], self.terms.multipliers(number, lam), ca.repmat(lam_f, 1, n)]
                 values.append(ca.vec(self.terms.many(curvatures_of(group.kind), n)(*arguments)))
         row, column, weight, entry = tables.second.places
         norm_rows, norm_columns = self._norm_parts

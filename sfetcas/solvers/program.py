@@ -148,17 +148,20 @@ class Program:
 
     @functools.cached_property
     def _energies(self) -> tuple[ca.MX, ca.MX]:
+        return self.expressions.energies(self._arguments)
+
+    @functools.cached_property
+    def _arguments(self) -> list[list[ca.MX]]:
         q, y, _, near = self.parts
-        return self.expressions.energies(q, self.expressions.kept_places(y, self.given), self.given, near)
+        return self.expressions.every(q, y, self.given, near)
 
     @functools.cached_property
     def strains(self) -> ca.MX:
         """Elastic energy of each element, (1, elements)."""
-        expressions, (q, y, _, near) = self.expressions, self.parts
+        expressions = self.expressions
         if not expressions.elements:
             return ca.MX(1, 0)
-        arguments = expressions.arguments(0, q, expressions.kept_places(y, self.given), self.given, near)
-        return expressions.many(energies_of(self.model.element), expressions.elements)(*arguments)[1]
+        return expressions.many(energies_of(self.model.element), expressions.elements)(*self._arguments[0])[1]
 
     @property
     def strain(self) -> ca.MX:
@@ -293,8 +296,7 @@ class Program:
 
     @functools.cached_property
     def _gaps(self) -> ca.MX:
-        _, (q, y, _, near) = self._symbols
-        return self.expressions.gaps(q, y, self.given, near)
+        return self.expressions.gaps_of(self._arguments, self.parts[1], self.given)
 
     @functools.cached_property
     def at(self) -> ca.Function:
@@ -341,13 +343,10 @@ class Program:
     def convex(self) -> ca.Function:
         """(state, given) -> entries of the matrix with the elements' share made positive."""
         expressions, model = self.expressions, self.model
-        state, (q, _, _, _) = self._symbols
-        entries = list(self.stationarity.entries)
+        state, entries = self._symbols[0], list(self.stationarity.entries)
         if expressions.elements:
-            places = expressions.kept_places(self.parts[1], self.given)
-            arguments = expressions.arguments(0, q, places, self.given, self.parts[3])
             function = expressions.many(model.element.convex, expressions.elements)
-            entries[0] = ca.vec(function(*arguments, expressions.multipliers(0, self.parts[2])))
+            entries[0] = ca.vec(function(*self._arguments[0], expressions.multipliers(0, self.parts[2])))
         matrix = self._matrix(entries).nz[:]
         return self._function("convex", {"state": state, "given": self.symbol}, {"entries": matrix})
 
