@@ -47,7 +47,7 @@ def crossed(rng):
 
 def driven(rng):
     a, _ = spun(rng)
-    across = quat.rotate(a, normals(AXIS, 3))
+    across = quat.rotate(a, normals(AXIS))
     return [a, quat.multiply(a, about(AXIS, ANGLE))], [], [(None, across[0]), (None, across[1])]
 
 
@@ -71,7 +71,7 @@ def slid_plane(rng):
 def slid_by(rng):
     a, _ = spun(rng)
     u = rng.normal(size=3)
-    return [a], [u, u + TRAVEL * quat.rotate(a, AXIS)], list(quat.rotate(a, normals(AXIS, 3)))
+    return [a], [u, u + TRAVEL * quat.rotate(a, AXIS)], list(quat.rotate(a, normals(AXIS)))
 
 
 def slid_by_plane(rng):
@@ -125,7 +125,7 @@ SPACE, PLANE = True, False
 SPRING = np.array([*AXIS, 1.7, 0.2, 0.0])
 CROSSED = np.array([*AXIS, *OTHER, 1.7, 0.2, 0.0])
 CASES = {
-    "hinge": Case(joints.Hinge(SPACE), normals(AXIS, 3).ravel(), hinged, swapped=lambda d, p: (d, p, -1.0)),
+    "hinge": Case(joints.Hinge(SPACE), normals(AXIS).ravel(), hinged, swapped=lambda d, p: (d, p, -1.0)),
     "universal": Case(
         joints.Universal(SPACE), np.concatenate([AXIS, OTHER]), crossed, swapped=lambda d, p: (np.roll(d, 3), p, 1.0)
     ),
@@ -133,7 +133,7 @@ CASES = {
     "driven turn, plane": Case(
         joints.DrivenTurn(PLANE), np.array([0, 0, 1.0]), driven_plane, (ANGLE,), lambda d, p: (d, -p, -1.0)
     ),
-    "slide": Case(joints.Slide(SPACE), normals(AXIS, 3).ravel(), slid, swapped=lambda d, p: (d, p, -1.0)),
+    "slide": Case(joints.Slide(SPACE), normals(AXIS).ravel(), slid, swapped=lambda d, p: (d, p, -1.0)),
     "slide, plane": Case(
         joints.Slide(PLANE), np.array([0.6, 0.8]), slid_plane, swapped=lambda d, p: (d, p, -1.0)
     ),
@@ -403,7 +403,7 @@ def test_body_is_linear_elasticity_for_small_motions():
 
 
 def test_hinge_is_zero_about_its_axis_and_nowhere_else():
-    kind, data = joints.Hinge(True), normals(AXIS, 3).ravel()
+    kind, data = joints.Hinge(True), normals(AXIS).ravel()
     first, lam = about([0.3, 0.9, -0.4], 1.0), np.array([0.7, -1.2])
 
     def rows(a, b):
@@ -411,7 +411,7 @@ def test_hinge_is_zero_about_its_axis_and_nowhere_else():
 
     for angle in (-2.0, 0.1, 3.0):
         np.testing.assert_allclose(rows(first, quat.multiply(first, about(AXIS, angle))), 0.0, atol=1e-15)
-    off = quat.multiply(first, about(normals(AXIS, 3)[0], 0.01))
+    off = quat.multiply(first, about(normals(AXIS)[0], 0.01))
     np.testing.assert_allclose(rows(first, off), [0.01, 0.0], atol=1e-6)  # twice the sine of half the angle
     turn = about([1.0, -0.3, 0.8], 1.0)
     np.testing.assert_allclose(rows(quat.multiply(turn, first), quat.multiply(turn, off)), rows(first, off), atol=1e-15)

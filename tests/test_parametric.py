@@ -1,6 +1,7 @@
 """Equilibria as functions of numbers: derivatives against differences and literature, names, refusals."""
 
 import functools
+import math
 from pathlib import Path
 
 import numpy as np
@@ -297,8 +298,17 @@ REFUSED = [
     (cantilever, ["members.m.elements"], "members.m.elements: found a number that changes the elements"),
     (cantilever, ["loads.tip.value", "loads.tip.value.1"], "parameters: found loads.tip.value.1 more than once"),
     (cantilever, ["analysis.accuracy"], "parameters.analysis.accuracy: found a number on which nothing depends"),
-    (cantilever, ["nodes.B.position.0"], "parameters.nodes.B.position.0: found no range, accepted: .* in Python {name"),
-    (systems.small_plane, ["nodes.D.direction"], "found arguments that change axes or directions of supports"),
+    (
+        systems.small_plane,
+        ["nodes.D.direction"],
+        "nodes.D.direction: found a guide that turns with parameters",
+    ),
+    (systems.linked_space, ["springs.knee.axis"], "springs.knee.axis.0: found a number that turns an axis about which"),
+    (
+        cantilever,
+        {"L": Parameter(1.0, lambda x: {"nodes.B.position.0": math.exp(x - 1.0)})},
+        "parameters.L: found a function that takes plain numbers only .*, accepted: NumPy's functions, as np.sin",
+    ),
     (stopped, ["loads.tip.value"], "springs.k.stop: which stops act is found by a search that is without derivatives"),
     (
         cantilever,

@@ -241,7 +241,7 @@ class Load(Record):
     @property
     def vector(self) -> tuple[float, float, float]:
         """(3,), N, N m or N/m, fixed axes; one number is a moment about z."""
-        return (0.0, 0.0, self.value) if isinstance(self.value, float) else self.value
+        return self.value if isinstance(self.value, tuple) else (0.0, 0.0, self.value)
 
 
 class Motion(Record):

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from ..errors import SceneError
+from ..mathematics.arrays import numbers
+from ..mathematics.interpolation import power_series
 from .records import NotNegative, Number, Numbers, Record, number, say
 
 __all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
@@ -101,12 +103,12 @@ def evaluate(varying: Quantity, x: ArrayLike) -> Floats:
     -------
     (n,) - in the unit of the quantity
     """
-    x = np.atleast_1d(np.asarray(x, float))
+    x = np.atleast_1d(numbers(x))
     if isinstance(varying, Table):
-        return np.asarray(np.interp(x, varying.at, varying.value))
+        return numbers(np.interp(x, numbers(varying.at), numbers(varying.value)))
     if isinstance(varying, Polynomial):
-        return np.asarray(polynomial.polyval(x, varying.polynomial), float)
-    return np.full(x.shape, varying)
+        return power_series(x, varying.polynomial)
+    return numbers(np.broadcast_to(numbers(varying), x.shape))
 
 
 def breaks(varying: Quantity) -> tuple[float, ...]:
@@ -320,9 +322,17 @@ class CrossSection(Record):
     @property
     def breaks(self) -> tuple[float, ...]:
         """Fractions strictly between 0 and 1 where the slope of some quantity jumps, rising."""
+        return tuple(sorted({kink for item in self._varying() for kink in breaks(item)}))
+
+    @property
+    def even(self) -> bool:
+        """Whether it is the same all along the member."""
+        return not any(isinstance(item, (Table, Polynomial)) for item in self._varying())
+
+    def _varying(self) -> list[Quantity]:
+        """What may vary along the member."""
         names = ("EI2", "EI3", "GJ", "rhoA", "E", "G", "rho", *_DIMENSIONS)
-        varying = [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
-        return tuple(sorted({kink for item in varying for kink in breaks(item)}))
+        return [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Which of EI2, EI3, GJ, rhoA (N m2, kg/m) this section cannot tell, in the order asked."""

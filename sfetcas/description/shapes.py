@@ -6,6 +6,7 @@ splines are polynomials on panels.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -13,12 +14,11 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, final
 
 import numpy as np
-from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from ..errors import SceneError
-from ..mathematics.arrays import first_of_largest, fixed
+from ..mathematics.arrays import first_of_largest, fixed, length_of, numbers, values_of
 from ..mathematics.curves import (
     FORWARD,
     POINTS,
@@ -30,6 +30,7 @@ from ..mathematics.curves import (
     equal_arcs,
     refine,
 )
+from ..mathematics.interpolation import power_series
 from ..mathematics.quaternion import matrix, rotate
 from .records import Direction, Number, Numbers, Positive, Record, Vector
 
@@ -195,7 +196,7 @@ class CenterLine:
 
     def positions(self, x: ArrayLike) -> Floats:
         """Places (n, 3) in m, fixed axes, at the fractions x (n,)."""
-        return np.asarray(self.start + self.length * self._curve.positions(_row(x)))
+        return numbers(self.start + self.length * self._curve.positions(_row(x)))
 
     def quaternions(self, x: ArrayLike) -> Floats:
         """Unit quaternions (n, 4), scalar first, at the fractions x (n,); continuous in sign along x."""
@@ -236,8 +237,8 @@ def place(
     SceneError
         The shape does not fit the nodes, has no length or no tangent somewhere, or b2 is along the tangent.
     """
-    first, chord = np.array(start, float), np.array(end, float) - np.asarray(start, float)
-    across = None if b2 is None else np.array(b2, float)
+    first, chord = numbers(start), numbers(end) - numbers(start)
+    across = None if b2 is None else numbers(b2)
     try:
         length, curve = _curve_of(shape, first, chord, across)
         return _line(first, chord, length, curve)
@@ -256,13 +257,13 @@ def end_of(shape: Any, start: ArrayLike, b2: ArrayLike | None = None) -> Floats 
     b2 : (3,), optional
     """
     if isinstance(shape, Spline):
-        return np.array(shape.points[-1], float)
+        return numbers(shape.points[-1])
     if not isinstance(shape, Helix) and not (isinstance(shape, Curvature) and shape.start is not None):
         return None
-    first, across = np.array(start, float), None if b2 is None else np.array(b2, float)
+    first, across = numbers(start), None if b2 is None else numbers(b2)
     # Of the chord only its not being zero is asked.
     length, curve = _curve_of(shape, first, np.ones(3), across)
-    return np.asarray(first + length * curve.positions(np.ones(1))[0])
+    return numbers(first + length * curve.positions(np.ones(1))[0])
 
 
 def _curve_of(shape: Any, start: Floats, chord: Floats, b2: Floats | None) -> tuple[float, Curve]:
@@ -292,19 +293,19 @@ def _line(start: Floats, chord: Floats, length: float, curve: Curve) -> CenterLi
         length=length,
         end_gap=fixed(gap),
         bending_axis=_bending_axis(curve),
-        turning=curve.turning,
+        turning=float(values_of(curve.turning)),
         _curve=curve,
     )
 
 
 def _bending_axis(curve: Curve) -> int:
     x = curve.samples
-    rotations = curve.quaternions(x)
+    rotations = values_of(curve.quaternions(x))
     frames = matrix(rotations)
-    bending = rotate(rotations, curve.curvatures(x))
+    bending = rotate(rotations, values_of(curve.curvatures(x)))
     size = max(1.0, float(np.abs(bending).max()))
     level = max(
-        np.abs(curve.positions(x)[:, 2]).max(),
+        np.abs(values_of(curve.positions(x))[:, 2]).max(),
         # also holds between the samples of a helix that meet it always at the same phase
         np.abs(bending[:, :2]).max() / size,
     )
@@ -318,16 +319,16 @@ def _bending_axis(curve: Curve) -> int:
 
 
 def _row(x: ArrayLike) -> Floats:
-    return np.atleast_1d(np.asarray(x, float))
+    return np.atleast_1d(numbers(x))
 
 
-def _norm(v: Floats) -> float:
-    return math.hypot(*v)
+def _norm(v: Floats) -> Any:
+    return length_of(v)
 
 
 def _unit(v: ArrayLike) -> Floats:
-    v = np.asarray(v, float)
-    return np.asarray(v / _norm(v))
+    v = numbers(v)
+    return numbers(v / _norm(v))
 
 
 def _say(v: Iterable[float]) -> str:
@@ -337,7 +338,7 @@ def _say(v: Iterable[float]) -> str:
 def _frame(tangent: Floats, b2: Floats | None) -> Floats:
     """Quaternion (4,) of the frame with this tangent and b2 as :func:`place` says."""
     if b2 is None:
-        b2 = np.array([-tangent[1], tangent[0], 0.0])
+        b2 = numbers([-tangent[1], tangent[0], 0.0])
         if _norm(b2) <= NEAR:
             b2 = np.array([0.0, 1.0, 0.0])
     elif not b2.any():
@@ -354,7 +355,7 @@ def _frame(tangent: Floats, b2: Floats | None) -> Floats:
 def _quaternion(turn: Floats) -> Floats:
     """Unit quaternion (4,) of a rotation matrix (3, 3): the largest row of 4 l l^T, free of cancellation."""
     (a, b, c), (d, e, f), (g, h, i) = turn
-    rows = np.array(
+    rows = numbers(
         [
             [1.0 + a + e + i, h - f, c - g, d - b],
             [h - f, 1.0 + a - e - i, b + d, c + g],
@@ -391,11 +392,11 @@ def _arc(shape: Arc, start: Floats, chord: Floats, b2: Floats | None) -> tuple[f
         )
     half = 0.5 * shape.angle
     direction = _unit(chord)
-    tangent = math.cos(half) * direction - math.sin(half) * np.cross(normal, direction)
+    tangent = np.cos(half) * direction - np.sin(half) * np.cross(normal, direction)
     if shape.start is not None:
-        _check_start(np.array(shape.start), tangent)
+        _check_start(values_of(numbers(shape.start)), values_of(tangent))
     first = _frame(_unit(tangent), b2)
-    length = _norm(chord) * half / math.sin(half)
+    length = _norm(chord) * half / np.sin(half)
     return length, Screw(first=first, axis=normal, turns=shape.angle / (2.0 * math.pi))
 
 
@@ -408,9 +409,9 @@ def _check_start(start: Floats, tangent: Floats) -> None:
 
 def _helix(shape: Helix, start: Floats, b2: Floats | None) -> tuple[float, Curve]:
     axis = _unit(shape.axis)
-    outward = start - np.array(shape.center)
+    outward = start - numbers(shape.center)
     outward = outward - (outward @ axis) * axis
-    length = shape.turns * math.hypot(2.0 * math.pi * shape.radius, shape.pitch)
+    length = shape.turns * np.hypot(2.0 * math.pi * shape.radius, shape.pitch)
     if abs(_norm(outward) - shape.radius) > min(NEAR * length, 0.5 * shape.radius):
         found = f"found {shape.radius:.9g}, but the first node is {_norm(outward):.9g} m from the axis"
         raise SceneError(f"{found}, accepted: the same to {NEAR:g} of the length", ("shape", "radius"))
@@ -431,10 +432,14 @@ def _given_curvature(shape: Curvature, start: Floats, chord: Floats, b2: Floats 
 
     def sample(left: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:
         x = left[:, None] + (right - left)[:, None] * POINTS
-        rates = np.stack([shape.length * polynomial.polyval(x, c) for c in given], axis=2)
-        return right - left, rates, np.ones((*x.shape, 1))
+        rates = numbers([shape.length * power_series(x, c) for c in given])
+        return right - left, np.moveaxis(rates, 0, 2), np.ones((*x.shape, 1))
 
-    edges, good = refine(sample, np.array([0.0, 1.0]))
+    def known(left: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:
+        widths, rates, more = sample(left, right)
+        return widths, values_of(rates), more
+
+    edges, good = refine(known, np.array([0.0, 1.0]))
     if not good.all():
         raise SceneError("found a curvature of over 5000 rad along the member, accepted: less", ("shape",))
     widths, rates, _ = sample(edges[:-1], edges[1:])
@@ -442,11 +447,11 @@ def _given_curvature(shape: Curvature, start: Floats, chord: Floats, b2: Floats 
 
 
 def _spline(shape: Spline, start: Floats, b2: Floats | None) -> tuple[float, Curve]:
-    points = np.array(shape.points)
-    scale = math.fsum(math.dist(a, b) for a, b in pairwise(shape.points))
+    points = numbers(shape.points)
+    scale = math.fsum(math.dist(a, b) for a, b in pairwise(values_of(points)))
     cubics = cubic_spline(np.diff(points, axis=0) / scale)
 
-    def sample(left: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:
+    def sample(left: Floats, right: Floats, cubics: Floats) -> tuple[Floats, Floats, Floats]:
         arcs, speeds, at = equal_arcs(cubics, left, right)
         slope, bend = derivatives(cubics, np.floor(left).astype(int), at)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -455,17 +460,18 @@ def _spline(shape: Spline, start: Floats, b2: Floats | None) -> tuple[float, Cur
             even = speeds / speeds.mean(axis=1, keepdims=True)
         return arcs / arcs.sum(), rates, even[:, :, None]
 
-    knots, good = refine(sample, np.arange(float(len(points))))
+    known = functools.partial(sample, cubics=values_of(cubics))
+    knots, good = refine(known, np.arange(float(len(points))))
     arcs, _, at = equal_arcs(cubics, knots[:-1], knots[1:])
     slope, _ = derivatives(cubics, np.floor(knots[:-1]).astype(int), at)
-    _check_smooth(slope, good, knots)
-    length = scale * float(arcs.sum())
-    if (gap := math.dist(points[0], start)) > NEAR * length:
+    _check_smooth(values_of(slope), good, knots)
+    length = scale * arcs.sum()
+    if (gap := _norm(points[0] - start)) > NEAR * length:
         found = f"found the first point {gap:.3g} m from the first node at {_say(start)}"
         accepted = f"up to {NEAR:g} of the length of {length:.6g} m"
         raise SceneError(f"{found}, accepted: {accepted}", ("shape", "points"))
     first = _frame(_unit(cubics[0, 0]), b2)
-    widths, rates, _ = sample(knots[:-1], knots[1:])
+    widths, rates, _ = sample(knots[:-1], knots[1:], cubics)
     return length, collocate(widths, rates, first, fixed_axes=True)
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from .arrays import fixed, unit
-from .interpolation import gauss
+from .arrays import fixed, length_of, numbers, unit, values_of
+from .interpolation import gauss, legendre_values
 from .quaternion import conjugate, multiply, product, rotate
 
 __all__ = [
@@ -82,7 +82,7 @@ class Screw(Curve):
         rest = _turned(self.turns, x)[1]
         forward = np.sin(2.0 * math.pi * rest) / total if total else x
         aside = 2.0 * np.sin(math.pi * rest) ** 2 / total if total else 0.0 * x
-        return np.asarray(
+        return numbers(
             np.outer(x, along) + np.outer(forward, tangent - along) + np.outer(aside, np.cross(self.axis, tangent))
         )
 
@@ -111,7 +111,7 @@ def _turned(turns: float, x: Floats) -> tuple[Floats, Floats]:
     Source: Dekker 1971, splitting of a product into exact parts (doi 10.1007/BF01397083).
     """
     whole = np.round(turns * x)
-    (a, b), (c, d) = _halves(np.asarray(turns)), _halves(x)
+    (a, b), (c, d) = _halves(numbers(turns)), _halves(x)
     return whole, ((a * c - whole) + a * d + b * c) + b * d
 
 
@@ -166,8 +166,8 @@ class Panels(Curve):
     def _at(self, series: Floats, x: Floats) -> Floats:
         panel = np.clip(np.searchsorted(self.edges, x, side="right") - 1, 0, len(series) - 1)
         left, right = self.edges[panel], self.edges[panel + 1]
-        basis = legendre.legvander(2.0 * (x - left) / (right - left) - 1.0, series.shape[1] - 1)
-        return np.asarray(np.einsum("nk,nkc->nc", basis, series[panel]))
+        basis = legendre_values(2.0 * (x - left) / (right - left) - 1.0, series.shape[1] - 1)
+        return numbers(np.einsum("nk,nkc->nc", basis, series[panel]))
 
     def positions(self, x: Floats) -> Floats:
         return self._at(self.places, x)
@@ -198,24 +198,24 @@ def collocate(widths: Floats, rates: Floats, first: Floats, fixed_axes: bool) ->
         Whether the curvature is given about fixed axes, without twist, and not about those of the section.
     """
     # About fixed axes, 2 l' = (0, w) l: then the conjugate of l follows the law for the section with -w.
-    flip = conjugate if fixed_axes else np.asarray
+    flip = conjugate if fixed_axes else numbers
     edges = np.concatenate([[0.0], np.cumsum(widths[:-1]), [1.0]])
     widths = widths[:, None, None]
-    halves = 0.5 * widths * np.insert(-rates if fixed_axes else rates, 0, 0.0, axis=2)
+    halves = 0.5 * widths * np.concatenate([0.0 * rates[:, :, :1], -rates if fixed_axes else rates], axis=2)
     local = np.broadcast_to(ONE, halves.shape)
-    for _ in range(16):  # the n-th sweep leaves (1/4)^n / n!
+    for _ in range(12):  # the n-th sweep leaves (1/4)^n / n!
         local = ONE + RUNNING @ multiply(local, halves)
     change = multiply(local, halves)
     firsts = _chain(flip(first), ONE + WEIGHTS @ change)[:, None, :]
     series = INTEGRAL @ change
-    series[:, 0] += ONE
+    series[:, 0] = series[:, 0] + ONE
     rotations = flip(multiply(firsts, local))
     tangents = rotate(rotations, FORWARD)
     places = widths * (INTEGRAL @ tangents)
-    places[1:, 0] += np.cumsum(widths[:-1, 0] * (WEIGHTS @ tangents[:-1]), axis=0)
+    places[1:, 0] = places[1:, 0] + np.cumsum(widths[:-1, 0] * (WEIGHTS @ tangents[:-1]), axis=0)
     bending = rates if not fixed_axes else rotate(conjugate(rotations), rates) * [0.0, 1.0, 1.0]
     return Panels(
-        turning=float(np.sum(widths[:, 0] * (np.linalg.norm(rates, axis=2) @ WEIGHTS)[:, None])),
+        turning=float(values_of(np.sum(widths[:, 0] * (np.linalg.norm(rates, axis=2) @ WEIGHTS)[:, None]))),
         edges=fixed(edges),
         places=fixed(places),
         rotations=fixed(flip(multiply(firsts, series))),
@@ -228,9 +228,9 @@ def _chain(first: Floats, turns: Floats) -> Floats:
     chain = [first.tolist()]
     for turn in turns[:-1].tolist():
         following = product(chain[-1], turn)
-        size = math.hypot(*following)
+        size = length_of(numbers(following))
         chain.append([entry / size for entry in following])
-    return np.array(chain)
+    return numbers(chain)
 
 
 Sample = Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]
@@ -353,10 +353,10 @@ def equal_arcs(cubics: Floats, left: Floats, right: Floats) -> tuple[Floats, Flo
     speeds = np.linalg.norm(derivatives(cubics, piece, low + width * POINTS)[0], axis=2)
     mean = (speeds @ WEIGHTS)[:, None]
     series = speeds @ INTEGRAL.T
-    part = np.tile(POINTS, (len(left), 1))
+    part = numbers(np.tile(POINTS, (len(left), 1)))
     for _ in range(8):  # Newton: on a panel that is fine enough the speed hardly changes
         speed = np.linalg.norm(derivatives(cubics, piece, low + width * part)[0], axis=2)
-        reached = np.einsum("mkc,mc->mk", legendre.legvander(2.0 * part - 1.0, ORDER), series)
-        step = np.divide(reached - mean * POINTS, speed, out=np.zeros_like(part), where=speed > 0.0)
+        reached = np.einsum("mkc,mc->mk", legendre_values(2.0 * part - 1.0, ORDER), series)
+        step = np.where(speed > 0.0, reached - mean * POINTS, 0.0) / np.where(speed > 0.0, speed, 1.0)
         part = np.clip(part - step, 0.0, 1.0)
     return mean[:, 0] * width[:, 0], speeds, low + width * part

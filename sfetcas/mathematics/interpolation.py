@@ -8,14 +8,25 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-from .arrays import Array, fixed
+from .arrays import Array, fixed, numbers
 
-__all__ = ["differentiation", "evaluation", "gauss", "integration", "legendre_tail", "lobatto", "pieces"]
+__all__ = [
+    "differentiation",
+    "evaluation",
+    "gauss",
+    "integration",
+    "legendre_tail",
+    "legendre_values",
+    "lobatto",
+    "pieces",
+    "power_series",
+]
 
 
 @functools.cache
@@ -56,13 +67,13 @@ def _barycentric(nodes: Array) -> Array:
 
 def evaluation(nodes: Array, x: ArrayLike) -> Array:
     """Matrix (len(x), len(nodes)) that takes nodal values to values at x."""
-    x = np.atleast_1d(np.asarray(x, dtype=float))
+    x = np.atleast_1d(numbers(x))
     difference = x[:, None] - nodes[None, :]
     # Nearer than that the quotient would overflow.
     hit = np.abs(difference) < 1e-200
     quotient = _barycentric(nodes) / np.where(hit, 1.0, difference)
     quotient = np.where(hit.any(axis=1, keepdims=True), hit.astype(float), quotient)
-    return np.asarray(quotient / quotient.sum(axis=1, keepdims=True))
+    return numbers(quotient / quotient.sum(axis=1, keepdims=True))
 
 
 def differentiation(nodes: Array, x: ArrayLike | None = None) -> Array:
@@ -78,10 +89,26 @@ def differentiation(nodes: Array, x: ArrayLike | None = None) -> Array:
 
 def integration(nodes: Array, x: ArrayLike) -> Array:
     """Matrix (len(x), len(nodes)) that takes nodal values to integrals from 0 to x of their interpolant."""
-    x = np.atleast_1d(np.asarray(x, dtype=float))
+    x = np.atleast_1d(numbers(x))
     points, weights = gauss((len(nodes) + 1) // 2 + 1)
     inner = evaluation(nodes, (x[:, None] * points).ravel()).reshape(len(x), len(points), len(nodes))
-    return np.asarray(x[:, None] * np.einsum("k,xkn->xn", weights, inner))
+    return numbers(x[:, None] * np.einsum("k,xkn->xn", weights, inner))
+
+
+def power_series(x: Array, terms: Sequence[Any]) -> Array:
+    """c0 + c1 x + c2 x^2 + ... at x (...)."""
+    total = terms[-1] + 0.0 * x
+    for term in reversed(terms[:-1]):
+        total = term + total * x
+    return numbers(total)
+
+
+def legendre_values(x: Array, degree: int) -> Array:
+    """Legendre polynomials of degree 0, 1, ... at x (...), (..., degree + 1)."""
+    found = [1.0 + 0.0 * x, x]
+    for k in range(2, degree + 1):
+        found.append((found[-1] * x * (2 * k - 1) - found[-2] * (k - 1)) / k)
+    return np.moveaxis(numbers(found[: degree + 1]), 0, -1)
 
 
 def legendre_tail(nodes: Array) -> Array:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import TINY, Array
+from .arrays import TINY, Array, numbers
 
 __all__ = [
     "Components",
@@ -72,12 +72,14 @@ def turned(q: Sequence[Any], v: Sequence[Any]) -> list[Any]:
 
 
 def _components(a: ArrayLike) -> list[Array]:
-    a = np.asarray(a, dtype=float)
+    a = numbers(a)
     return [a[..., i] for i in range(a.shape[-1])]
 
 
 def _stacked(parts: list[Array]) -> Array:
     """The inverse; sums of products have the shape that all are broadcast to."""
+    if any(hasattr(part, "expression") for part in parts):
+        return np.moveaxis(numbers(parts), 0, -1)
     found = np.empty((*np.shape(parts[0]), len(parts)))
     for i, part in enumerate(parts):
         found[..., i] = part
@@ -91,7 +93,7 @@ def multiply(a: ArrayLike, b: ArrayLike) -> Array:
 
 def conjugate(q: ArrayLike) -> Array:
     """The inverse rotation, shape (..., 4)."""
-    return np.asarray(q, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+    return numbers(numbers(q) * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
@@ -109,7 +111,7 @@ def turned_by(q: Array, v: Array) -> Array:
 
 def matrix(q: ArrayLike) -> Array:
     """Rotation matrices, shape (..., 3, 3); the columns are the turned unit vectors."""
-    q = np.asarray(q, dtype=float)
+    q = numbers(q)
     return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
 
 

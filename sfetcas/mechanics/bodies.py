@@ -15,6 +15,7 @@ transpose of the shapes that the ends give the member.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,14 +24,17 @@ from numpy.typing import ArrayLike
 from ..description.matrices import rigid_motions
 from ..description.scene import Scene
 from ..description.sections import breaks
+from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, numbers, values_of
 from ..mathematics.interpolation import gauss, integration
+from ..mathematics.keeping import kept
 
 __all__ = ["BodyData", "Lever", "body_of", "lever_along", "own_axes", "quadrature", "shapes_along"]
 
-PANELS, POINTS = 24, 6
-"""Quadrature along a member: exact for polynomials of degree 11 a panel, and no panel turns by much."""
+PANELS, POINTS, PANELS_A_RADIAN = 24, 6, 4.0
+"""Quadrature along a member: exact for polynomials of degree 11 a panel; so many panels where anything varies along it,
+and so many at least that none turns by more than a quarter of a radian."""
 
 RIGID = 1e-11
 """Compliances below this share of the largest do not exist."""
@@ -79,18 +83,19 @@ class BodyData:
     mass: Array | None = None
 
 
+@kept(64)
 def body_of(scene: Scene, name: str) -> BodyData:
     """The body of a small member."""
     member = scene.members[name]
-    places = np.array([scene.nodes[n].position for n in member.nodes], dtype=float)
+    places = numbers([scene.nodes[n].position for n in member.nodes])
     rest = places - places[0]
     if member.stiffness is None:
         return _from_section(scene, name, rest)
     turn = np.kron(np.eye(2 * len(rest)), own_axes(scene, name))
 
     def fixed(matrix: ArrayLike) -> Array:
-        own = np.asarray(matrix, dtype=float)
-        return np.asarray(turn @ (0.5 * (own + own.T)) @ turn.T)
+        own = numbers(matrix)
+        return numbers(turn @ (0.5 * (own + own.T)) @ turn.T)
 
     mass = None if member.mass is None else fixed(member.mass)
     weight = None if mass is None else _lever_of_mass(mass, rest)
@@ -99,7 +104,7 @@ def body_of(scene: Scene, name: str) -> BodyData:
 
 def own_axes(scene: Scene, name: str) -> Array:
     """Section axes of a member at its start as columns, (3, 3)."""
-    return np.asarray(quaternion.matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0])
+    return numbers(quaternion.matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0])
 
 
 def _lever_of_mass(mass: Array, rest: Array) -> Lever:
@@ -108,8 +113,8 @@ def _lever_of_mass(mass: Array, rest: Array) -> Lever:
     ends = along.T @ mass
     about = ends @ rigid_motions(rest)[:, 3:]
     # Moving along i while turning about j takes the mass times the component of (j x centre) along i.
-    first = 0.5 * np.array([about[2, 1] - about[1, 2], about[0, 2] - about[2, 0], about[1, 0] - about[0, 1]])
-    return Lever(float(np.trace(ends @ along)) / 3.0, -first, ends)
+    first = 0.5 * numbers([about[2, 1] - about[1, 2], about[0, 2] - about[2, 0], about[1, 0] - about[0, 1]])
+    return Lever(np.trace(ends @ along) / 3.0, -first, ends)
 
 
 def quadrature(scene: Scene, name: str) -> tuple[Array, Array]:
@@ -121,13 +126,15 @@ def quadrature(scene: Scene, name: str) -> tuple[Array, Array]:
 
 def _edges(scene: Scene, name: str) -> Array:
     """Ends of the panels: equal ones, and wherever the shape, the section or a load profile has a kink."""
-    member = scene.members[name]
-    kinks = [*scene.center_lines[name].breaks]
-    kinks += [] if member.section is None else scene.sections[member.section].breaks
-    for load in scene.loads.values():
-        if load.member == name and load.profile is not None:
-            kinks += breaks(load.profile)
-    return np.unique(np.concatenate([np.linspace(0.0, 1.0, PANELS + 1), np.array(kinks, dtype=float)]))
+    member, line = scene.members[name], scene.center_lines[name]
+    profiles = [load.profile for load in scene.loads.values() if load.member == name and load.profile is not None]
+    kinks, even = [*line.breaks, *(kink for profile in profiles for kink in breaks(profile))], not profiles
+    if member.section is not None:
+        section = scene.sections[member.section]
+        kinks, even = [*kinks, *section.breaks], even and section.even
+    panels = 1 if even and member.shape.type in ("straight", "arc", "helix") else PANELS
+    panels = max(panels, math.ceil(PANELS_A_RADIAN * line.turning))
+    return np.unique(np.concatenate([np.linspace(0.0, 1.0, panels + 1), np.array(kinks, dtype=float)]))
 
 
 def _integrals(edges: Array, values: Array, x: Array) -> Array:
@@ -139,15 +146,12 @@ def _integrals(edges: Array, values: Array, x: Array) -> Array:
     before = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(whole, axis=0)])
     e = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(lengths) - 1)
     rows = integration(points, (x - edges[e]) / lengths[e]) * lengths[e][:, None]
-    return np.asarray(before[e] + np.einsum("nk,nk...->n...", rows, panels[e]))
+    return numbers(before[e] + np.einsum("nk,nk...->n...", rows, panels[e]))
 
 
 def _moments_of_wrench(arm: Array) -> Array:
     """Moment at places of a unit wrench at the end, (n, 3, 6); ``arm`` from the places to the end."""
-    b = np.zeros((len(arm), 3, 6))
-    b[:, :, :3] = np.cross(arm[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1)
-    b[:, :, 3:] = np.eye(3)
-    return b
+    return np.concatenate([_cross_all(arm), np.broadcast_to(np.eye(3), (len(arm), 3, 3))], axis=2)
 
 
 def compliance_along(scene: Scene, name: str, x: Array) -> Array:
@@ -165,37 +169,51 @@ def _from_section(scene: Scene, name: str, rest: Array) -> BodyData:
     flexible = compliance_along(scene, name, x) * (w * line.length)[:, None, None]
     b = _moments_of_wrench(line.positions(np.array([1.0]))[0] - line.positions(x))
     compliance = np.einsum("nji,njk,nkl->il", b, flexible, b)
-    size = float(np.abs(rest).max())
-    unit = np.array([size, size, size, 1.0, 1.0, 1.0])
-    # In the plane only its own three freedoms; seen as energies: forces times the size, rotations as they are.
-    own = np.arange(6) if scene.resolved_dimension == "space" else np.array([0, 1, 5])
-    values, vectors = np.linalg.eigh((compliance / unit[:, None] / unit[None, :])[np.ix_(own, own)])
-    vectors = np.eye(6)[:, own] @ vectors
-    moves = values > RIGID * values[-1]
-    at_end = (vectors[:, moves] / values[moves]) @ vectors[:, moves].T / unit[:, None] / unit[None, :]
+    at_end, still = _against(scene, name, compliance)
     # Deformations are those of the second end seen from the first: E takes all freedoms to them.
     to_end = _seen_from_first(rest[1])
-    stiff = (vectors[:, ~moves].T / unit) @ to_end
+    stiff = still @ to_end
     density = scene.sections[str(scene.members[name].section)]
     weight = None if density.missing(["rhoA"]) else lever_along(scene, name, density.mass(x), x, w)
     return BodyData(rest, to_end.T @ at_end @ to_end, stiff, weight)
 
 
-def _carried(arm: Array) -> Array:
-    """Displacement and rotation of the end of an arm by those of its foot, (6, 6)."""
-    matrix = np.eye(6)
-    matrix[:3, 3:] = np.cross(np.eye(3), arm).T
-    return matrix
+def _against(scene: Scene, name: str, compliance: Array) -> tuple[Array, Array]:
+    """Inverse (6, 6) of the compliance of the second end, and what that cannot do, (n, 6), both by six freedoms."""
+    line = scene.center_lines[name]
+    # Seen as energies: forces times the size, rotations as they are.
+    size = float(np.abs(values_of(line.positions(np.array([1.0]))[0] - line.start)).max())
+    unit = np.array([size, size, size, 1.0, 1.0, 1.0])
+    # In the plane only its own three freedoms.
+    own = np.arange(6) if scene.resolved_dimension == "space" else np.array([0, 1, 5])
+    energies = (compliance / unit[:, None] / unit[None, :])[np.ix_(own, own)]
+    values, vectors = np.linalg.eigh(values_of(energies))
+    still = numbers(vectors[:, values <= RIGID * values[-1]].T)
+    if line.turning == 0.0:
+        # The length of what is straight, whatever rounding says.
+        still = np.concatenate([line.tangents(np.array([0.0]))[0], np.zeros(3)])[None, own]
+    elif len(still) and hasattr(energies, "expression"):
+        raise SceneError("found a member that is all but straight, accepted: one that is straight", ("members", name))
+    shift = values[-1] * (still.T @ still)
+    found = np.linalg.inv(energies + shift) - shift / values[-1] ** 2
+    onto = np.eye(6)[:, own] / unit[:, None]
+    return onto @ found @ onto.T, still @ onto.T
+
+
+def _carried(arms: Array) -> Array:
+    """Displacement and rotation of the ends of arms (n, 3) by those of their feet, (n, 6, 6)."""
+    one, other = (np.broadcast_to(np.eye(6)[part], (len(arms), 3, 6)) for part in (slice(3), slice(3, 6)))
+    return np.concatenate([np.concatenate([one[:, :, :3], -_cross_all(arms)], axis=2), other], axis=1)
 
 
 def _seen_from_first(arm: Array) -> Array:
     """Displacement and rotation of the second end against what the first one carries, (6, 12)."""
-    return np.hstack([-_carried(arm), np.eye(6)])
+    return np.hstack([-_carried(arm[None, :])[0], np.eye(6)])
 
 
 def _cross_all(r: Array) -> Array:
     """Columns ``r x e_i``, (n, 3, 3)."""
-    return np.asarray(np.cross(r[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1))
+    return numbers(np.cross(r[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1))
 
 
 def shapes_along(scene: Scene, name: str, x: Array) -> Array:
@@ -216,12 +234,8 @@ def shapes_along(scene: Scene, name: str, x: Array) -> Array:
     bent = np.einsum("nji,njk->nik", b, softness)
     by_moment, by_origin = _integrals(edges, bent, x), _integrals(edges, bent @ _cross_all(here), x)
     by_wrench = np.concatenate([by_moment @ _cross_all(places) - by_origin, by_moment], axis=2).transpose(0, 2, 1)
-    size = float(np.abs(end - start).max())
-    unit = np.array([size, size, size, 1.0, 1.0, 1.0])
-    inverse = np.linalg.pinv(compliance / unit[:, None] / unit[None, :], rcond=RIGID) / unit[:, None] / unit[None, :]
-    shapes = by_wrench @ inverse @ _seen_from_first(end - start)
-    shapes[:, :, :6] += np.array([_carried(arm) for arm in places - start])
-    return np.asarray(shapes)
+    shapes = by_wrench @ _against(scene, name, compliance)[0] @ _seen_from_first(end - start)
+    return np.concatenate([shapes[:, :, :6] + _carried(places - start), shapes[:, :, 6:]], axis=2)
 
 
 def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> Lever:
@@ -230,4 +244,4 @@ def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> 
     share = profile * w * line.length
     first = share @ (line.positions(x) - line.positions(np.array([0.0]))[0])
     # What forces do at the ends is what the ends do where they act.
-    return Lever(float(share.sum()), first, np.einsum("n,nij->ij", share, shapes_along(scene, name, x)[:, :3]))
+    return Lever(share.sum(), first, np.einsum("n,nij->ij", share, shapes_along(scene, name, x)[:, :3]))

@@ -11,7 +11,7 @@ from ..description.obstacles import Obstacle, obstacle, rounded, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
 from ..description.supports import turned_about
-from ..mathematics.arrays import Array, Index, unit
+from ..mathematics.arrays import Array, Index, normals, numbers, unit
 from .beams import Scales
 from .bodies import BodyData, body_of
 from .contact_joints import (
@@ -40,7 +40,6 @@ from .joints import (
 )
 from .mesh import Cushion, Mesh, Touch
 from .parts import Parts
-from .positions import normals
 from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
 from .segments import Segments, cushioned
 from .terms import GROUND, Group, One
@@ -102,18 +101,16 @@ class _Maker:
             return
         if pin.joint in ("hinge", "cylindrical"):
             axis = node.axis if pin.joint == "hinge" else node.direction
-            yield One(Hinge(True), name, pin.node, normals(np.asarray(axis), 3).ravel(), sides, row=name)
+            yield One(Hinge(True), name, pin.node, normals(numbers(axis)).ravel(), sides, row=name)
         elif pin.joint == "universal":
-            axes = [unit(a) for a in (node.axis, node.axis2)]
-            yield One(Universal(True), name, pin.node, np.concatenate(axes), sides, row=name)
+            axes = unit([node.axis, node.axis2])
+            yield One(Universal(True), name, pin.node, axes.ravel(), sides, row=name)
 
     def _slide(self, member: str, i: int, node: str) -> One:
-        direction = np.asarray(self.scene.nodes[node].direction, dtype=float)
+        direction = numbers(self.scene.nodes[node].direction)[: self.axes]
         places = self.segments.place(node), self.segments.place(self.segments.ends[member, i])
         name = f"slide of {member} at {node}"
-        return One(
-            Slide(self.space), name, node, normals(direction, self.axes).ravel(), (self._base(node),), places, name
-        )
+        return One(Slide(self.space), name, node, normals(direction).ravel(), (self._base(node),), places, name)
 
     def _base(self, node: str) -> int:
         """Rotation that carries the lines of a node."""
@@ -144,18 +141,18 @@ class _Maker:
         spring, scales = self.scene.springs[name], self.scales
         if spring.type == "rotational":
             crossed, sides, head = self._measured(name)
-            data = np.array([*head, spring.stiffness / scales.moment, spring.rest, *self._near])
+            data = numbers([*head, spring.stiffness / scales.moment, spring.rest, *self._near])
             return One(TurnSpring(self.space, crossed), name, spring.node, data, sides)
         other, places = spring.to, self._ends_of(name)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
         if spring.direction is not None:
-            data = np.array([*unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
+            data = numbers([*unit(spring.direction)[: self.axes], stiffness, spring.rest / scales.length])
             return One(LineSpring(self.space), name, spring.node, data, (), places)
         start = self.scene.nodes[spring.node].position
         anchor = self.scene.nodes[other].position if other is not None else spring.anchor or start
-        gap = np.asarray(start, dtype=float) - np.asarray(anchor, dtype=float)
-        length = float(np.linalg.norm(gap)) if spring.length is None else spring.length
-        data = np.array([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
+        gap = numbers(start) - numbers(anchor)
+        length = np.linalg.norm(gap) if spring.length is None else spring.length
+        data = numbers([*gap[: self.axes] / scales.length, stiffness, length / scales.length])
         return One(Spring(self.space), name, spring.node, data, (), places)
 
     def _ends_of(self, name: str) -> tuple[int, int]:
@@ -172,11 +169,11 @@ class _Maker:
             at = spring.stop[0 if side == "low" else 1]
             if spring.type == "rotational":
                 crossed, sides, head = self._measured(name)
-                data = np.array([*head, at, *self._near])
+                data = numbers([*head, at, *self._near])
                 stop = TurnStop(self.space, crossed)
                 yield One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
                 continue
-            data = np.array([*unit(spring.direction)[: self.axes], at / self.scales.length])
+            data = numbers([*unit(spring.direction)[: self.axes], at / self.scales.length])
             yield One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
 
     @property

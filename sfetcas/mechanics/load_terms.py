@@ -21,7 +21,7 @@ from ..description.loads import Load
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics import interpolation, quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, numbers, scattered
 from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
@@ -258,7 +258,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
         elif follows:
             yield One(FollowingMoment(space), *where, nothing, (number,))
         elif space and rotations.kind[number] == Turn.AXIS:
-            axis = np.append(rotations.axis[number], 0.0)
+            axis = numbers([*rotations.axis[number], 0.0])
             yield One(AxisMoment(space), *where, axis, (GROUND, number))
         else:
             yield One(Moment(space), *where, nothing, (number,))
@@ -304,9 +304,8 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
     """
     on_element = forces.sum(axis=1)
     pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
-    on_places = np.zeros((len(segments.places), element.axes))
     alone, starts = segments.single
-    np.add.at(on_places, starts, on_element[alone])
+    on_places = scattered(len(segments.places), starts, on_element[alone])
     for part in segments.longer:
         here = part.elements
         if not forces[here].any():

@@ -16,7 +16,7 @@ import numpy as np
 from ..description.scene import Load, Motion, Scene
 from ..description.sections import evaluate
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, numbers, plus, unit
 from ..mathematics.interpolation import pieces
 from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
@@ -131,6 +131,26 @@ MOTIONS = ("shift", "turn")
 
 
 @dataclass(frozen=True, eq=False)
+class _Sums:
+    """Arrays of a loading while shares are added to them."""
+
+    parts: dict[str, Array]
+    loads: list[Array]
+
+    def add(self, name: str, key: Any, value: Any) -> None:
+        """A share of an array."""
+        self.parts[name] = plus(self.parts[name], key, value)
+
+    def load(self, group: int, key: Any, value: Any) -> None:
+        """A share of what grows in a group of connections."""
+        self.loads[group] = plus(self.loads[group], key, value)
+
+    def loading(self, connections: tuple[Group, ...]) -> Loading:
+        """The sum of all shares."""
+        return Loading(**self.parts, loads=tuple(self.loads), kinds=tuple(group.kind for group in connections))
+
+
+@dataclass(frozen=True, eq=False)
 class _Writer:
     """Everything that it takes to turn a load into shares of a loading."""
 
@@ -143,24 +163,24 @@ class _Writer:
     beams: Beams
     connections: tuple[Group, ...]
 
-    def empty(self) -> Loading:
+    def empty(self) -> _Sums:
         """No load and no motion."""
         places, turns = len(self.segments.places), len(self.rotations.kind)
         along = (*self.beams.weight.shape, self.element.axes)
-        return Loading(
-            force=np.zeros((places, self.element.axes)),
-            own=np.zeros((places, self.element.axes)),
-            moment=np.zeros((turns, 3)),
-            further=np.zeros((turns, 3)),
-            jump=np.zeros((len(self.beams.weight), 3)),
-            couple=np.zeros((places, 3)),
-            pull=np.zeros(along),
-            spread=np.zeros(along),
-            shift=np.zeros(places * self.element.axes),
-            turn=np.zeros((turns, 3)),
-            loads=tuple(np.zeros((len(group.names), group.kind.sizes[4])) for group in self.connections),
-            kinds=tuple(group.kind for group in self.connections),
-        )
+        shapes = {
+            "force": (places, self.element.axes),
+            "own": (places, self.element.axes),
+            "moment": (turns, 3),
+            "further": (turns, 3),
+            "jump": (len(self.beams.weight), 3),
+            "couple": (places, 3),
+            "pull": along,
+            "spread": along,
+            "shift": (places * self.element.axes,),
+            "turn": (turns, 3),
+        }
+        parts = {name: np.zeros(shape) for name, shape in shapes.items()}
+        return _Sums(parts, [np.zeros((len(group.names), group.kind.sizes[4])) for group in self.connections])
 
     def elements_of(self, member: str) -> slice:
         start = self.beams.first[member]
@@ -169,7 +189,7 @@ class _Writer:
     def places(self, member: str) -> Array:
         """Fractions of the length of the integration points of a member, (elements, points)."""
         cuts = self.mesh.cuts[member]
-        return np.asarray(cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.points)
+        return numbers(cuts[:-1, None] + np.diff(cuts)[:, None] * self.element.points)
 
     def terms(self, name: str, chosen: Callable[[Term], bool]) -> Iterator[tuple[int, int, Term]]:
         """Group, number in it, and kind of the terms of a name whose kind is chosen."""
@@ -178,26 +198,26 @@ class _Writer:
                 yield i, group.names.index(name), group.kind
 
     def vector(self, vector: Any) -> Array:
-        return np.asarray(vector, dtype=float)[: self.element.axes]
+        return numbers(vector)[: self.element.axes]
 
     def segments_of(self, member: str) -> list[tuple[int, slice]]:
         """Number of the first place and elements of each segment of a member."""
         parts = (part for part in self.segments.parts if part.member == member)
         return [(self.segments.place(part.start), part.elements) for part in parts]
 
-    def push(self, group: Loading, place: int, force: Array) -> None:
+    def push(self, group: _Sums, place: int, force: Array) -> None:
         """Add a force on a place itself, N."""
-        group.force[place] += force / self.scales.force
-        group.own[place] += force / self.scales.force
+        group.add("force", place, force / self.scales.force)
+        group.add("own", place, force / self.scales.force)
 
     # -- loads ----------------------------------------------------------------------------------
 
-    def add_load(self, group: Loading, name: str, load: Load) -> None:
+    def add_load(self, group: _Sums, name: str, load: Load) -> None:
         if load.type == "moment":
             self._add_moment(group, name, load)
         elif load.follows and load.type == "force":
             ((i, number, _),) = self.terms(f"loads.{name}", lambda kind: kind.is_load)
-            group.loads[i][number] += self.vector(load.vector) / self.scales.force
+            group.load(i, number, self.vector(load.vector) / self.scales.force)
         elif load.node is not None:
             self.push(group, self.segments.place(load.node), self.vector(load.vector))
         elif self.scene.members[str(load.member)].type == "small":
@@ -215,38 +235,38 @@ class _Writer:
         if load.frame != "section":
             return self.vector(load.vector)
         turned = self.scene.center_lines[str(load.member)].quaternions(x.ravel())
-        return quaternion.rotate(turned, np.asarray(load.vector))[:, : self.element.axes].reshape(*x.shape, -1)
+        return quaternion.rotate(turned, numbers(load.vector))[:, : self.element.axes].reshape(*x.shape, -1)
 
-    def _add_moment(self, group: Loading, name: str, load: Load) -> None:
-        value = np.asarray(load.vector) / self.scales.moment
+    def _add_moment(self, group: _Sums, name: str, load: Load) -> None:
+        value = numbers(load.vector) / self.scales.moment
         ((i, number, kind),) = self.terms(f"loads.{name}", lambda kind: kind.is_load)
         turn = self.connections[i].turns[number, -1]
-        group.loads[i][number] += value[3 - kind.sizes[4] :]
+        group.load(i, number, value[3 - kind.sizes[4] :])
         if kind.follows:
             return
-        group.moment[turn] += value
+        group.add("moment", turn, value)
         inner = None if load.node is not None else inner_cut(self.mesh, self.beams.first, load)
         if load.node is not None:
-            group.couple[self.segments.place(load.node)] += value
+            group.add("couple", self.segments.place(load.node), value)
         elif inner is not None:
-            group.jump[inner] += value
+            group.add("jump", inner, value)
 
-    def _add_point_force(self, group: Loading, load: Load) -> None:
+    def _add_point_force(self, group: _Sums, load: Load) -> None:
         member = str(load.member)
         value = self.vector(load.vector) / self.scales.force
         cut = self.beams.first[member] + cut_of(self.mesh, load)
         for place, part in self.segments_of(member):
             if part.start <= cut < part.stop:
-                group.pull[part.start : cut] -= value
-                group.force[place] += value
+                group.add("pull", slice(part.start, cut), -value)
+                group.add("force", place, value)
                 return
         self.push(group, self.segments.place(self.segments.ends[member, 1]), self.vector(load.vector))
 
-    def add_weight(self, group: Loading, member: str) -> None:
+    def add_weight(self, group: _Sums, member: str) -> None:
         if self.scene.members[member].type == "small":
             weight = body_of(self.scene, member).weight
             assert weight is not None
-            self._add_lever(group, member, weight, np.asarray(self.scene.gravity))
+            self._add_lever(group, member, weight, numbers(self.scene.gravity))
             return
         section = self.scene.members[member].section
         if section is None:
@@ -259,50 +279,51 @@ class _Writer:
             return
         self.spread(group, member, mass[..., None] * self.vector(self.scene.gravity))
 
-    def _add_weight_of_chord(self, group: Loading, member: str) -> None:
+    def _add_weight_of_chord(self, group: _Sums, member: str) -> None:
         """The mass of a rigid member is spread over the straight line between its nodes, whatever its shape."""
         section = self.scene.sections[str(self.scene.members[member].section)]
         x, w = pieces(section.breaks, 9)
-        start, end = (np.asarray(self.scene.nodes[n].position) for n in self.scene.members[member].nodes)
+        start, end = (numbers(self.scene.nodes[n].position) for n in self.scene.members[member].nodes)
         share = section.mass(x) * w * np.linalg.norm(end - start)
         weight = self.vector(self.scene.gravity)
         self.push(group, self.segments.place(self.segments.ends[member, 0]), (share @ (1.0 - x)) * weight)
         self.push(group, self.segments.place(self.segments.ends[member, 1]), (share @ x) * weight)
 
-    def add_mass(self, group: Loading, node: str) -> None:
+    def add_mass(self, group: _Sums, node: str) -> None:
         """Weight of a lumped mass."""
         weight = self.scene.nodes[node].mass * self.vector(self.scene.gravity)
         self.push(group, self.segments.place(node), weight)
 
-    def spread(self, group: Loading, member: str, density: Array, *, follows: bool = False) -> None:
+    def spread(self, group: _Sums, member: str, density: Array, *, follows: bool = False) -> None:
         """Add a force per length (elements, points, axes), N/m."""
-        part, forces = self.elements_of(member), np.zeros_like(group.spread)
-        forces[part] = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
+        part = self.elements_of(member)
+        along = self.beams.weight[part][..., None] * density * (self.scales.length / self.scales.force)
+        forces = plus(np.zeros((*self.beams.weight.shape, self.element.axes)), part, along)
         if follows:
             for i, turned in enumerate(self.connections):
                 if isinstance(turned.kind, FollowingSpread):
                     elements = followed_elements(self.scene, self.segments)
-                    group.loads[i][:] += forces[elements].reshape(len(elements), -1)
+                    group.load(i, slice(None), forces[elements].reshape(len(elements), -1))
             return
         pull, on_places = carried(forces, self.segments, self.element)
-        group.spread[part] += forces[part]
-        group.pull[part] += pull[part]
-        group.force[:] += on_places
+        group.add("spread", part, forces[part])
+        group.add("pull", part, pull[part])
+        group.add("force", slice(None), on_places)
 
     # -- small members ----------------------------------------------------------------------------
 
-    def _add_on_body(self, group: Loading, load: Load) -> None:
+    def _add_on_body(self, group: _Sums, load: Load) -> None:
         member = str(load.member)
         if load.type == "force":
             length = self.scene.center_lines[member].length
-            lever = lever_along(self.scene, member, np.ones(1) / length, np.array([load.at or 0.0]), np.ones(1))
+            lever = lever_along(self.scene, member, np.ones(1) / length, numbers([load.at or 0.0]), np.ones(1))
         else:
             x, w = quadrature(self.scene, member)
             profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
             lever = lever_along(self.scene, member, profile, x, w)
-        self._add_lever(group, member, lever, np.asarray(load.vector))
+        self._add_lever(group, member, lever, numbers(load.vector))
 
-    def _add_lever(self, group: Loading, member: str, lever: Lever, vector: Array) -> None:
+    def _add_lever(self, group: _Sums, member: str, lever: Lever, vector: Array) -> None:
         """A profile times a vector: force, first moment and consistent forces as the body's kernel takes them."""
         ((i, number, kind),) = self.terms(member, lambda kind: isinstance(kind, Body))
         axes = self.element.axes
@@ -314,39 +335,38 @@ class _Writer:
         first = np.outer(value, lever.first[:axes] / self.scales.length)
         tensor = np.einsum("a,bj->abj", value, ends)
         parts = [lever.total * value, first.T.ravel(), tensor.transpose(2, 1, 0).ravel()]
-        group.loads[i][number] += np.concatenate(parts)
+        group.load(i, number, np.concatenate(parts))
 
     # -- motions --------------------------------------------------------------------------------
 
-    def add_motion(self, group: Loading, name: str, motion: Motion) -> None:
+    def add_motion(self, group: _Sums, name: str, motion: Motion) -> None:
         number, axes = self.segments.place(motion.node), self.element.axes
         if motion.between is not None:
             self._add_drive(group, name, motion)
             return
         if motion.displacement is not None:
             shift = self.vector(motion.displacement) / self.scales.length
-            group.shift[number * axes : (number + 1) * axes] += shift
+            group.add("shift", slice(number * axes, (number + 1) * axes), shift)
         if motion.rotation is not None:
             turn = self.rotations.node_turn[motion.node]
             assert turn is not None
-            group.turn[turn] += self._rotation_vector(motion)
+            group.add("turn", turn, self._rotation_vector(motion))
 
-    def _add_drive(self, group: Loading, name: str, motion: Motion) -> None:
+    def _add_drive(self, group: _Sums, name: str, motion: Motion) -> None:
         """Angle or travel of a driven joint."""
         for i, number, kind in self.terms(name, lambda kind: kind.is_driven):
             if isinstance(kind, DrivenTurn):
-                group.loads[i][number] += motion.rotation
+                group.load(i, number, motion.rotation)
             else:
-                along = np.asarray(self.scene.nodes[motion.node].direction, dtype=float)
-                travel = np.dot(motion.displacement or (), along / np.linalg.norm(along))
-                group.loads[i][number] += travel / self.scales.length
+                along = unit(self.scene.nodes[motion.node].direction)
+                travel = np.dot(numbers(motion.displacement), along)
+                group.load(i, number, travel / self.scales.length)
 
     def _rotation_vector(self, motion: Motion) -> Array:
         if isinstance(motion.rotation, tuple):
-            return np.asarray(motion.rotation, dtype=float)
+            return numbers(motion.rotation)
         assert motion.rotation is not None
-        axis = np.asarray(self.scene.nodes[motion.node].turn_axis, dtype=float)
-        return np.asarray(motion.rotation * axis / np.linalg.norm(axis))
+        return numbers(motion.rotation * unit(self.scene.nodes[motion.node].turn_axis))
 
 
 def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | None, Loading]:
@@ -358,10 +378,10 @@ def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | No
         A moment on a node that nothing turns with.
     """
     scene, writer = parts.scene, _Writer(connections=connections, **vars(parts))
-    groups: dict[str | None, Loading] = {None: writer.empty()}
+    groups: dict[str | None, _Sums] = {None: writer.empty()}
     for name, load in scene.loads.items():
         writer.add_load(groups.setdefault(load.history, writer.empty()), name, load)
-    if scene.gravity is not None and np.any(scene.gravity):
+    if scene.gravity is not None and any(scene.gravity):
         for member in scene.members:
             writer.add_weight(groups[None], member)
         for node in scene.nodes:
@@ -370,5 +390,5 @@ def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | No
         writer.add_motion(groups.setdefault(motion.history, writer.empty()), name, motion)
     for i, terms in enumerate(connections):
         for history, more in terms.loads.items():
-            groups.setdefault(history, writer.empty()).loads[i][:] += more
-    return groups
+            groups.setdefault(history, writer.empty()).load(i, slice(None), more)
+    return {history: sums.loading(connections) for history, sums in groups.items()}

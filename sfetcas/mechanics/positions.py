@@ -22,12 +22,13 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.supports import drives
-from ..mathematics.arrays import Array, Index, unit
+from ..errors import SceneError
+from ..mathematics.arrays import Array, Index, normals, numbers, unit
 from ..mathematics.linear import SparseMap
 from .mesh import Mesh
 from .segments import Segments
 
-__all__ = ["Positions", "entries", "normals", "place_nodes"]
+__all__ = ["Positions", "entries", "place_nodes"]
 
 
 @dataclass(frozen=True)
@@ -55,13 +56,6 @@ class Positions:
     rows: tuple[str, ...]
     unknowns: tuple[str, ...]
     kept: Index
-
-
-def normals(direction: Array, axes: int) -> Array:
-    """Unit vectors that complete a direction to an orthonormal basis, (axes - 1, axes)."""
-    d = unit(direction[:axes])
-    basis = np.linalg.svd(d[None, :])[2][1:]
-    return np.asarray(basis)
 
 
 def _slides(scene: Scene, name: str) -> bool:
@@ -159,8 +153,11 @@ class _Placing:
         return found
 
     def _guide(self, name: str) -> Array:
-        d = np.asarray(self.scene.nodes[name].direction)[: self.axes]
-        return unit(d)
+        direction = numbers(self.scene.nodes[name].direction)
+        if hasattr(direction, "expression"):
+            message = "found a guide that turns with parameters, accepted: one that stays, as unknowns go along it"
+            raise SceneError(message, ("nodes", name, "direction"))
+        return unit(direction[: self.axes])
 
     def _prescribed(self, name: str) -> _Place:
         return _Place({("B", self.number[name]): self.eye})
@@ -189,7 +186,7 @@ class _Placing:
     def _across(self, name: str, found: _Place) -> _Place:
         """Rows that keep a place on its guide; its displacement along it."""
         gap = found.plus(self._prescribed(name), -1.0)
-        across = normals(self._guide(name), self.axes)
+        across = normals(self._guide(name))
         self._close(gap, [f"{name} across its guide"] * len(across), across)
         along = self._guide(name)[:, None] @ self._guide(name)[None, :]
         return self._prescribed(name).plus(gap.times(along))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..description.scene import Member, Node, Scene
-from ..mathematics.arrays import Array, Index, unit
+from ..mathematics.arrays import Array, Index, numbers, unit
 from .elements import Element
 from .mesh import Mesh
 
@@ -74,29 +74,29 @@ class Rotations:
 
 def number_rotations(scene: Scene, mesh: Mesh, element: Element) -> Rotations:
     """Number the rotations along the members and say how each may change."""
-    numbers = _Numbers(scene, element.space)
+    numbering = _Numbers(scene, element.space)
     turns: list[list[int]] = []
     ends: dict[str, tuple[int, ...]] = {}
     for name, member in scene.members.items():
-        first = numbers.of_end(name, 0)
+        first = numbering.of_end(name, 0)
         if member.type == "flexible":
-            inner = [numbers.new() for _ in range((len(mesh.cuts[name]) - 1) * element.order - 1)]
-        ends[name] = (first, *(numbers.of_end(name, i) for i in range(1, len(member.nodes))))
+            inner = [numbering.new() for _ in range((len(mesh.cuts[name]) - 1) * element.order - 1)]
+        ends[name] = (first, *(numbering.of_end(name, i) for i in range(1, len(member.nodes))))
         if member.type == "rigid":
             turns += [[first] * (element.order + 1)] * (len(mesh.cuts[name]) - 1)
         elif member.type == "flexible":
             chain = [first, *inner, ends[name][-1]]
             turns += [chain[e : e + element.order + 1] for e in range(0, len(chain) - 1, element.order)]
     for name, node in scene.nodes.items():
-        if node.joint == "rigid" and numbers.held[name] != Turn.FREE:
-            numbers.of(("node", name))
+        if node.joint == "rigid" and numbering.held[name] != Turn.FREE:
+            numbering.of(("node", name))
     return Rotations(
         turns=np.array(turns, dtype=np.intp).reshape(-1, element.order + 1),
-        kind=np.array(numbers.kind, dtype=np.intp),
-        axis=np.array([unit(a) for a in numbers.axis]).reshape(-1, 3),
-        pins=tuple(_pins(scene, numbers)),
+        kind=np.array(numbering.kind, dtype=np.intp),
+        axis=unit(numbers(numbering.axis).reshape(-1, 3)),
+        pins=tuple(_pins(scene, numbering)),
         ends=ends,
-        node_turn={name: numbers.given.get(numbers.root(("node", name))) for name in scene.nodes},
+        node_turn={name: numbering.given.get(numbering.root(("node", name))) for name in scene.nodes},
     )
 
 

@@ -24,7 +24,7 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, numbers
 from ..mathematics.quaternion import Components, product, turned
 
 __all__ = [
@@ -250,13 +250,13 @@ def _group(kind: Term, ones: list[One]) -> Group:
         kind=kind,
         turns=np.array([one.turns for one in ones], dtype=np.intp).reshape(n, turns),
         places=np.array([one.places for one in ones], dtype=np.intp).reshape(n, places),
-        data=np.array([one.data for one in ones], dtype=float).reshape(n, data),
+        data=numbers([one.data for one in ones]).reshape(n, data),
         rows=tuple(
             f"{one.row or one.name}, {c + 1} of {rows}" if rows > 1 else one.row for one in ones for c in range(rows)
         ),
         names=tuple(one.name for one in ones),
         nodes=tuple(one.node for one in ones),
-        loads={history: np.array([one.loads.get(history, nothing) for one in ones]) for history in histories},
+        loads={history: numbers([one.loads.get(history, nothing) for one in ones]) for history in histories},
     )
 
 

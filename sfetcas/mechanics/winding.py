@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, Index
+from ..mathematics.arrays import Array, Index, numbers
 from .joints import DrivenTurn, Turning
 from .loading import Loading
 from .rotations import PARALLEL, Turn
@@ -166,11 +166,11 @@ def winding_of(terms: tuple[Group, ...], space: bool) -> Winding:
             axis.append(data[:3])
             across.append(data[3:6] if group.kind.crossed else np.zeros(3))
     pairs = np.array(sides, dtype=np.intp).reshape(-1, 2)
-    lines = np.array(axis).reshape(-1, 3)
+    lines = numbers(axis).reshape(-1, 3)
     return Winding(
         sides=pairs,
         axis=lines,
-        across=np.array(across).reshape(-1, 3),
+        across=numbers(across).reshape(-1, 3),
         parts=tuple(parts),
         driven=tuple(_driven(terms[1:], pairs, lines)) if space else (),
         names=tuple(names),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -16,12 +16,13 @@ from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
 from ..description.shapes import end_of
 from ..errors import SceneError
-from ..mathematics.arrays import Array
+from ..mathematics.active import Active, gathered
+from ..mathematics.arrays import Array, numbers
+from ..mathematics.constants import picked
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
 from ..mechanics.model import Model, assemble
 from ..solvers.program import Program, data_of, is_data
-from .dependence import Dependence, Number, found
 
 __all__ = [
     "FACTOR",
@@ -177,7 +178,7 @@ def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, f
     single: dict[str, float] = {}
     for name, value in values.items():
         known = argument(scene, name)
-        given = np.asarray(value, dtype=float).ravel()
+        given = numbers(value).ravel()
         if len(given) != len(known.default) or not np.isfinite(given).all():
             count = len(known.default)
             accepted = "a finite number" if count == 1 else f"{count} finite numbers"
@@ -306,13 +307,15 @@ def _meaning(path: Sequence[str]) -> str:
 class Arguments:
     """What is given as a function of the arguments.
 
+    The numbers of the scene are symbols in the data of its model, which is assembled once: at values near those of the
+    scene at which nothing vanishes by chance, so that its structure is that of all values.
+
     Attributes
     ----------
     arguments : tuple of Argument
     model : Model
-        At values where nothing vanishes by chance: its structure is that of all values.
+        At these values.
     program : Program
-    rest : what is told of a model beside its data: undeformed positions
     defaults : ndarray (numbers,)
     """
 
@@ -324,135 +327,109 @@ class Arguments:
         rest: Callable[[Model], Array],
         prefix: str = "",
     ) -> None:
-        self._rest, self._undeformed = rest, len(rest(base))
-        self.arguments, self._scene, self._base = tuple(arguments), scene, base
+        self.arguments, self._scene = tuple(arguments), scene
         self.defaults = np.array([x for one in self.arguments for x in one.default])
-        numbers: list[Number] = []
-        for one in self.arguments:
-            numbers += [Number(n, x, one.low, one.high) for n, x in zip(one.names, one.default, strict=True)]
-        names = [number.name for number in numbers]
-        for name in names:
-            if names.count(name) > 1:
+        self._names = [name for one in self.arguments for name in one.names]
+        for name in self._names:
+            if self._names.count(name) > 1:
                 raise SceneError(f"found {name} more than once, accepted: each number once", ("arguments",))
-        self._numbers = numbers
-        self._groups = list(base.groups)
-        # Factors multiply what the other numbers say: they are no matter for probes.
-        self._own = [i for i, number in enumerate(numbers) if not self._is_factor(number.name)]
-        self._mesh = base.mesh
-        self.model = self._assembled(self._generic()) if self._own else base
+        # Factors multiply what the other numbers say.
+        self._own = [i for i, name in enumerate(self._names) if not _is_factor(name)]
+        self._symbols = ca.SX.sym("numbers", len(self._own))
+        symbolic = self._assembled(base) if self._own else base
+        self.model = _at_values(symbolic)
         self.expressions = Expressions(Equations(self.model, kernels="interpreted"), "interpreted")
         everything = Program(self.expressions, self._every())
-        self._layout = everything.sizes
-        self.dependence = self._dependence(everything)
+        self._layout, self._groups = everything.sizes, list(self.model.groups)
+        told, data = Active.of(rest(symbolic)), self._data(symbolic, everything)
+        self._told, self._given = (_Part(part, self._symbols, name) for part, name in ((told, "rest"), (data, "data")))
+        self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
-
-    def _is_factor(self, name: str) -> bool:
-        return name == FACTOR or bool(re.fullmatch(r"histories\.[^.]+", name))
 
     def accepted(self, values: Array) -> bool:
         """Whether values of the numbers are finite and within their limits."""
         limits = [one.limits for one in self.arguments for _ in one.default]
         return all(low <= x <= high and np.isfinite(x) for x, (low, high) in zip(values, limits, strict=True))
 
-    # -- probes -------------------------------------------------------------------------------------
+    # -- the model with symbols -----------------------------------------------------------------------
 
-    def _generic(self) -> list[float]:
-        values = []
-        for i in self._own:
-            number = self._numbers[i]
-            centre, half = number.span
-            values.append(centre + half * (0.37 + 0.11 * np.sin(1.0 + i)))
-        return values
-
-    def _assembled(self, values: Sequence[float]) -> Model:
+    def _assembled(self, base: Model) -> Model:
+        """The model with symbols in the place of numbers."""
+        values, assembly = self._generic(), base.assembly
+        plain, symbolic = (self._followed(each.tolist()) for each in (values, Active(values, self._symbols)))
         try:
-            scene = with_numbers(self._scene, self._followed(values))
-            assembly: Any = self._base.assembly
-            return assemble(scene, self._mesh, assembly=assembly, scales=self._base.scales)
+            known = depending(with_numbers(self._scene, plain), symbolic)
+            return assemble(known, base.mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
         except SceneError as error:
             raise SceneError(f"{error} (asked for by the arguments)") from None
 
-    def _followed(self, values: Sequence[float]) -> dict[str, float]:
+    def _generic(self) -> Array:
+        """Values near the defaults where nothing vanishes by chance, within their ranges."""
+        values = []
+        ranges = [(one.low, one.high) for one in self.arguments for _ in one.default]
+        for i in self._own:
+            (low, high), default = ranges[i], float(self.defaults[i])
+            share = NEAR * (1.0 + 0.3 * np.sin(1.0 + i))
+            if low is None or high is None:
+                values.append(default + share * (default or self._scene.size))
+            else:
+                values.append(default + share * ((high if high - default > default - low else low) - default))
+        return np.array(values)
+
+    def _followed(self, values: Sequence[Any]) -> dict[str, Any]:
         """Numbers of the scene, those that follow others among them."""
         followers = {one.name: one.numbers for one in self.arguments}
-        found: dict[str, float] = {}
+        found: dict[str, Any] = {}
         for i, value in zip(self._own, values, strict=True):
-            name = self._numbers[i].name
+            name = self._names[i]
             follow = followers.get(name)
-            more = {name: value} if follow is None else single_numbers(self._scene, follow(value))
+            more = {name: value} if follow is None else single_numbers(self._scene, _called(name, follow, value))
             twice = sorted(found.keys() & more.keys())
             if twice:
                 raise SceneError(f"found {twice[0]} in two of them, accepted: each number once", ("arguments",))
             found |= more
         return found
 
+    def _check(self, symbolic: Model) -> None:
+        """Refuse numbers that the unknowns themselves depend on, and those on which nothing depends."""
+        parts = [symbolic.rotations.axis, symbolic.winding.axis, symbolic.winding.across]
+        axes = _Part(gathered(parts), self._symbols, "axes")
+        for i, turns in zip(self._own, axes.numbers, strict=True):
+            if turns:
+                message = "found a number that turns an axis about which angles are unknowns or counted"
+                raise SceneError(f"{message}, accepted: one that leaves it as it is", ("arguments", self._names[i]))
+        for i, used in zip(self._own, self._told.numbers | self._given.numbers, strict=True):
+            if not used:
+                message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
+                raise SceneError(message, ("arguments", self._names[i]))
+
     def scene_at(self, values: Array) -> Scene:
         """The scene with these values of the numbers; the factor in the place of all steps."""
-        scene = with_numbers(self._scene, self._followed([values[i] for i in self._own]))
+        scene = with_numbers(self._scene, self._followed([float(values[i]) for i in self._own]))
         steps, histories = (self._scene.analysis.steps[-1],), dict(scene.histories)
-        for number, value in zip(self._numbers, values.tolist(), strict=True):
-            if number.name == FACTOR:
+        for name, value in zip(self._names, values.tolist(), strict=True):
+            if name == FACTOR:
                 steps = (value,)
-            elif self._is_factor(number.name):
-                histories[number.name.partition(".")[2]] = History(t=(0.0, 1.0), value=(value, value))
+            elif _is_factor(name):
+                histories[name.partition(".")[2]] = History(t=(0.0, 1.0), value=(value, value))
         analysis = scene.analysis.model_copy(update={"steps": steps})
         return scene.model_copy(update={"analysis": analysis, "histories": histories})
 
-    def _every(self) -> dict[str, bool]:
-        names = ["stiffness", "tangent", *LOADS]
-        count = len(self.model.connections)
-        return dict.fromkeys(
-            [*names, *(f"data_{i}" for i in range(count)), *(f"loads_{i}" for i in range(count))], True
-        )
+    # -- what is given --------------------------------------------------------------------------------
 
-    def _data(self, model: Model, everything: Program) -> Array:
+    def _every(self) -> dict[str, bool]:
+        count = range(len(self.model.connections))
+        names = ["stiffness", "tangent", *LOADS, *(f"data_{i}" for i in count), *(f"loads_{i}" for i in count)]
+        return dict.fromkeys(names, True)
+
+    def _data(self, model: Model, everything: Program) -> Active:
         """Data of a model, then its loads group by group, flat."""
         first = everything.slice_of_loads.start
         loads = [everything.given_of(model.groups[name])[first:] for name in self._groups]
-        return np.concatenate([self._rest(model), *data_of(model).values(), *loads])
-
-    def _dependence(self, everything: Program) -> Dependence:
-        lengths = self._lengths(everything)
-        shape = self._data(self.model, everything).shape
-
-        def probe(values: Sequence[float]) -> Array:
-            model = self._assembled(values) if self._own else self._base
-            if [g.names for g in model.connections] != [g.names for g in self.model.connections]:
-                raise SceneError("found arguments that change which joints and springs there are", ("arguments",))
-            flat = self._data(model, everything)
-            if flat.shape != shape:
-                raise SceneError("found arguments that change what the model is made of", ("arguments",))
-            if not _alike(model, self.model):
-                message = "found arguments that change axes or directions of supports and joints"
-                raise SceneError(f"{message}, accepted: numbers that leave these as they are", ("arguments",))
-            return flat
-
-        return found([self._numbers[i] for i in self._own], probe, lengths)
-
-    def _lengths(self, everything: Program) -> Array:
-        """Lengths of the rows of what :meth:`_data` gives: of a point, an element, a place, a connection."""
-        expressions, sizes = self.expressions, everything.sizes
-        points, axes = expressions.points, expressions.axes
-        known = {"stiffness": points * self.model.element.stiffnesses, "tangent": points * axes, "turn": 3}
-        known |= dict.fromkeys(("pull", "tangential", "spread"), points * axes)
-        known |= dict.fromkeys(("force", "shift", "following"), axes)
-        known |= dict.fromkeys(("moment", "twist"), expressions.turns)
-        for i, group in enumerate(self.model.connections):
-            known |= {f"data_{i}": group.data.shape[1], f"loads_{i}": group.kind.sizes[4]}
-
-        def rows(names: Sequence[str]) -> list[Array]:
-            return [np.full(sizes[n] // max(known[n], 1), known[n], dtype=np.intp) for n in names]
-
-        data = [name for name in sizes if is_data(name)]
-        loads = [name for name in sizes if not is_data(name)]
-        # Places are judged by the size of the whole scene.
-        rest = np.array([self._undeformed], dtype=np.intp)
-        found = np.concatenate([rest, *rows(data), *(rows(loads) * len(self._groups))])
-        return found[found > 0]
+        return gathered([*data_of(model).values(), *loads])
 
     def _split(self, flat: Any, cut: Callable[[Any, list[int]], Any]) -> tuple[list[Any], list[list[Any]]]:
         """Data, and loads by groups."""
-        flat = cut(flat, [0, self._undeformed, flat.shape[0]])[1]
         data = [name for name in self._layout if is_data(name)]
         loads = [name for name in self._layout if name not in data]
         sizes = [self._layout[name] for name in data]
@@ -467,25 +444,22 @@ class Arguments:
         def cut(flat: Array, bounds: list[int]) -> list[Array]:
             return [flat[a:b] for a, b in zip(bounds, bounds[1:], strict=False)]
 
-        data, loads = self._split(self.dependence.changing, cut)
+        data, loads = self._split(self._given.changing, cut)
         names = list(self._layout)
         flags = {name: bool(part.any()) for name, part in zip(names, data, strict=False)}
         changed = np.any([[part.any() for part in group] for group in loads], axis=0)
-        acting = np.any([[part.any() for part in group] for group in self._split(self.dependence.base, cut)[1]], axis=0)
+        acting = np.any([[part.any() for part in group] for group in self._split(self._given.values, cut)[1]], axis=0)
         flags |= {n: bool(a or b) for n, a, b in zip(names[len(data) :], changed, acting, strict=True)}
         return flags
 
     def undeformed(self, p: ca.MX) -> ca.MX:
         """What ``rest`` tells, for numbers (numbers,)."""
-        own = p[self._own] if self._own else ca.MX(0, 1)
-        return self.dependence.value(own, slice(0, self._undeformed))
-
-    # -- the function ---------------------------------------------------------------------------------
+        return self._told.at(picked(p, np.array(self._own, dtype=np.intp)))
 
     def given(self, p: ca.MX) -> ca.MX:
         """What is given, as :class:`~sfetcas.solvers.program.Program` takes it, for numbers (numbers,)."""
-        own = p[self._own] if self._own else ca.MX(0, 1)
-        data, loads = self._split(self.dependence.value(own), ca.vertsplit)
+        own = picked(p, np.array(self._own, dtype=np.intp))
+        data, loads = self._split(self._given.at(own), ca.vertsplit)
         names = list(self._layout)
         found: dict[str, ca.MX] = dict(zip(names, data, strict=False))
         for i, name in enumerate(names[len(data) :]):
@@ -497,9 +471,8 @@ class Arguments:
 
     def _factor(self, p: ca.MX, group: str | None) -> ca.MX | float:
         name = FACTOR if group is None else f"histories.{group}"
-        for i, number in enumerate(self._numbers):
-            if number.name == name:
-                return p[i]
+        if name in self._names:
+            return p[self._names.index(name)]
         # What is no argument stands as it would by default.
         return argument(self._scene, name).default[0]
 
@@ -509,17 +482,69 @@ class Arguments:
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
 
 
-def _alike(one: Model, other: Model) -> bool:
-    """Whether what is no data is the same: unknowns, axes, directions of guides, closings."""
+NEAR = 0.01
+"""Share by which numbers differ from those of the scene where its structure is looked at: nothing vanishes there by
+chance, and nothing else is another scene."""
 
-    def parts(model: Model) -> list[Array]:
-        positions, rotations = model.positions, model.rotations
-        maps = [positions.E, positions.Y, positions.B, positions.Z, positions.W, positions.BZ]
-        found = [part for one in maps for part in (one.row, one.column, one.value)]
-        return [*found, rotations.kind, rotations.axis, model.winding.axis, model.winding.across]
 
-    pairs = zip(parts(one), parts(other), strict=True)
-    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=1e-12) for a, b in pairs)
+class _Part:
+    """A vector that depends on numbers in some of its entries.
+
+    Attributes
+    ----------
+    values : ndarray (n,)
+        At the values at which the model was assembled; constant but where it is ``changing``, (n,) bool.
+    numbers : ndarray (numbers,)
+        Which of the numbers it depends on, bool.
+    """
+
+    def __init__(self, flat: Active, symbols: ca.SX, name: str) -> None:
+        jacobian = ca.jacobian_sparsity(flat.expression, symbols)
+        row, column = (np.array(part, dtype=np.intp) for part in jacobian.get_triplet())
+        self.values, self.changing = flat.values, np.isin(np.arange(flat.size), row)
+        self.numbers = np.isin(np.arange(symbols.shape[0]), column)
+        self._entries = np.flatnonzero(self.changing).tolist()
+        self._function = ca.Function(name, [symbols], [flat.expression[self._entries, 0]])
+
+    def at(self, own: ca.MX) -> ca.MX:
+        """The vector for values of the numbers."""
+        found = ca.MX(ca.DM(self.values))
+        if self._entries:
+            found[self._entries] = self._function(own)
+        return found
+
+
+def _is_factor(name: str) -> bool:
+    return name == FACTOR or bool(re.fullmatch(r"histories\.[^.]+", name))
+
+
+def _called(name: str, follow: Callable[[Any], Mapping[str, ArrayLike]], value: Any) -> Mapping[str, ArrayLike]:
+    """What a function of one's own says for a value, which may be a symbol."""
+    try:
+        return follow(value)
+    except TypeError as error:
+        if not isinstance(value, Active):
+            raise
+        found = f"found a function that takes plain numbers only ({error})"
+        accepted = "NumPy's functions, as np.sin in the place of math.sin, and no float(...)"
+        raise SceneError(f"{found}, accepted: {accepted}", ("arguments", name)) from None
+
+
+def _at_values(value: Any) -> Any:
+    """A model, or a part of it, with plain numbers in the place of those that depend on symbols."""
+    if isinstance(value, (Active, Scene)):
+        return value.values if isinstance(value, Active) else _plain_scene(value)
+    if isinstance(value, tuple):
+        found: Any = tuple(_at_values(each) for each in value)
+        return found if any(a is not b for a, b in zip(found, value, strict=True)) else value
+    if isinstance(value, Mapping):
+        found = {key: _at_values(each) for key, each in value.items()}
+        return found if any(found[key] is not value[key] for key in value) else value
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {item.name: getattr(value, item.name) for item in fields(value) if item.init}
+        changed = {name: now for name, part in parts.items() if (now := _at_values(part)) is not part}
+        return replace(value, **changed) if changed else value
+    return value
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
@@ -533,21 +558,44 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     SceneError
         The changed scene is none.
     """
+    found = _with(scene, _tree(scene, {name: float(value) for name, value in numbers.items()}), _checked)
+    assert isinstance(found, Scene)
+    return found
+
+
+def depending(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
+    """The same with symbols in the place of numbers that the scene has; nothing of it is checked again."""
+    found = _with(scene, _tree(scene, numbers), _unchecked)
+    assert isinstance(found, Scene)
+    # Which is not asked of symbols.
+    vars(found)["_out_of_plane"] = scene._out_of_plane
+    vars(found)[PLAIN] = scene
+    return found
+
+
+PLAIN = "_plain"
+"""Where a scene with symbols keeps the one that it was made of."""
+
+
+def _plain_scene(scene: Scene) -> Scene:
+    return vars(scene).get(PLAIN, scene)
+
+
+def _tree(scene: Scene, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """New entries of a scene by their keys."""
     tree: dict[str, Any] = {}
     for name, value in numbers.items():
         *path, last = name.split(".")
         branch = tree
         for key in path:
             branch = branch.setdefault(key, {})
-        branch[last] = float(value)
+        branch[last] = value
     tree |= {"dimension": scene.resolved_dimension, "expect": ()}
     _carry_ends(scene, tree, numbers)
-    found = _with(scene, tree)
-    assert isinstance(found, Scene)
-    return found
+    return tree
 
 
-def _carry_ends(scene: Scene, tree: dict[str, Any], numbers: Mapping[str, float]) -> None:
+def _carry_ends(scene: Scene, tree: dict[str, Any], numbers: Mapping[str, Any]) -> None:
     """Take free nodes to where the shapes end that numbers change."""
     for name, member in scene.members.items():
         first, last = member.nodes[0], member.nodes[-1]
@@ -556,16 +604,30 @@ def _carry_ends(scene: Scene, tree: dict[str, Any], numbers: Mapping[str, float]
         told = any(n.startswith(f"nodes.{last}.position.") for n in numbers)
         if not moved or told or others or scene.nodes[last].support != "free":
             continue
-        shape = _with(member.shape, tree.get("members", {}).get(name, {}).get("shape", {}))
-        begin = _with(scene.nodes[first].position, tree.get("nodes", {}).get(first, {}).get("position", {}))
+        make = _unchecked if any(isinstance(value, Active) for value in numbers.values()) else _checked
+        shape = _with(member.shape, tree.get("members", {}).get(name, {}).get("shape", {}), make)
+        begin = _with(scene.nodes[first].position, tree.get("nodes", {}).get(first, {}).get("position", {}), make)
         end = end_of(shape, [*begin, 0.0][:3], member.b2)
         if end is not None:
             place = {str(i): x for i, x in enumerate(end.tolist()[: len(scene.nodes[last].position)])}
             tree.setdefault("nodes", {}).setdefault(last, {})["position"] = place
 
 
-def _with(here: Any, tree: Any) -> Any:
-    """A record, table or list with other entries; of records only those are validated that change."""
+Making = Callable[[Record, dict[str, Any]], Record]
+"""A record with other entries."""
+
+
+def _checked(record: Record, entries: dict[str, Any]) -> Record:
+    return record.replace(**entries)
+
+
+def _unchecked(record: Record, entries: dict[str, Any]) -> Record:
+    kept = {name: getattr(record, name) for name in type(record).model_fields}
+    return type(record).model_construct(record.model_fields_set, **{**kept, **entries})
+
+
+def _with(here: Any, tree: Any, make: Making) -> Any:
+    """A record, table or list with other entries; of records only those are made anew that change."""
     if not isinstance(tree, dict):
         # What counts, as elements, is a whole number.
         return int(tree) if type(here) is int and isinstance(tree, float) and tree.is_integer() else tree
@@ -573,12 +635,12 @@ def _with(here: Any, tree: Any) -> Any:
     if isinstance(here, Record):
         entries = {key: getattr(here, key) for key in tree}
     else:
-        entries = dict(here) if isinstance(here, Mapping) else plain(here)
+        entries = dict(here) if isinstance(here, Mapping) else list(here)
     listed = isinstance(entries, list)
     for key, branch in tree.items():
         place = int(key) if listed else key
         try:
-            entries[place] = _with(entries[place], branch)
+            entries[place] = _with(entries[place], branch, make)
         except SceneError as error:
             raise error.within(key) from None
-    return here.replace(**entries) if isinstance(here, Record) else entries
+    return make(here, entries) if isinstance(here, Record) else tuple(entries) if listed else entries

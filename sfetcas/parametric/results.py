@@ -17,7 +17,7 @@ from ..description.answers import PARAMETERS, STEPS, AnswerName, answer_name, ch
 from ..description.records import unknown
 from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import constant, times
 from ..mechanics.balance import guide, pinned_turns
 from ..mechanics.connections import connections_of
@@ -229,7 +229,7 @@ class Results:
     def rest(self, model: Model) -> Array:
         """Undeformed positions (m) of all nodes, then of the places of all members, flat; then what curvatures need."""
         scene = model.scene
-        nodes = [np.asarray(scene.nodes[name].position, dtype=float) for name in model.nodes]
+        nodes = [numbers(scene.nodes[name].position) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]
         sections = [self._sections(model, name).ravel() for name in self.curved]
         return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])

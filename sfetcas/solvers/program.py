@@ -15,7 +15,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.active import applied
+from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import constant, sparse, times
 from ..mathematics.linear import pattern
 from ..mechanics.equations import UNLOADED, State
@@ -99,10 +100,9 @@ class Program:
     def _load(self, name: str, loading: Loading) -> Array:
         base, _, number = name.partition("_")
         part = loading.loads[int(number)] if number else getattr(loading, base)
-        part = part.ravel()
         if base == "pull" and self.expressions.reaching.nnz():
-            part = part - (self.expressions.reaching.T @ ca.DM(loading.force.ravel())).full().ravel()
-        return np.asarray(part)
+            return numbers(part.ravel() - applied(self.expressions.reaching.T, loading.force.ravel()))
+        return numbers(part.ravel())
 
     # -- states -----------------------------------------------------------------------------------
 
