@@ -49,6 +49,7 @@ FUNCTIONS = {
     "lengths": lambda x: np.linalg.norm(A * x, axis=1, keepdims=True),
     "unit vectors": lambda x: unit(A * x),
     "cumulative sums": lambda x: np.cumsum(A * x, axis=1),
+    "cumulative sums of nothing": lambda x: np.cumsum((A * x)[:0], axis=0),
     "differences": lambda x: np.diff(A * x, axis=0),
     "inverse": lambda x: np.linalg.inv(3.0 * np.eye(3) + np.outer(x, A[0])),
     "choices": lambda x: np.where(A > 0.0, x, 2.0 * x),

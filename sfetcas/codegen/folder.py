@@ -66,8 +66,7 @@ def export(
         Of the files, and the beginning of all names in C.
     arguments : names of numbers of the scene, or a mapping of them to their ranges (low, high)
         ``factor``, ``histories.NAME``, and any number or list of numbers: ``loads.tip.value``,
-        ``sections.strip.EI3``.  Without them the factor, all loads and all motions.  A range is needed by what enters
-        the model by no power, as positions of nodes.
+        ``sections.strip.EI3``.  Without them the factor, all loads and all motions.  A range limits what is accepted.
     results : names as in the JSON answer
         ``nodes.B.position``, ``reactions.A.force``, ``members.beam.moment``, ``springs.S.angle``,
         ``energy.elastic``, and ``stiffness.B`` or ``compliance.B``.  Without them all but these two.

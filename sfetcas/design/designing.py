@@ -202,8 +202,7 @@ class Design:
     ) -> None:
         """What a number of the scene is, in one case or in all: a number or an expression of unknowns.
 
-        ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``; ``between`` is the range of what the model is
-        no polynomial of, as places of joints.
+        ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``; ``between`` limits each of them.
         """
         self._formulation.set(name, value, case=case, between=between)
 

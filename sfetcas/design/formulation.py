@@ -245,7 +245,7 @@ class Formulation:
         ----------
         name : as in the scene; of a vector an expression of as many numbers
         case : all cases without
-        between : range of each, which places of joints and lengths need
+        between : limits of each
 
         Raises
         ------

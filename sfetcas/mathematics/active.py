@@ -355,7 +355,7 @@ def _cumsum(a: Any, axis: int = 0) -> Any:
     rows = list(_moved(np.moveaxis, (a, axis, 0), {}))
     for i in range(1, len(rows)):
         rows[i] = rows[i - 1] + rows[i]
-    return _stack(rows, axis=axis % Active.of(a).ndim)
+    return _stack(rows, axis=axis % Active.of(a).ndim) if rows else Active.of(a)
 
 
 def _diff(a: Any, axis: int = -1) -> Any:

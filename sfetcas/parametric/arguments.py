@@ -45,16 +45,16 @@ FACTOR = "factor"
 class Parameter:
     """A number of one's own that several numbers of a scene follow: a length, the place of a joint on a line.
 
-    ``Parameter(1.0, lambda x: {"nodes.B.position": [x, 0], "nodes.C.position": [2 * x, 0]}, low=0.8, high=1.2)``
+    ``Parameter(1.0, lambda x: {"nodes.B.position": [x, 0], "nodes.C.position": [2 * x, 0]})``
 
     Attributes
     ----------
     value : float
         That of the scene as it stands.
     numbers : callable
-        Numbers of the scene for a value, by their names; smooth.
+        Numbers of the scene for a value, by their names; it is called with a symbol, too, which NumPy's functions take.
     low, high : float or None
-        Its range, where it needs one.
+        What is accepted.
     unit, meaning : str
     """
 
@@ -77,7 +77,7 @@ class Argument:
     default : tuple of float
     unit, meaning : str
     low, high : float or None
-        The range of each number, where it needs one.
+        What is accepted of each number.
     components : tuple of int or None
         Which numbers of a list these are; None of a single number.
     numbers : callable or None

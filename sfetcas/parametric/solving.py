@@ -58,8 +58,7 @@ def parametric(
         Its last step is what is solved, on the mesh that its accuracy asks for with its own numbers.
     parameters : names of numbers, or mapping of names to ranges or to a :class:`Parameter`
         As ``loads.tip.value``, ``sections.strip.EI3``, ``springs.k.rest``, ``nodes.B.position.0``, ``factor``; a range
-        ``(low, high)`` where the model is no power of a number, as of places and angles.  The usual ones without:
-        factor, loads and motions.
+        ``(low, high)`` limits what is accepted.  The usual ones without: factor, loads and motions.
     answers : names
         As ``nodes.tip.position``, ``members.beam.moment``, ``reactions.A.force``, ``energy.elastic``,
         ``compliance.tip``; without all of nodes, reactions, springs and energies.
@@ -72,7 +71,7 @@ def parametric(
     ------
     SceneError
         A scene with contact, stops or turning axes; a number or an answer that it does not have; a number that changes
-        what the model is made of, or that the model depends on in no way that is found.
+        what the model is made of.
     """
     check_scene(scene, "parametric({}, ...)")
     parameters = [parameters] if isinstance(parameters, str) else parameters
