@@ -9,7 +9,8 @@ from test_contacts import balance, smallest_gap
 from sfetcas import SolveError, solve
 from sfetcas.contact.contact_statics import ContactRun
 from sfetcas.contact.cushions import Cushions
-from sfetcas.equilibria.statics import Settings, _Run
+from sfetcas.equilibria.meshing import Meshing
+from sfetcas.equilibria.statics import Settings
 from sfetcas.mechanics.contact_joints import CushionedPlane, CushionedRound
 from sfetcas.mechanics.terms import by_turning
 
@@ -93,9 +94,9 @@ def test_cushions_say_what_touches():
     table["members"] = {"m0": {"nodes": ["n0", "n1"], "section": "s"}}
     table["loads"] = {"w": {"type": "distributed", "member": "m0", "value": [0, -20]}}
     scene = made(table)
-    run = _Run(scene, Settings())
-    sides = ContactRun(scene, run._prepared, 1e-4, set()).reviser.sides
-    found = Cushions(scene, run._prepared, sides).found(run.pilot_mesh, [0.0, 1.0])
+    meshes = Meshing(scene, Settings())
+    sides = ContactRun(scene, meshes.prepared, 1e-4, set()).reviser.sides
+    found = Cushions(scene, meshes.prepared, sides).found(meshes.pilot_mesh, [0.0, 1.0])
     assert found is not None
     (touch,) = found.touches
     begin, end = solve(scene).last.contacts["floor"]["at"]

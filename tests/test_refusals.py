@@ -221,11 +221,11 @@ def test_an_angle_of_which_rounding_leaves_nothing_is_no_answer():
 
 def test_straight_member_between_clamps_is_refused_on_the_third_finer_mesh(monkeypatch):
     """It cannot bend: only coarse meshes have states under its weight, wound up, and each mesh others."""
-    from sfetcas.equilibria.refining import Refining
+    from sfetcas.equilibria.refinement import Refinement
 
     meshes = []
-    onto = Refining._onto
-    monkeypatch.setattr(Refining, "_onto", lambda self, mesh, *rest: (meshes.append(mesh), onto(self, mesh, *rest))[1])
+    onto = Refinement.onto
+    monkeypatch.setattr(Refinement, "onto", lambda self, mesh, *rest: (meshes.append(mesh), onto(self, mesh, *rest))[1])
     scene = {
         "gravity": [0, -9.80665],
         "sections": {"s": {"shape": "circle", "radius": 0.01, "E": 1e4, "nu": 0.5, "rho": 636.62}},

@@ -222,23 +222,23 @@ class ContactRun:
         """Whether no obstacle is in the way of a state."""
         return not Touched.of(fields).inside({}, self.reviser.sides, self.fine * self.scene.size)
 
-    def reached(self, base: Mesh, factor: float, free: Held | None, *, falls: bool) -> Iterator[Held | None]:
-        """States in contact, one way after the other: that of the growing loads is the answer, others are told.
+    def reached(
+        self, base: Mesh, factor: float, free: Held | None, *, falls: bool
+    ) -> Iterator[tuple[str, Held | None]]:
+        """States in contact by names of ways, tried one after the other: that of the growing loads is the answer.
 
         Near the state without obstacles, ``free``, where a start place chooses it.  What ``falls`` onto obstacles, as
         nothing else holds it, has no state under small loads to grow from.
         """
-        ways: list[tuple[str, Callable[[], Held | None]]] = [
-            ("", lambda: self.continued(base, factor)),
-            ("" if falls else ELSEWHERE, lambda: self.cushioned(base, factor)),
-        ]
-        if not falls:
-            ways.insert(1, ("", lambda: self.grown(base, factor)))
+        ways: list[tuple[str, Callable[[], Held | None]]] = [("in contact", lambda: self.continued(base, factor))]
         if free is not None:
-            ways.insert(1, ("", lambda: self.retracted(base, factor, free)))
-        for note, way in ways:
-            self.jumps, self.elsewhere = [], note
-            yield way()
+            ways.append(("retreat", lambda: self.retracted(base, factor, free)))
+        if not falls:
+            ways.append(("in contact", lambda: self.grown(base, factor)))
+        ways.append(("cushions", lambda: self.cushioned(base, factor)))
+        for name, way in ways:
+            self.jumps, self.elsewhere = [], ELSEWHERE if name == "cushions" and not falls else ""
+            yield name, way()
 
     def refuse_held_inside(self, pilot: Prepared, factor: float) -> None:
         """Refuse a node that a support or a motion holds inside an obstacle, which the data alone tell.

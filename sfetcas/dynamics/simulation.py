@@ -120,7 +120,7 @@ class Simulation:
         self.name = analysis.integrator or USUAL
         meshing = Meshing(self.scene, settings)
         self.accuracy, self.asked, self.quantity = meshing.accuracy, meshing.asked, meshing.quantity
-        self.prescribed = meshing._prescribed
+        self.prescribed = meshing.prescribed
         self.mesh: Mesh = replace(meshing.target, places=True)
         self.seconds = {"model": 0.0, "build": 0.0, "solve": 0.0}
 

@@ -35,7 +35,8 @@ PILOT_ORDER = 4
 class Found:
     """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other.
 
-    ``drifts`` counts finer meshes on which it was not the same.
+    ``drifts`` counts finer meshes on which it was not the same; ``way`` names how it was found, see
+    :data:`~sfetcas.equilibria.ways.WAYS`.
     """
 
     prepared: Prepared
@@ -46,6 +47,7 @@ class Found:
     left: tuple[float, ...] = ()
     kept: bool = False
     drifts: int = 0
+    way: tuple[str, ...] = ()
 
 
 class Meshing:
@@ -65,6 +67,8 @@ class Meshing:
         Where to arrive, and where to begin.
     fixed : set of str
         Members whose number of elements is asked for.
+    leave, small : bool
+        Whether unstable equilibria are left for stable ones; whether there are small members.
     """
 
     def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
@@ -76,6 +80,8 @@ class Meshing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
+        self.leave = scene.analysis.unstable == "leave"
+        self.small = any(member.type == "small" for member in scene.members.values())
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
         self.asked = self.asked or not self.fixed
@@ -107,7 +113,7 @@ class Meshing:
             self.pilot_mesh = replace(first_mesh(scene, max(order, PILOT_ORDER), turning=1.0), stops=self.stops)
 
     @property
-    def _prescribed(self) -> bool:
+    def prescribed(self) -> bool:
         """Whether the meshes of all flexible members are asked for."""
         return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
 
@@ -132,7 +138,8 @@ class Meshing:
             raise SceneError(str(error), WHERE) from None
         return difference, remaining(difference, gained(coarse.fields, fine.fields, positions=self.quantity.positions))
 
-    def _prepared(self, mesh: Mesh) -> Prepared:
+    def prepared(self, mesh: Mesh) -> Prepared:
+        """The model on a mesh, ready to be solved."""
         begin = time.perf_counter()
         # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
         self.model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)

@@ -51,7 +51,7 @@ def solve_model(
     loading = prepared.model.loading(factor)
     found, iterations = _warm(prepared, start, loading) if start is not None else None, 0
     if found is None:
-        found, iterations = cold(prepared, loading, solver)
+        found, iterations, _ = cold(prepared, loading, solver)
     return finished(prepared, found, loading, factor, prepared.stability(found), iterations=iterations)
 
 
@@ -60,8 +60,8 @@ def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected
     return found if found.converged else None
 
 
-def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> tuple[Corrected, int]:
-    """The equilibrium from the start guess and the iterations; what cannot be minimised is followed from zero.
+def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> tuple[Corrected, int, str]:
+    """The equilibrium from the start guess, the iterations and the way: what cannot be minimised is followed from zero.
 
     Raises
     ------
@@ -71,13 +71,13 @@ def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> 
     if solver == "newton":
         found, iterations = prepared.globalised(loading)
         if found is not None:
-            return found, iterations
+            return found, iterations, "afar"
     if not prepared.model.minimisable:
         start = prepared.equations.start(prepared.model.loading(0.0, 0.0))
         followed = follow(prepared, loading.scaled, start, leave=False)
         if not followed.reached:
             raise SolveError(Status.FAILED, "the loads could not be followed from zero", followed.state)
-        return prepared.correct(followed.state, loading), 0
+        return prepared.correct(followed.state, loading), 0, "growing"
     state, gap = prepared.guess(loading)
     if gap > 0.2:
         equations = prepared.equations
@@ -87,7 +87,7 @@ def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> 
         told = contradiction(equations, state, loading)
         detail += f"; {told}" if told else ""
         raise SolveError(Status.INFEASIBLE, detail, state)
-    return prepared.minimise(loading, state)
+    return *prepared.minimise(loading, state), "minimum"
 
 
 UNJUDGED = Stability("not defined", 0, np.nan, np.zeros(0), np.zeros(0))
@@ -118,6 +118,7 @@ def finished(
     error_of: str = "",
     notes: tuple[str, ...] = (),
     iterations: int = 0,
+    way: tuple[str, ...] = (),
 ) -> Equilibrium:
     """The equilibrium with its name, certificate and notes."""
     notes = (*notes, HIDDEN) if stability.hidden else notes
@@ -134,4 +135,5 @@ def finished(
         error_of=error_of,
         notes=notes,
         iterations=iterations,
+        way=way,
     )

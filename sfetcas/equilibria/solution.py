@@ -244,6 +244,8 @@ class Equilibrium(Posture):
         What a reader should know: an unstable state that was left, reactions that are not unique.
     iterations : int
         Iterations of IPOPT.
+    way : tuple of str
+        How it was found, one way after the other, see :data:`~sfetcas.equilibria.ways.WAYS`.
     """
 
     certificate: Certificate
@@ -251,6 +253,7 @@ class Equilibrium(Posture):
     iterations: int
     strain: float
     potential: float
+    way: tuple[str, ...] = ()
 
     @functools.cached_property
     def energy(self) -> dict[str, float]:
@@ -350,6 +353,7 @@ def equilibrium(
     error_of: str = "",
     notes: tuple[str, ...] = (),
     iterations: int = 0,
+    way: tuple[str, ...] = (),
 ) -> Equilibrium:
     """Put an equilibrium together; dimensionless in, by name and in SI out.
 
@@ -385,6 +389,7 @@ def equilibrium(
         iterations=iterations,
         strain=point.strain,
         potential=point.potential,
+        way=way,
         fields=fields,
     )
 

@@ -28,17 +28,17 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
 from ..solvers.unheld import refuse_unheld
-from .meshing import Found
-from .piloting import NO_ENERGY
+from .meshing import Found, Meshing
 from .quantities import WHERE
-from .refining import LEVELS, Refining
+from .refinement import LEVELS, Refinement
 from .scanning import Scan, scan
 from .settings import Settings
 from .several import Search, long_elements, same, search
 from .single import finished, solve_model, unjudged
 from .solution import Equilibrium, Solution, at_factor, refuse_large
+from .ways import NO_ENERGY, Ways
 
-__all__ = ["Settings", "pilot_of", "solve", "solve_model"]
+__all__ = ["LoadSteps", "Settings", "pilot_of", "solve", "solve_model"]
 
 
 @single_threaded
@@ -68,36 +68,49 @@ def solve(
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     settings = replace(settings or Settings(), **changes)
-    return _Run(scene, settings, stops).solution()
+    return LoadSteps(scene, settings, stops).solution()
 
 
 def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
     """The mesh that :func:`solve` begins with."""
-    return _Run(scene, settings or Settings()).target
+    return Meshing(scene, settings or Settings()).target
 
 
 FINER = 2
 """Halvings of the mesh of the search at most for equilibria of a scan that it does not have."""
 
 
-class _Run(Refining):
-    """One run over the load factors of a scene."""
+class LoadSteps:
+    """The equilibria of a scene at the load factors of its analysis, one after the other.
+
+    Parameters
+    ----------
+    scene, settings, stops
+        As of :func:`solve`.
+    """
 
     def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
-        super().__init__(scene, settings, stops)
+        self.scene, self.meshes = scene, Meshing(scene, settings, stops)
+        self.ways, self.refinement = Ways(self.meshes), Refinement(self.meshes)
         self.others: list[tuple[Model, State]] = []
 
     def solution(self) -> Solution:
         """All steps."""
         begin = time.perf_counter()
-        pilot = self._prepared(self.pilot_mesh)
+        pilot = self.meshes.prepared(self.meshes.pilot_mesh)
         if self.scene.analysis.equilibria == "all":
             self._refuse_all(pilot.model)
         steps: list[Equilibrium] = []
         last: tuple[float, Found] | None = None
         contact = None
         if self.scene.contacts:
-            contact = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed, self._judged_in_contact)
+            contact = ContactRun(
+                self.scene,
+                self.meshes.prepared,
+                self.meshes.accuracy,
+                self.meshes.fixed,
+                self._judged_in_contact,
+            )
         for factor in self.scene.analysis.steps:
             refuse_unheld(pilot, factor)
             try:
@@ -105,18 +118,18 @@ class _Run(Refining):
                     contact.refuse_held_inside(pilot, factor)
                     steps.append(self._in_contact(contact, pilot, factor))
                     continue
-                found = self._found(pilot, factor, last)
+                found = self.ways.found(pilot, factor, last)
                 last = (factor, found) if found.prepared is pilot else None
-                steps.append(self._refined(found, factor))
+                steps.append(self.refinement.refined(found, factor))
                 if self.scene.analysis.equilibria == "all":
                     steps[-1:] = self._several(found, steps[-1], factor)
             except SolveError as error:
-                self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
-                raise at_factor(self._named(pilot, error), self.scene, factor, steps, self.seconds) from None
-        self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
-        reached = all((step.certificate.error_estimate or 0.0) <= self.accuracy for step in steps)
-        status = Status.SOLVED if reached or not self.asked else Status.SHORT
-        return Solution(self.scene, status, tuple(steps), self.seconds)
+                self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
+                raise at_factor(self.ways.named(pilot, error), self.scene, factor, steps, self.meshes.seconds) from None
+        self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
+        reached = all((step.certificate.error_estimate or 0.0) <= self.meshes.accuracy for step in steps)
+        status = Status.SOLVED if reached or not self.meshes.asked else Status.SHORT
+        return Solution(self.scene, status, tuple(steps), self.meshes.seconds)
 
     # -- several equilibria ---------------------------------------------------------------------
 
@@ -147,9 +160,11 @@ class _Run(Refining):
         SceneError
             Such loads, or such an accuracy.
         """
-        if self.quantity is not None:
+        if self.meshes.quantity is not None:
             why = "equilibria are told apart by the error of their positions"
-            raise SceneError(f"found {self.quantity.text!r}, accepted with all equilibria: none, as {why}", WHERE)
+            raise SceneError(
+                f"found {self.meshes.quantity.text!r}, accepted with all equilibria: none, as {why}", WHERE
+            )
         if model.has_potential:
             return
         why = "loads without potential have no energy to search by"
@@ -160,11 +175,11 @@ class _Run(Refining):
     def _further(self, candidate: Found, factor: float) -> Equilibrium | None:
         """The answer to what a search found; None where finer meshes do not have it."""
         try:
-            answer = self._refined(candidate, factor)
+            answer = self.refinement.refined(candidate, factor)
         except SolveError:
             return None
-        short = (answer.certificate.error_estimate or 0.0) > self.accuracy
-        return None if short and not self._prescribed else answer
+        short = (answer.certificate.error_estimate or 0.0) > self.meshes.accuracy
+        return None if short and not self.meshes.prescribed else answer
 
     def _searched(self, found: Found, factor: float) -> Search | Scan:
         """The scan or, where one number does not give all equilibria, the search.
@@ -172,29 +187,29 @@ class _Run(Refining):
         On a mesh fine enough for what is strongly curled, but for elements that are prescribed.
         """
         first = found
-        if not self._prescribed:
-            first = self._onto(self._halved(found), found, factor)
-        elif self.pilot_mesh is not self.target:
-            first = self._onto(found.prepared.model.mesh.refined(), found, factor)
+        if not self.meshes.prescribed:
+            first = self.refinement.onto(self.refinement.halved(found), found, factor)
+        elif self.meshes.pilot_mesh is not self.meshes.target:
+            first = self.refinement.onto(found.prepared.model.mesh.refined(), found, factor)
         for _ in range(LEVELS if first is not found else 0):
             long = long_elements(first.prepared, first.prepared.model.loading(factor), first.corrected)
-            marks = {name: marked & (name not in self.fixed) for name, marked in long.items()}
+            marks = {name: marked & (name not in self.meshes.fixed) for name, marked in long.items()}
             if not any(marked.any() for marked in marks.values()):
                 break
-            first = self._onto(first.prepared.model.mesh.refined(marks), first, factor)
+            first = self.refinement.onto(first.prepared.model.mesh.refined(marks), first, factor)
         prepared, loading = first.prepared, first.prepared.model.loading(factor)
         starts = [transferred(model, state, prepared.model) for model, state in self.others]
         # Whoever gives the number of runs wants the search.
-        scanned = scan(prepared, loading, first.corrected) if self.settings.runs is None else None
-        for _ in range(0 if self._prescribed else FINER):
+        scanned = scan(prepared, loading, first.corrected) if self.meshes.settings.runs is None else None
+        for _ in range(0 if self.meshes.prescribed else FINER):
             if scanned is None or len(scanned.found) >= scanned.roots:
                 break
-            first = self._onto(self._halved(first), first, factor)
+            first = self.refinement.onto(self.refinement.halved(first), first, factor)
             again = scan(first.prepared, first.prepared.model.loading(factor), first.corrected)
             if again is None or len(again.found) <= len(scanned.found):
                 break
             scanned = again
-        result = scanned or search(prepared, loading, first.corrected, starts, self.settings.runs)
+        result = scanned or search(prepared, loading, first.corrected, starts, self.meshes.settings.runs)
         self.others = [(result.prepared.model, other.state) for other in result.found]
         return result
 
@@ -202,22 +217,22 @@ class _Run(Refining):
 
     def _in_contact(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium:
         """The answer where obstacles may stop members."""
-        base = self.pilot_mesh.refined()
+        base = self.meshes.pilot_mesh.refined()
         notes: tuple[str, ...] = () if pilot.model.conservative else (NO_ENERGY,)
         falls = bool(pilot.diagnosis.mobility) and not contact.first_touches
         known = pilot.model.minimisable and not (pilot.diagnosis.mobility or pilot.lacks_slack)
-        if known and not (self.started or contact.last or contact.first_touches):
+        if known and not (self.ways.started or contact.last or contact.first_touches):
             found = self._clear_all_the_way(contact, pilot, factor)
             if found is not None:
                 return found
-        unstopped, failure = self._unstopped(pilot, factor) if self.started else (None, None)
+        unstopped, failure = self._unstopped(pilot, factor) if self.ways.started else (None, None)
         free = None
         if unstopped is not None:
-            there = self._onto(base, unstopped, factor)
+            there = self.refinement.onto(base, unstopped, factor)
             notes += there.notes
             free = _as_held(there, factor)
             if contact.reviser.wrong(free, contact.at(factor)) is None:
-                answer = self._refined(unstopped, factor)
+                answer = self.refinement.refined(replace(unstopped, way=("no contact",)), factor)
                 if contact.clear(answer.fields):
                     contact.last = (factor, free)
                     return answer
@@ -226,24 +241,21 @@ class _Run(Refining):
 
     def _clear_all_the_way(self, contact: ContactRun, pilot: Prepared, factor: float) -> Equilibrium | None:
         """The answer without obstacles, where the growing loads lead there past none of them; else None."""
-        self.allowed = contact.unstopped
         try:
-            found = self._grown_from_zero(pilot, factor)
+            found = self.ways.grown_from_zero(pilot, factor, contact.unstopped(pilot))
         except SolveError as error:
             if error.status is Status.BENT:
                 raise
             found = None
-        finally:
-            self.allowed = None
-        if found is None or (self.leave and found.stability.negative > 0):
+        if found is None or (self.meshes.leave and found.stability.negative > 0):
             return None
-        answer = self._refined(found, factor)
+        answer = self.refinement.refined(replace(found, way=("no contact",)), factor)
         return answer if contact.clear(answer.fields) else None
 
     def _first_pressed(
         self,
         contact: ContactRun,
-        ways: Iterator[Held | None],
+        ways: Iterator[tuple[str, Held | None]],
         factor: float,
         notes: tuple[str, ...],
         failure: SolveError | None,
@@ -251,38 +263,39 @@ class _Run(Refining):
         """The first stable answer among states in contact that were found in different ways; else the first."""
         refused: SolveError | None = None
         unstable: Equilibrium | None = None
-        for held in ways:
+        for way, held in ways:
             if held is None:
                 continue
             try:
-                answer = self._pressed(contact.answered(held, factor, self.target, (*notes, *contact.jumped)), factor)
+                pressed = contact.answered(held, factor, self.meshes.target, (*notes, *contact.jumped))
+                answer = self._pressed(pressed, factor, (way,))
             except SolveError as error:
                 refused = refused or error
                 continue
-            if not self.leave or answer.certificate.negative == 0:
+            if not self.meshes.leave or answer.certificate.negative == 0:
                 return answer
             unstable = unstable or answer
         if unstable is not None:
             return unstable
         if refused is not None:
             raise refused
-        contact.refuse_unheld(self._prepared(self.pilot_mesh))
+        contact.refuse_unheld(self.meshes.prepared(self.meshes.pilot_mesh))
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
         raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
 
     def _judged_in_contact(self, coarse: Held, fine: Held, factor: float) -> tuple[float, float]:
         """How far two states in contact are apart, and the estimated error of the finer one."""
         one, other = (unjudged(held.prepared, held.corrected, held.loading, factor) for held in (coarse, fine))
-        return self.judged(one, other)
+        return self.meshes.judged(one, other)
 
     def _unstopped(self, pilot: Prepared, factor: float) -> tuple[Found | None, SolveError | None]:
         """The answer as if there were no obstacles; None where nothing else holds the structure."""
         try:
-            return self._on_pilot(pilot, factor, None), None
+            return self.ways.on_pilot(pilot, factor, None), None
         except SolveError as error:
             return None, error
 
-    def _pressed(self, found: Pressed, factor: float) -> Equilibrium:
+    def _pressed(self, found: Pressed, factor: float, way: tuple[str, ...]) -> Equilibrium:
         held = found.held
         refuse_unbalanced(held.touched.fields)
         refuse_large(held.touched.fields)
@@ -293,8 +306,9 @@ class _Run(Refining):
             factor,
             found.stability,
             estimate=found.error,
-            error_of=self.error_of,
+            error_of=self.meshes.error_of,
             notes=found.notes,
+            way=way,
         )
         refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
         return answer

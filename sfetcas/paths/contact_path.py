@@ -57,7 +57,7 @@ def follow_in_contact(scene: Scene, settings: Settings) -> Path:
     SolveError
         There is no equilibrium to start from, or none beside it.
     """
-    return _Run(scene, settings).path()
+    return ContactPath(scene, settings).path()
 
 
 @dataclass
@@ -72,42 +72,48 @@ class _Level:
         return self.crossings if kind == "step" else [self.trace.points[i] for i in sorted(self.trace.limits)]
 
 
-class _Run(Meshing):
-    """One path, on finer and finer meshes."""
+class ContactPath:
+    """A path in contact on finer and finer meshes."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
         self.span, self.analysis = scene.analysis.span, scene.analysis
         # Meshes for the loads at the ends of the range.
         analysis = scene.analysis.model_copy(update={"steps": tuple(factor for factor in self.span if factor)})
-        super().__init__(scene.model_copy(update={"analysis": analysis}), settings)
-        self.scene = scene
+        self.meshes = Meshing(scene.model_copy(update={"analysis": analysis}), settings)
+        self.scene, self.settings = scene, settings
         knots = {t for h in scene.histories.values() for t in h.t if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
 
     def path(self) -> Path:
         """The answer."""
         begin = time.perf_counter()
-        base = self.target if self._prescribed else self.target.refined()
+        base = self.meshes.target if self.meshes.prescribed else self.meshes.target.refined()
         coarse = self._level(base)
-        gain = 1.0 if self._prescribed else max(1.0, 4.0**base.order / MARGIN)
+        gain = 1.0 if self.meshes.prescribed else max(1.0, 4.0**base.order / MARGIN)
         for _ in range(LEVELS):
             fine = self._level(self._halved(coarse.tracer.base))
             errors = {key: error / gain for key, error in self._errors(coarse, fine).items()}
             largest = max(errors.values())
-            if largest <= self.accuracy or self._prescribed or 2 * fine.tracer.base.elements > MOST_ELEMENTS:
+            if (
+                largest <= self.meshes.accuracy
+                or self.meshes.prescribed
+                or 2 * fine.tracer.base.elements > MOST_ELEMENTS
+            ):
                 break
             coarse = fine
-        answer = self._answer(coarse if self._prescribed else fine, errors)
-        self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
+        answer = self._answer(coarse if self.meshes.prescribed else fine, errors)
+        self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
         return answer
 
     def _halved(self, mesh: Mesh) -> Mesh:
-        marks = {n: np.full(len(c) - 1, self._prescribed or n not in self.fixed) for n, c in mesh.cuts.items()}
+        marks = {
+            n: np.full(len(c) - 1, self.meshes.prescribed or n not in self.meshes.fixed) for n, c in mesh.cuts.items()
+        }
         return mesh.refined(marks)
 
     def _level(self, base: Mesh) -> _Level:
-        run = ContactRun(self.scene, self._prepared, self.accuracy, self.fixed)
-        run.reviser.limit = COARSE if self._prescribed else float(np.clip(run.fine, DEEP, COARSE))
+        run = ContactRun(self.scene, self.meshes.prepared, self.meshes.accuracy, self.meshes.fixed)
+        run.reviser.limit = COARSE if self.meshes.prescribed else float(np.clip(run.fine, DEEP, COARSE))
         tracer = Tracer(run, base, self.span, self.knots)
         begun = tracer.begin(self._beside)
         if begun is None:
@@ -168,7 +174,7 @@ class _Run(Meshing):
         end = ending(trace.end, trace.points[-1].factor, len(trace.points) - len(trace.limits), trace.told)
         branch = Branch(tuple(points), entries("step"), entries("limit"), (), end)
         notes = (*trace.notes, BIFURCATIONS, *self._unexplained(trace, points))
-        status = Status.SHORT if largest > self.accuracy and self.asked else Status.SOLVED
+        status = Status.SHORT if largest > self.meshes.accuracy and self.meshes.asked else Status.SOLVED
         return Path(
             scene=self.scene,
             status=Status.CUT if trace.end in ("lost", "bent") else status,
@@ -178,7 +184,7 @@ class _Run(Meshing):
             error_estimate=largest if np.isfinite(largest) else None,
             last=branch.steps[-1] if branch.steps else self._entry(run, trace.points[-1], None),
             notes=notes if prepared.model.conservative else (*notes, NO_POTENTIAL),
-            seconds=self.seconds,
+            seconds=self.meshes.seconds,
         )
 
     def _point(self, run: ContactRun, point: Stood, limit: bool) -> PathPoint:

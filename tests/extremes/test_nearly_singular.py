@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks import extremes
 from sfetcas import SceneError, SolveError, Status
-from sfetcas.equilibria.piloting import CHANGE_POINT
 from sfetcas.equilibria.statics import solve
+from sfetcas.equilibria.ways import CHANGE_POINT
 
 PLANE_AND_SPACE = pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
 CRITICAL = 0.25 * np.pi**2

@@ -1,4 +1,4 @@
-"""The equilibrium on the pilot mesh: by IPOPT in one go, checked against where the loads lead from zero."""
+"""The ways to an equilibrium, in the order in which they are tried: by IPOPT in one go, and as the loads grow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..description.records import counted
-from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.fields import Fields
@@ -20,11 +19,10 @@ from ..solvers.newton import loose_rows
 from ..solvers.prepared import BEYOND, Prepared
 from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, Found, Meshing
-from .settings import Settings
 from .single import cold
 from .solution import refuse_large
 
-__all__ = ["KEPT", "NO_ENERGY", "NO_POTENTIAL", "Piloting"]
+__all__ = ["KEPT", "NO_ENERGY", "NO_POTENTIAL", "WAYS", "Ways"]
 
 KEPT = "the loads growing from zero lead to this unstable equilibrium, and no way from it to a stable one was found"
 
@@ -80,82 +78,86 @@ CHANGE_POINT = (
 )
 
 
-class Piloting(Meshing):
-    """Meshes, and the way to the equilibrium on the pilot."""
+WAYS = {
+    "growing": "the loads grow from zero, or from those of the step before",
+    "small share": "a small share of the loads puts what has no place without them; from there they grow",
+    "minimum": "IPOPT from a start guess under the whole loads",
+    "afar": "Newton's method from afar under the whole loads, where it is asked for",
+    "beside": "Newton's method beside start places of nodes",
+    "carried": "the whole loads carry the undeformed state downhill",
+    "left": "an unstable equilibrium is left along its unstable mode",
+    "finer": "one of these on a pilot mesh with a quarter of the element lengths",
+    "refound": "IPOPT again on a finer mesh, where Newton's method did not converge",
+    "no contact": "the loads grow from zero, or a minimum is found, past no obstacle",
+    "in contact": "loads and touches grow from zero, or from those of the step before",
+    "retreat": "obstacles come back from where they do not reach the state without them",
+    "cushions": "obstacles are cushions that become hard",
+}
+"""The ways to an equilibrium, in the words of :attr:`~sfetcas.equilibria.solution.Equilibrium.way`; in which order they
+are tried say :meth:`Ways.found`, :meth:`Ways.on_pilot` and, in contact,
+:meth:`~sfetcas.contact.contact_statics.ContactRun.reached`."""
 
-    def __init__(self, scene: Scene, settings: Settings, stops: tuple[tuple[str, str], ...] = ()) -> None:
-        super().__init__(scene, settings, stops)
-        self.leave = scene.analysis.unstable == "leave"
-        self.allowed: Callable[[Prepared], Callable[[State, Loading, State, Loading], bool]] | None = None
-        self.started = any(node.start is not None for node in scene.nodes.values())
-        self.small = any(member.type == "small" for member in scene.members.values())
 
-    def _found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+Allowed = Callable[[State, Loading, State, Loading], bool]
+"""Whether a step may be taken: from one state and loading to the next."""
+
+
+class Ways:
+    """The ways to an equilibrium on the pilot mesh, tried one after the other.
+
+    Parameters
+    ----------
+    meshes : Meshing
+    """
+
+    def __init__(self, meshes: Meshing) -> None:
+        self.meshes, self.scene = meshes, meshes.scene
+        self.started = any(node.start is not None for node in meshes.scene.nodes.values())
+
+    # -- the order ------------------------------------------------------------------------------------
+
+    def found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
         try:
-            return _with_change_point(self._on_pilot(pilot, factor, last))
+            return _with_change_point(self.on_pilot(pilot, factor, last))
         except SolveError as error:
-            if pilot.model.mesh.elements > PILOT_ELEMENTS or self.fixed or pilot.diagnosis.mobility:
-                raise
-            # What falls on and on does so on a finer mesh too; one that is too coarse is left by other ways.
-            if error.status in (Status.ITERATIONS, Status.BENT):
-                raise
-            mesh = pilot.model.mesh.refined().refined()
-            if mesh.elements == pilot.model.mesh.elements:
+            finer = self._finer(pilot, error)
+            if finer is None:
                 raise
             try:
-                finer = self._prepared(mesh)
-                return _with_change_point(self._on_pilot(finer, factor, None))
+                return _with_change_point(_by("finer", self.on_pilot(finer, factor, None)))
             except SolveError:
                 raise error from None
 
-    def _named(self, pilot: Prepared, error: SolveError) -> SolveError:
-        """The error with the motions that nothing holds, and the members that have no slack, where there are any."""
-        try:
-            free, taut = pilot.diagnosis, pilot.lacks_slack
-        except np.linalg.LinAlgError:
-            return error
-        details = [f"free to move: {free.told(3)}"] if free.mobility else []
-        details += [error.detail] if error.detail else []
-        if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
-            rows = ", ".join(dict.fromkeys(free.redundant))
-            details.append(f"{TAUT}: {rows}")
-        return SolveError(error.status, "; ".join(details), error.last)
+    def on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+        """The answer on the pilot.
 
-    def _on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+        What the growing loads lead to is the answer; a minimum under the whole loads is where they cannot be followed,
+        where the branch does not matter, or where start places choose it.
+        """
         loading = pilot.model.loading(factor)
         if not pilot.model.minimisable:
-            return self._only_grown(pilot, factor, last)
-        grows = self.settings.branch and not self.started
+            return self._without_minimum(pilot, factor, last)
+        grows = self.meshes.settings.branch and not self.started
         # Where small members bend beyond sense on the way of the loads, nothing else is tried.
-        reached = self._grown(pilot, factor, last) if grows and self.small else None
+        grown = self._grown(pilot, factor, last) if grows and self.meshes.small else None
         alone, failure = self._direct(pilot, loading)
         if not grows:
             return self._accepted(pilot, alone, failure, loading)
-        reached = reached or self._grown(pilot, factor, last)
-        if reached is None:
-            zero = self._unloaded(pilot)
-            straight = alone is None or pilot.distance(alone.corrected.state, zero) < STRAIGHT
-            if straight and pilot.lacks_slack and self._stays(pilot, zero, factor):
-                raise SolveError(Status.FAILED, CRITICAL, zero)
-            found = self._accepted(pilot, alone, failure, loading)
-            return replace(found, notes=(NEAREST, *found.notes))
-        if alone is not None:
-            reached.iterations = alone.iterations
-            apart = pilot.distance(alone.corrected.state, reached.corrected.state) > 1e-3
-            # What falls from its start guess is nearest to no minimum.
-            held = pilot.diagnosis.mobility == 0
-            told = held and pilot.multipliers(alone.corrected) <= BEYOND and not reached.notes
-            if told and apart and alone.stability.negative == 0:
-                reached.notes += (
-                    "the loads growing from zero lead here, not to the minimum nearest to the start guess",
-                )
-        return reached
+        grown = grown or self._grown(pilot, factor, last)
+        if grown is not None:
+            return self._beside(grown, alone)
+        zero = self._unloaded(pilot)
+        straight = alone is None or pilot.distance(alone.corrected.state, zero) < STRAIGHT
+        if straight and pilot.lacks_slack and self._stays(pilot, zero, factor):
+            raise SolveError(Status.FAILED, CRITICAL, zero)
+        found = self._accepted(pilot, alone, failure, loading)
+        return replace(found, notes=(NEAREST, *found.notes))
 
-    def _only_grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+    def _without_minimum(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
         """Loads that cannot be minimised: the state that they lead to from zero, stable or not."""
         found = self._onward(pilot, factor, last)
-        ways = [self._carried, self._grown_from_zero]
+        ways = [self._carried, self.grown_from_zero]
         # A mechanism has no place of its own without loads: growing from zero they put it anywhere, also upside down.
         for way in ways if pilot.diagnosis.mobility else ways[::-1]:
             found = found or way(pilot, factor)
@@ -168,16 +170,56 @@ class Piloting(Meshing):
             found.notes += (NO_POTENTIAL if regular else DIVERGED if diverged else NO_ENERGY,)
         return found
 
+    def _finer(self, pilot: Prepared, error: SolveError) -> Prepared | None:
+        """A pilot with a quarter of the element lengths, where that may have what this one has not."""
+        if pilot.model.mesh.elements > PILOT_ELEMENTS or self.meshes.fixed or pilot.diagnosis.mobility:
+            return None
+        # What falls on and on does so on a finer mesh too; one that is too coarse is left by other ways.
+        if error.status in (Status.ITERATIONS, Status.BENT):
+            return None
+        mesh = pilot.model.mesh.refined().refined()
+        return None if mesh.elements == pilot.model.mesh.elements else self.meshes.prepared(mesh)
+
+    @staticmethod
+    def _beside(grown: Found, alone: Found | None) -> Found:
+        """What the loads lead to, with a note where another minimum is nearer to the start guess."""
+        if alone is None:
+            return grown
+        pilot = grown.prepared
+        grown.iterations = alone.iterations
+        apart = pilot.distance(alone.corrected.state, grown.corrected.state) > 1e-3
+        # What falls from its start guess is nearest to no minimum.
+        held = pilot.diagnosis.mobility == 0
+        told = held and pilot.multipliers(alone.corrected) <= BEYOND and not grown.notes
+        if told and apart and alone.stability.negative == 0:
+            grown.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
+        return grown
+
+    def named(self, pilot: Prepared, error: SolveError) -> SolveError:
+        """The error with the motions that nothing holds, and the members that have no slack, where there are any."""
+        try:
+            free, taut = pilot.diagnosis, pilot.lacks_slack
+        except np.linalg.LinAlgError:
+            return error
+        details = [f"free to move: {free.told(3)}"] if free.mobility else []
+        details += [error.detail] if error.detail else []
+        if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
+            rows = ", ".join(dict.fromkeys(free.redundant))
+            details.append(f"{TAUT}: {rows}")
+        return SolveError(error.status, "; ".join(details), error.last)
+
+    # -- single ways ----------------------------------------------------------------------------------
+
     def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
         """From the start guess at the full load."""
-        near = nearest(pilot, loading) if self.started and not self.leave else None
+        near = nearest(pilot, loading) if self.started and not self.meshes.leave else None
         if near is not None:
-            return Found(pilot, near, pilot.stability(near)), None
+            return Found(pilot, near, pilot.stability(near), way=("beside",)), None
         try:
-            corrected, iterations = cold(pilot, loading, self.settings.solver)
+            corrected, iterations, way = cold(pilot, loading, self.meshes.settings.solver)
         except SolveError as error:
             return None, error
-        return Found(pilot, corrected, pilot.stability(corrected), iterations=iterations), None
+        return Found(pilot, corrected, pilot.stability(corrected), iterations=iterations, way=(way,)), None
 
     def _carried(self, pilot: Prepared, factor: float) -> Found | None:
         """Where the loads carry the undeformed state: slack has no place of its own from which to follow them.
@@ -195,7 +237,8 @@ class Piloting(Meshing):
                 continue
             found = self._followed(pilot, between(pilot.model, begin, factor), there.state, (begin, factor))
             if found is not None:
-                return replace(found, notes=(*notes, *found.notes))
+                way = "carried" if notes else "small share"
+                return replace(found, notes=(*notes, *found.notes), way=(way, *found.way[1:]))
         return None
 
     def _accepted(self, pilot: Prepared, alone: Found | None, failure: SolveError | None, loading: Loading) -> Found:
@@ -203,16 +246,16 @@ class Piloting(Meshing):
         if alone is None:
             assert failure is not None
             raise failure
-        if alone.stability.negative == 0 or not self.leave:
+        if alone.stability.negative == 0 or not self.meshes.leave:
             return alone
         corrected, stability = pilot.leave(alone.corrected.state, alone.stability, loading)
         ways = counted(alone.stability.negative, "way out", "ways out")
         note = f"left an unstable equilibrium with {ways} along its escape shape"
-        return Found(pilot, corrected, stability, (note,), alone.iterations)
+        return _by("left", Found(pilot, corrected, stability, (note,), alone.iterations, way=alone.way))
 
     def _grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
         """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
-        return self._onward(pilot, factor, last) or self._grown_from_zero(pilot, factor)
+        return self._onward(pilot, factor, last) or self.grown_from_zero(pilot, factor)
 
     def _onward(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
         """The state that the loads lead to from the last factor, where that lies on the way from zero."""
@@ -220,27 +263,27 @@ class Piloting(Meshing):
             return None
         return self._through(pilot, last[0], factor, last[1].corrected.state)
 
-    def _grown_from_zero(self, pilot: Prepared, factor: float) -> Found | None:
-        """The state that the loads lead to from zero."""
+    def grown_from_zero(self, pilot: Prepared, factor: float, allowed: Allowed | None = None) -> Found | None:
+        """The state that the loads lead to from zero, by steps that are ``allowed``."""
         model = pilot.model
         zero = self._unloaded(pilot)
         if pilot.lacks_slack:
             # Straight members without slack: what acts along them alone leaves them straight, else they have to bend.
             if self._stays(pilot, zero, factor):
-                found = self._through(pilot, 0.0, factor, zero)
+                found = self._through(pilot, 0.0, factor, zero, allowed)
                 # What cannot bend leaves for a whole turn within one element, which only its mesh lets pass.
                 return None if found is None or pilot.multipliers(found.corrected) > BEYOND else found
-            return None if self.scene.histories else self._grown_from_bent(pilot, factor)
+            return None if self.scene.histories else self._grown_from_bent(pilot, factor, allowed)
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
-            return self._grown_from_bent(pilot, factor)
+            return self._grown_from_bent(pilot, factor, allowed)
         if model.loaded_at_zero and factor != 0.0:
             # Then the way leads through the factors, after the loads of factor 0 have grown.
-            first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None)
+            first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None, allowed)
             if first is None:
                 return None
             zero = first.corrected.state
-        return self._through(pilot, 0.0, factor, zero)
+        return self._through(pilot, 0.0, factor, zero, allowed)
 
     @staticmethod
     def _unloaded(pilot: Prepared) -> State:
@@ -253,7 +296,9 @@ class Piloting(Meshing):
         there = pilot.correct(zero, pilot.model.loading(factor))
         return there.converged and pilot.distance(there.state, zero) < STRAIGHT
 
-    def _through(self, pilot: Prepared, begin: float, end: float, state: State) -> Found | None:
+    def _through(
+        self, pilot: Prepared, begin: float, end: float, state: State, allowed: Allowed | None = None
+    ) -> Found | None:
         """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
         knots = {
             t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)
@@ -261,13 +306,13 @@ class Piloting(Meshing):
         stops = [begin, *sorted(knots, reverse=end < begin), end]
         found: Found | None = None
         for a, b in zip(stops, stops[1:], strict=False):
-            part = self._followed(pilot, between(pilot.model, a, b), state, (a, b))
+            part = self._followed(pilot, between(pilot.model, a, b), state, (a, b), allowed)
             if part is None:
                 return None
             found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
         return found
 
-    def _grown_from_bent(self, pilot: Prepared, factor: float) -> Found | None:
+    def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> Found | None:
         """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
         # What cannot be minimised is followed to each, in thousands of steps where it falls.
         for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
@@ -278,22 +323,29 @@ class Piloting(Meshing):
         if bent is None:
             return None
         state = bent.corrected.state
-        if bent.stability.negative and self.leave:
+        if bent.stability.negative and self.meshes.leave:
             try:
                 state = pilot.leave(state, bent.stability, pilot.model.loading(begin))[0].state
             except SolveError:
                 return None
-        return self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor))
+        found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
+        return None if found is None else replace(found, way=("small share", *found.way[1:]))
 
-    def _followed(self, pilot: Prepared, way: Any, state: State, factors: tuple[float, float] | None) -> Found | None:
+    def _followed(
+        self,
+        pilot: Prepared,
+        way: Any,
+        state: State,
+        factors: tuple[float, float] | None,
+        allowed: Allowed | None = None,
+    ) -> Found | None:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
-        leave, energy_known = self.leave and pilot.leaves, pilot.model.minimisable
-        allowed = self.allowed and self.allowed(pilot)
+        leave, energy_known = self.meshes.leave and pilot.leaves, pilot.model.minimisable
 
         def refuse(there: State, loading: Loading) -> None:
             refuse_large(Fields(pilot.equations, there, loading))
 
-        result = follow(pilot, way, state, leave=leave, allowed=allowed, refuse=refuse if self.small else None)
+        result = follow(pilot, way, state, leave=leave, allowed=allowed, refuse=refuse if self.meshes.small else None)
         passed = not result.reached and leave and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
@@ -303,11 +355,18 @@ class Piloting(Meshing):
         corrected = pilot.correct(result.state, way(1.0))
         stability = pilot.stability(corrected)
         notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
-        if stability.negative and self.leave and not energy_known:
+        if stability.negative and self.meshes.leave and not energy_known:
             notes += (KEPT,)
         elif passed:
             notes += (PASSED,)
-        return Found(pilot, corrected, stability, notes, left=result.left)
+        return Found(
+            pilot, corrected, stability, notes, left=result.left, way=("growing", *("left",) * bool(result.left))
+        )
+
+
+def _by(way: str, found: Found) -> Found:
+    """The same, with a further way that it took."""
+    return replace(found, way=(*found.way, way))
 
 
 def _with_change_point(found: Found) -> Found:

@@ -22,13 +22,13 @@ from ..solvers.newton import TINY, Corrected, loose_rows, named_in, relative_res
 from ..solvers.prepared import BEYOND, SOLVED, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
-from .meshing import Found
+from .meshing import Found, Meshing
 from .mirrors import has_twin
-from .piloting import KEPT, Piloting
 from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
+from .ways import KEPT
 
-__all__ = ["LEVELS", "Refining"]
+__all__ = ["LEVELS", "Refinement"]
 
 HUGE = 2000
 """From this many elements on the error is estimated from the mesh with half the elements, not with twice."""
@@ -87,15 +87,23 @@ TWIN = (
 """What is said where the energy does not tell one side from the other."""
 
 
-class Refining(Piloting):
-    """The pilot, and the way from it to the accuracy asked for."""
+class Refinement:
+    """The way from the pilot to the accuracy asked for.
 
-    def _onto(self, mesh: Mesh, source: Found, factor: float) -> Found:
+    Parameters
+    ----------
+    meshes : Meshing
+    """
+
+    def __init__(self, meshes: Meshing) -> None:
+        self.meshes = meshes
+
+    def onto(self, mesh: Mesh, source: Found, factor: float) -> Found:
         """The same equilibrium on another mesh."""
         if mesh.same(source.prepared.model.mesh):
             # Without flexible members nothing is halved.
             return source
-        prepared = self._prepared(mesh)
+        prepared = self.meshes.prepared(mesh)
         loading = prepared.model.loading(factor)
         state = transferred(source.prepared.model, source.corrected.state, prepared.model)
         corrected = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
@@ -103,8 +111,9 @@ class Refining(Piloting):
             corrected = deflated(prepared, state, loading, ()) or corrected
         if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
-        drifts = source.drifts
+        drifts, way = source.drifts, source.way
         if not corrected.converged:
+            way = way if "refound" in way else (*way, "refound")
             try:
                 corrected, _ = prepared.minimise(loading, state)
             except SolveError as error:
@@ -115,7 +124,7 @@ class Refining(Piloting):
                 raise SolveError(Status.FAILED, detail, state)
         apart = prepared.distance(state, corrected.state) > DRIFT and ELSEWHERE not in source.notes
         notes = (*source.notes, ELSEWHERE) if apart else source.notes
-        return replace(source, prepared=prepared, corrected=corrected, notes=notes, drifts=drifts)
+        return replace(source, prepared=prepared, corrected=corrected, notes=notes, drifts=drifts, way=way)
 
     @staticmethod
     def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:
@@ -128,32 +137,39 @@ class Refining(Piloting):
         held = prepared.correct(state, loading, iterations=25, most=1.5, flat=still)
         return held if held.converged else near
 
-    def _refined(self, pilot: Found, factor: float) -> Equilibrium:
+    def refined(self, pilot: Found, factor: float) -> Equilibrium:
+        """The answer that is found on a pilot mesh, on one that is fine enough.
+
+        Raises
+        ------
+        SceneError, SolveError
+            Nothing holds it, or finer meshes do not have it.
+        """
         if not pilot.kept:
             if pilot.prepared.multipliers(pilot.corrected) > BEYOND:
                 # What no finite force holds straight may look balanced, by rounding, and free along the rest.
                 _with_unique_reactions(pilot, pilot.prepared.model.loading(factor))
             # What nothing holds on a coarse mesh no finer one holds.
             _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
-        if self.small:
+        if self.meshes.small:
             refuse_large(Fields(pilot.prepared.equations, pilot.corrected.state, pilot.prepared.model.loading(factor)))
-        if self._prescribed:
+        if self.meshes.prescribed:
             return self._on_target(pilot, factor)
         mesh = pilot.prepared.model.mesh
-        own = mesh is not self.pilot_mesh and mesh.order == self.target.order and not self.fixed
-        there = mesh is self.target or own
+        own = mesh is not self.meshes.pilot_mesh and mesh.order == self.meshes.target.order and not self.meshes.fixed
+        there = mesh is self.meshes.target or own
         now = pilot if there else self._onto_target(pilot, factor)
-        usual = np.sqrt(self.accuracy)
+        usual = np.sqrt(self.meshes.accuracy)
         # Of one quantity a mesh may be right that is too coarse for all positions.
-        smooth, last, stalled = usual if self.quantity is None else max(usual, 0.5 * TORN), np.inf, 0
+        smooth, last, stalled = usual if self.meshes.quantity is None else max(usual, 0.5 * TORN), np.inf, 0
         loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
             marked = self._marked(now, loading, smooth)
             if not any(m.any() for m in marked.values()):
-                finer = self._onto(self._halved(now), now, factor)
+                finer = self.onto(self.halved(now), now, factor)
                 difference, error = self._difference(now, finer, factor)
                 now = finer
-                if error <= self.accuracy:
+                if error <= self.meshes.accuracy:
                     return self._answer(now, factor, max(error, self._of_fixed(now, factor)), difference)
                 stalled = stalled + 1 if error > 0.5 * last else 0
                 if stalled == STALLED:
@@ -162,35 +178,36 @@ class Refining(Piloting):
             elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
-                now = self._onto(now.prepared.model.mesh.refined(marked), now, factor)
+                now = self.onto(now.prepared.model.mesh.refined(marked), now, factor)
             loading = now.prepared.model.loading(factor)
-        finer = self._onto(self._halved(now), now, factor)
+        finer = self.onto(self.halved(now), now, factor)
         difference, error = self._difference(now, finer, factor)
         return self._answer(finer, factor, max(error, self._of_fixed(finer, factor)), difference)
 
     def _of_fixed(self, now: Found, factor: float) -> float:
         """What members contribute whose number of elements is asked for, and which the halving left as they were."""
-        if not self.fixed:
+        if not self.meshes.fixed:
             return 0.0
-        return sum(self._difference(now, self._onto(now.prepared.model.mesh.refined(), now, factor), factor))
+        return sum(self._difference(now, self.onto(now.prepared.model.mesh.refined(), now, factor), factor))
 
-    def _halved(self, now: Found) -> Mesh:
+    def halved(self, now: Found) -> Mesh:
+        """The mesh with all elements halved but those that are prescribed."""
         cuts = now.prepared.model.mesh.cuts
-        marks = {n: np.full(len(c) - 1, n not in self.fixed) for n, c in cuts.items()}
+        marks = {n: np.full(len(c) - 1, n not in self.meshes.fixed) for n, c in cuts.items()}
         return now.prepared.model.mesh.refined(marks)
 
     def _on_target(self, pilot: Found, factor: float) -> Equilibrium:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
-        mesh = self.target
+        mesh = self.meshes.target
         if mesh.elements > HUGE:
             half = replace(mesh, cuts={n: every_other(c) for n, c in mesh.cuts.items()})
-            coarse = self._onto(half, pilot, factor)
-            now = self._onto(mesh, coarse, factor)
+            coarse = self.onto(half, pilot, factor)
+            now = self.onto(mesh, coarse, factor)
             # The error falls by 4^p a halving; twice that share for not being there yet.
             difference, _ = self._difference(coarse, now, factor)
             return self._answer(now, factor, difference * 2.0 / (4.0**mesh.order - 1.0), difference)
-        now = pilot if self.pilot_mesh is mesh else self._onto_target(pilot, factor)
-        finer = self._onto(mesh.refined(), now, factor)
+        now = pilot if self.meshes.pilot_mesh is mesh else self._onto_target(pilot, factor)
+        finer = self.onto(mesh.refined(), now, factor)
         # The error before the halving is what that changes and what it leaves.
         error = sum(self._difference(now, finer, factor))
         return self._answer(_with_coarse_moments(now, finer, factor), factor, error)
@@ -203,19 +220,19 @@ class Refining(Piloting):
         SolveError
             That is too coarse for it.
         """
-        now = self._onto(self.target, pilot, factor)
+        now = self.onto(self.meshes.target, pilot, factor)
         if not now.prepared.model.space:
             return now
         fine, coarse = pilot.prepared, now.prepared.model
         apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
-        few, many = (counted(n, "element", "elements") for n in (self.target.elements, fine.model.mesh.elements))
+        few, many = (counted(n, "element", "elements") for n in (self.meshes.target.elements, fine.model.mesh.elements))
         if apart > APART:
             detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}" + more_than(
-                self.target, pilot
+                self.meshes.target, pilot
             )
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         if pilot.stability.negative == 0 < now.prepared.negative(now.corrected):
-            detail = f"{few} asked for snap away from what is stable on {many}" + more_than(self.target, pilot)
+            detail = f"{few} asked for snap away from what is stable on {many}" + more_than(self.meshes.target, pilot)
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         return now
 
@@ -229,12 +246,19 @@ class Refining(Piloting):
         self._refuse_torn(found, loading)
         if not found.kept:
             _refuse_free(prepared, found.corrected, stability)
-        if stability.negative > 0 and self.leave and prepared.leaves and not found.kept and KEPT not in found.notes:
+        if (
+            stability.negative > 0
+            and self.meshes.leave
+            and prepared.leaves
+            and not found.kept
+            and KEPT not in found.notes
+        ):
             corrected, stability = prepared.leave(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
-            found = replace(found, corrected=corrected, stability=stability, notes=(*found.notes, note))
+            notes, way = (*found.notes, note), (*found.way, "left")
+            found = replace(found, corrected=corrected, stability=stability, notes=notes, way=way)
             # The error was that of the state that was left.
-            error = sum(self._difference(found, self._onto(prepared.model.mesh.refined(), found, factor), factor))
+            error = sum(self._difference(found, self.onto(prepared.model.mesh.refined(), found, factor), factor))
         if any(ESCAPED in note for note in found.notes) and has_twin(prepared, found.corrected, loading):
             found = replace(found, notes=(*found.notes, TWIN))
         return finished(
@@ -245,9 +269,10 @@ class Refining(Piloting):
             stability,
             estimate=error,
             halved=halved,
-            error_of=self.error_of,
+            error_of=self.meshes.error_of,
             notes=found.notes,
             iterations=found.iterations,
+            way=found.way,
         )
 
     def _refuse_torn(self, found: Found, loading: Loading) -> None:
@@ -264,7 +289,7 @@ class Refining(Piloting):
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading))
         for name in model.members:
             worst = float(rough[model.elements_of(name)].max(initial=0.0))
-            if name not in self.fixed and worst > TORN:
+            if name not in self.meshes.fixed and worst > TORN:
                 detail = f"an equilibrium of the mesh only: member {name!r} turns by a jump within an element"
                 raise SolveError(Status.FAILED, detail, found.corrected.state)
 
@@ -274,13 +299,13 @@ class Refining(Piloting):
             unjudged(found.prepared, found.corrected, found.prepared.model.loading(factor), factor)
             for found in (coarse, fine)
         )
-        return self.judged(one, other)
+        return self.meshes.judged(one, other)
 
     def _marked(self, found: Found, loading: Loading, smooth: float) -> dict[str, Array]:
         """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
-        return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
+        return {n: rough[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members}
 
 
 def more_than(mesh: Mesh, source: Found) -> str:
