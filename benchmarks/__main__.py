@@ -1,8 +1,8 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...]``, from a clone of the repository.
 
 Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import
-and extremes; left out, all are run.  Three others, ``random``, ``jitter`` and ``contact``, stand alone, take options
-(``--help``) and half an hour each.
+and extremes; left out, all are run.  Four others, ``random``, ``jitter``, ``contact`` and ``ways``, stand alone, take
+options (``--help``) and half an hour each.
 
 Not a test: times are medians on the machine at hand, printed as tables.
 """
@@ -26,6 +26,7 @@ from .motion import motion, step_cost
 from .pieces import pieces
 from .random_run import random_scenes
 from .speed import loads, net, order, path, repeated, size
+from .ways import ways
 
 __all__ = ["main"]
 
@@ -35,7 +36,8 @@ def main(names: list[str]) -> None:
     known = {"order": order, "loads": loads, "size": size, "repeated": repeated, "derivatives": derivatives}
     known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
     known |= {"accuracy": knob, "pieces": pieces, "sweep": many, "import": importing, "extremes": extremes}
-    alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter, "contact": contact}
+    alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
+    alone |= {"contact": contact, "ways": ways}
     if names[:1] and names[0] in alone:
         alone[names[0]](names[1:])
         return

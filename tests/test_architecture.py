@@ -258,6 +258,7 @@ ORDER = [
     "benchmarks.contact_oracle",
     "benchmarks.contact_scenes",
     "benchmarks.contact_run",
+    "benchmarks.ways",
     "benchmarks.importing",
     "benchmarks.speed",
     "benchmarks.__main__",

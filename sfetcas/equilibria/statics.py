@@ -139,7 +139,8 @@ class LoadSteps:
         answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
         for number, corrected in enumerate(result.found[1:], start=1):
             stability = result.prepared.stability(corrected)
-            candidate = Found(result.prepared, corrected, stability, result.family_note(number), kept=True)
+            notes = result.family_note(number)
+            candidate = Found(result.prepared, corrected, stability, notes, kept=True, way=("search",))
             further = self._further(candidate, factor)
             if further is None:
                 dropped += 1

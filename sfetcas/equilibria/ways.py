@@ -87,6 +87,7 @@ WAYS = {
     "carried": "the whole loads carry the undeformed state downhill",
     "left": "an unstable equilibrium is left along its unstable mode",
     "finer": "one of these on a pilot mesh with a quarter of the element lengths",
+    "search": "a search or a scan for all equilibria, which deflates those that are known",
     "refound": "IPOPT again on a finer mesh, where Newton's method did not converge",
     "no contact": "the loads grow from zero, or a minimum is found, past no obstacle",
     "in contact": "loads and touches grow from zero, or from those of the step before",
