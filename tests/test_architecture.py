@@ -38,6 +38,7 @@ ORDER = [
     "mathematics.spectra",
     "mathematics.pieces",
     "mathematics.relations",
+    "mathematics.statements",
     "description",
     "description.records",
     "description.answers",

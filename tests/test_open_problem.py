@@ -51,6 +51,25 @@ def test_tip_kept_on_a_line():
     assert answer.multiplier("line") > 1.0
 
 
+def test_relations_are_said_as_in_all_problems():
+    problem = equilibrium_nlp(model_of(cantilever((0.0, 5.0)), 4, 5))
+    tip = problem.answer("nodes.B.position")
+    kept = problem.subject_to(tip[1] == 0.2, name="line").solve(TIGHT)
+    assert kept.position("B") == pytest.approx(on_line(0.2).position("B"), abs=1e-12)
+    assert kept.multiplier("line") == pytest.approx(on_line(0.2).multiplier("line"), abs=1e-9)
+    higher = problem.answer("nodes.B.position.y")
+    above = problem.subject_to(0.75 <= (higher <= 0.8), name="window").solve(TIGHT)  # noqa: SIM300
+    assert above.position("B")[1] == pytest.approx(0.75, abs=1e-8)
+    bent = problem.answer("members.m.curvature at 0.5")
+    assert float(above.value(bent)) == pytest.approx(float(above.value(problem.curvature("m", 0.5))))
+    sprung = problem.minimise(2.0 * tip[1] ** 2).solve(TIGHT)
+    assert sprung.position("B")[1] < problem.solve(TIGHT).position("B")[1] - 0.01
+    with pytest.raises(SceneError, match="found the symbol 'stranger'"):
+        problem.subject_to(ca.MX.sym("stranger") == 1.0)
+    with pytest.raises(SceneError, match=r"answer: found 'nodes\.B\.velocity', accepted: nodes\.NAME\.position"):
+        problem.answer("nodes.B.velocity")
+
+
 def test_multiplier_is_minus_the_derivative_of_the_energy():
     h = 1e-3
     energies = [on_line(0.2 + k * h).result.f for k in (-2, -1, 1, 2)]

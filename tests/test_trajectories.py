@@ -14,6 +14,7 @@ from sfetcas import (
     Member,
     Motion,
     Node,
+    Parameter,
     Scene,
     SceneError,
     Settings,
@@ -75,8 +76,11 @@ def flexible():
     [
         (lambda: OptimalControl(arm(), {"loads.none.value": (-1, 1)}, time=1.0), "none"),
         (lambda: OptimalControl(arm(), {}, time=1.0), "controls: found none"),
-        (lambda: OptimalControl(arm(), {TORQUE: (1, -1)}, time=1.0), "from the least to the largest"),
-        (lambda: OptimalControl(arm(), {TORQUE: 3.0}, time=1.0), "a pair"),
+        (
+            lambda: OptimalControl(arm(), {TORQUE: (1, -1)}, time=1.0),
+            "found the bounds 1 and -1, accepted: the lower one",
+        ),
+        (lambda: OptimalControl(arm(), {TORQUE: 3.0}, time=1.0), "found 3.0, accepted: a lower and an upper bound"),
         (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=-1.0), "a positive time"),
         (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, intervals=0), "at least 1"),
         (lambda: OptimalControl(arm(), {TORQUE: (-1, 1)}, time=1.0, intervals=[1, -1]), "positive shares"),
@@ -117,13 +121,14 @@ def test_what_is_asked_wrongly_is_refused():
         problem.control("loads.moter.value")
     with pytest.raises(SceneError, match="accepted: none"):
         problem.variable("sections.strip.EI3")
-    with pytest.raises(SceneError, match="do not contradict"):
+    with pytest.raises(SceneError, match=r"torn: found 1 <= \.\.\. <= -1, accepted: the lower bound first"):
         problem.subject_to(1.0 <= (torque <= -1.0), name="torn")  # noqa: SIM300
     with pytest.raises(SceneError, match="line: "):
         problem.subject_to(torque, name="line")
-    problem.minimise(ca.MX.sym("stranger"))
-    with pytest.raises(SceneError, match="stranger"):
-        problem.solve()
+    with pytest.raises(SceneError, match="minimise: found the symbol 'stranger'"):
+        problem.minimise(ca.MX.sym("stranger"))
+    with pytest.raises(SceneError, match="integral: found the symbol 'stranger'"):
+        problem.integral(ca.MX.sym("stranger"))
 
 
 def test_a_constraint_that_nothing_changes_and_does_not_hold_is_refused():
@@ -353,6 +358,24 @@ def test_the_least_effort_of_a_bar_does_not_depend_on_its_size(length):
     assert motion.cost / least == pytest.approx(1.0, abs=2e-6)
 
 
+def test_a_parameter_of_ones_own_is_a_variable():
+    """A spring of twice and one of three times the same stiffness, which holds the arm back as little as it may."""
+    springs = {name: Spring(node="hub", stiffness=share) for name, share in (("one", 2.0), ("other", 3.0))}
+    scene = bar(1.0)[0].scene.replace(springs=springs)
+    stiffness = Parameter(
+        1.0, lambda k: {"springs.one.stiffness": 2.0 * k, "springs.other.stiffness": 3.0 * k}, 0.2, 5.0
+    )
+    problem = OptimalControl(scene, {TORQUE: (-9.0, 9.0)}, time=2.0, intervals=12, variables={"stiffness": stiffness})
+    problem.subject_to(problem.at_tf(problem.answer("nodes.tip.position"))[1] == np.sin(0.5))
+    problem.rest_at_end()
+    problem.minimise(problem.integral(problem.control(TORQUE) ** 2))
+    motion = problem.solve(replay=False)
+    # Bounds of IPOPT give by 1e-8 of their distance.
+    assert motion.variables["stiffness"] == pytest.approx(0.2, abs=1e-6)
+    held = {name: spring.stiffness for name, spring in motion.scene.springs.items()}
+    assert held == pytest.approx({"one": 0.4, "other": 0.6}, abs=3e-6)
+
+
 @pytest.mark.parametrize("length", [1e-3, 1.0])
 def test_a_bound_of_the_effort_holds_in_small_units(length):
     problem, effort, least = bar(length)
@@ -378,7 +401,7 @@ def test_an_answer_that_its_replay_contradicts_says_so():
         ({"intervals": "a"}, "intervals: found 'a'"),
         ({"rates": {TORQUE: float("nan")}}, "rates: found nan"),
         ({"rates": {TORQUE: (-1, 1)}}, "rates: found"),
-        ({"time": (3.0, 1.0)}, "from the least to the largest"),
+        ({"time": (3.0, 1.0)}, "time: found the bounds 3 and 1, accepted: the lower one first"),
     ],
 )
 def test_numbers_that_are_none_are_refused(given, sentence):
@@ -397,5 +420,5 @@ def test_targets_that_are_no_numbers_are_refused():
     problem = OptimalControl(arm(0), {TORQUE: (-1, 1)}, time=1.0)
     with pytest.raises(SceneError, match="not a finite number as a bound"):
         problem.subject_to(problem.at_tf(problem.answer("nodes.hub.angle")) == float("nan"))
-    with pytest.raises(SceneError, match="cost: found 'x'"):
+    with pytest.raises(SceneError, match="minimise: found 'x'"):
         problem.minimise("x")

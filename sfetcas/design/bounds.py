@@ -7,7 +7,8 @@ import numpy as np
 
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from .formulation import Asked, Formulation, Free, Required
+from ..mathematics.statements import Free, Required
+from .formulation import Asked, Formulation
 
 __all__ = ["refuse_contradictions"]
 

@@ -18,8 +18,9 @@ from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt
+from ..mathematics.statements import Bounds
 from ..parametric.arguments import Parameter
-from .formulation import Bounds, Formulation, labelled
+from .formulation import Cases, Formulation, labelled
 from .solving import Iterate, Solved, Solving
 
 __all__ = ["Design", "DesignAnswer", "DesignIterate", "find"]
@@ -113,7 +114,7 @@ class DesignAnswer:
         return float(max(apart)) / self.scene(case).size
 
 
-class Design:
+class Design(Cases):
     """Numbers of a scene chosen for several load cases at once.
 
     Parameters
@@ -158,7 +159,7 @@ class Design:
     ) -> None:
         check_scene(scene, "Design({}, ...)")
         cases = cases if cases is not None else {ONE: {}}
-        self._formulation, self._kernels = Formulation(scene, list(cases), accuracy), kernels
+        self.statement, self._kernels = Formulation(scene, list(cases), accuracy), kernels
         self._guess = dict(guess or {})
         for case, numbers in cases.items():
             for name, value in numbers.items():
@@ -177,25 +178,21 @@ class Design:
     def _vary(
         self, label: str, name: str, bounds: Bounds | Parameter, case: str | None, guess: ArrayLike | None
     ) -> None:
-        low, high = self._formulation.bounds(label, name, bounds, guess)
-        known = self._formulation.numbers(name)
+        low, high = self.statement.bounds(label, name, bounds, guess)
+        known = self.statement.numbers(name)
         start = np.array(known.default, dtype=float)
         if case is not None:
-            set_to = self._formulation.settings[self._formulation.number(case)]
+            set_to = self.statement.settings[self.statement.number(case)]
             start = np.array([_number(set_to.get(n), x) for n, x in zip(known.names, start, strict=True)])
         if guess is not None:
             start = np.broadcast_to(np.asarray(guess, dtype=float), start.shape).copy()
         elif low < high:
             # A number of the scene outside of the bounds is as good a guess as the bound that is nearest.
             start = np.clip(start, low, high)
-        symbol = self._formulation.unknown(label, start, low, high)
-        self._formulation.set(name, symbol, case=case, between=(low, high))
+        symbol = self.statement.unknown(label, start, low, high)
+        self.statement.set(name, symbol, case=case, between=(low, high))
 
     # -- expressions --------------------------------------------------------------------------------
-
-    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
-        """Free numbers under a name of their own, which :meth:`set` makes numbers of the scene of."""
-        return self._formulation.unknown(name, guess, low, high)
 
     def set(
         self, name: str, value: ArrayLike | ca.MX, *, case: str | None = None, between: Bounds | None = None
@@ -204,7 +201,7 @@ class Design:
 
         ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``; ``between`` limits each of them.
         """
-        self._formulation.set(name, value, case=case, between=between)
+        self.statement.set(name, value, case=case, between=between)
 
     def variable(self, name: str, case: str | None = None) -> ca.MX:
         """An unknown by its name; of an input with its case.
@@ -214,10 +211,7 @@ class Design:
         SceneError
             There is none of this name.
         """
-        label = labelled(case or ONE, name)
-        if label not in self._formulation.free:
-            raise SceneError(not_known(label, list(self._formulation.free), "unknowns"), ("variable",))
-        return self._formulation.free[label].symbol
+        return self._free(labelled(case or ONE, name))
 
     def answer(self, case: str, name: str, at: Sequence[float] | None = None) -> ca.MX:
         """An answer of a case by its name: ``design.answer("open", "nodes.tip.position")``.
@@ -237,20 +231,8 @@ class Design:
         SceneError
             No such case or answer.
         """
-        number = self._formulation.number(case)
-        return self._formulation.ask(name, [number], labelled(case, name), at)
-
-    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
-        """Relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element."""
-        self._formulation.subject_to(*relations, name=name)
-
-    def minimise(self, expression: ca.MX | float) -> None:
-        """What shall be least; of further calls the sum."""
-        self._formulation.minimise(expression)
-
-    def stable(self, margin: float = 0.0) -> None:
-        """Only stable cases are answers, each lowest eigenvalue (``certificate.smallest``, N) at least the margin."""
-        self._formulation.stable(margin)
+        number = self.statement.number(case)
+        return self.statement.ask(name, [number], labelled(case, name), at)
 
     # -- the answer -----------------------------------------------------------------------------------
 
@@ -264,7 +246,7 @@ class Design:
         SolveError
             None was found; ``last`` is the last :class:`DesignIterate`.
         """
-        solving = Solving(self._formulation, solver, self._kernels)
+        solving = Solving(self.statement, solver, self._kernels)
         try:
             return self._answered(solving.solve(), solving.iterations)
         except SolveError as error:
@@ -274,11 +256,11 @@ class Design:
             raise SolveError(error.status, error.detail, last) from None
 
     def _told(self, iterate: Iterate) -> Told:
-        cases = self._formulation.cases
+        cases = self.statement.cases
         return {(cases[key[1][0]], key[0], key[2]): value for key, value in iterate.asked.items()}
 
     def _answered(self, solved: Solved, iterations: int) -> DesignAnswer:
-        formulation, iterate = self._formulation, solved.iterate
+        formulation, iterate = self.statement, solved.iterate
         names = formulation.cases
         return DesignAnswer(
             values={n: float(x[0]) if x.shape == (1,) else x for n, x in iterate.values.items()},
@@ -339,7 +321,7 @@ def find(
             raise SceneError(message, ("wanted", name))
         design.subject_to(flat == ca.DM(values), name=name)
         count += len(values)
-    most = sum(len(design._formulation.numbers(name).default) for name in bounds)
+    most = sum(len(design.statement.numbers(name).default) for name in bounds)
     if most > count:
         accepted = "as many, or a Design, which makes something least"
         raise SceneError(f"found {most} free numbers for {count} that are wanted, accepted: {accepted}", ("unknown",))

@@ -15,7 +15,7 @@ from ..description.records import unknown as not_known
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mathematics.relations import Relation, relation
+from ..mathematics.statements import Bounds, Problem, Statement, bounds_of
 from ..mechanics.mesh import first_mesh
 from ..mechanics.model import assemble
 from ..parametric.arguments import Argument, Parameter, argument, single_numbers
@@ -23,33 +23,10 @@ from ..parametric.changing import changed
 from ..parametric.equilibrium import refuse_search
 from ..parametric.results import Results
 
-__all__ = ["Asked", "Bounds", "Formulation", "Free", "Parameter", "Required", "Setting", "labelled"]
-
-Bounds = tuple[float, float]
-"""Least and largest value; infinite where there is none."""
+__all__ = ["Asked", "Cases", "Formulation", "Setting", "labelled"]
 
 EVENLY = tuple(np.linspace(0.0, 1.0, 21).tolist())
 """Where members are told of without a word about it: not where elements end, which may change on the way."""
-
-
-@dataclass(frozen=True, eq=False)
-class Free:
-    """Free numbers.
-
-    Attributes
-    ----------
-    name : str
-    symbol : MX
-        In expressions, in the shape of the guess.
-    guess, low, high : ndarray
-        All of one shape.
-    """
-
-    name: str
-    symbol: ca.MX
-    guess: Array
-    low: Array
-    high: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,20 +76,12 @@ class Asked:
     unit: str
 
 
-@dataclass(frozen=True, eq=False)
-class Required:
-    """Rows with bounds, and what they are called."""
-
-    name: str
-    relation: Relation
-
-
 def labelled(case: str, name: str) -> str:
     """What something of a case is called; the case of a problem that has one only has no name."""
     return f"{case}: {name}" if case else name
 
 
-class Formulation:
+class Formulation(Statement):
     """What a problem asks for; :class:`~sfetcas.design.solving.Solving` finds it.
 
     Parameters
@@ -125,7 +94,6 @@ class Formulation:
 
     Attributes
     ----------
-    free : dict of str to Free
     settings : list of dict
         Of each case, by the names of single numbers.
     """
@@ -141,45 +109,14 @@ class Formulation:
         analysis = scene.analysis.model_copy(update={"steps": steps, "equilibria": "one"})
         self.scene = scene.model_copy(update={"analysis": analysis, "expect": ()})
         self.cases, self.accuracy = list(cases), accuracy or scene.analysis.accuracy
-        self.free: dict[str, Free] = {}
+        super().__init__()
         self.settings: list[dict[str, Setting]] = [{} for _ in self.cases]
         self.asked: dict[Any, Asked] = {}
-        self.required: list[Required] = []
         self.tied: dict[str, Argument] = {}
-        self.objective = ca.MX(0)
         self.margin: float | None = None
         self._results: Results | None = None
 
     # -- unknowns -----------------------------------------------------------------------------------
-
-    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
-        """Free numbers under a name of their own, for :meth:`set` and for relations.
-
-        Parameters
-        ----------
-        guess : number, (n,) or (n, m): where to begin, and the shape
-        low, high : broadcast to it
-
-        Returns
-        -------
-        casadi.MX
-
-        Raises
-        ------
-        SceneError
-            A name that is there already, bounds that contradict each other, or a guess outside.
-        """
-        if name in self.free:
-            raise SceneError(f"found the unknown {name!r} twice, accepted: once")
-        start = np.atleast_1d(np.asarray(guess, dtype=float))
-        least, most = (np.broadcast_to(np.asarray(x, dtype=float), start.shape) for x in (low, high))
-        for a, x, b in zip(least.flat, start.flat, most.flat, strict=True):
-            if not a <= b:
-                raise SceneError(f"found the bounds {a:g} and {b:g}, accepted: the lower one first", (name,))
-            if not a <= x <= b:
-                raise SceneError(f"found the guess {x:g}, accepted: {a:g} to {b:g}, as its bounds say", (name,))
-        self.free[name] = Free(name, ca.MX.sym(name, *start.shape), start, least, most)
-        return self.free[name].symbol
 
     def numbers(self, name: str) -> Argument:
         """A number or vector of the scene by its name.
@@ -207,17 +144,10 @@ class Formulation:
         if isinstance(given, Parameter):
             if given.low is None or given.high is None:
                 raise SceneError("found no bounds, accepted: a lower and an upper bound, low and high", (label,))
-            if not given.low < given.high:
-                message = f"found the bounds {given.low:g} and {given.high:g}, accepted: the lower one first"
-                raise SceneError(message, (label,))
-            start = given.value if guess is None else float(np.asarray(guess))
-            self.tie(name, given, start, (given.low, given.high))
-            return given.low, given.high
-        try:
-            low, high = (float(x) for x in given)
-        except (TypeError, ValueError):
-            raise SceneError(f"found {given!r}, accepted: a lower and an upper bound", (label,)) from None
-        return low, high
+            bounds = bounds_of(label, (given.low, given.high))
+            self.tie(name, given, given.value if guess is None else float(np.asarray(guess)), bounds)
+            return bounds
+        return bounds_of(label, given)
 
     def tie(self, name: str, tied: Parameter, guess: float, bounds: Bounds) -> None:
         """Let a name stand for what moves several numbers of the scene.
@@ -293,7 +223,7 @@ class Formulation:
                 raise SceneError(f"found {list(places)}, accepted: fractions of the length, 0 to 1", ("at", name))
             result = self.result(name, places)
             shape = (len(cases), result.size) if rows else result.shape or (1,)
-            symbol = ca.MX.sym(label, *shape)
+            symbol = self.known(ca.MX.sym(label, *shape))
             self.asked[key] = Asked(name, result.member, label, places, tuple(cases), symbol, shape, result.unit)
         return self.asked[key].symbol
 
@@ -304,48 +234,6 @@ class Formulation:
         members = [n for n, record in self.scene.members.items() if record.type == "flexible"]
         return Results(self._results.model, [name], dict.fromkeys(members, tuple(places))).results[0]
 
-    # -- relations ----------------------------------------------------------------------------------
-
-    def subject_to(self, *given: ca.MX, name: str = "") -> None:
-        """Relations that have to hold, element by element: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``.
-
-        Parameters
-        ----------
-        name : what they are called in messages and among the multipliers; what they are made of without
-
-        Raises
-        ------
-        SceneError
-            What is given is no relation, or its bounds contradict each other.
-        """
-        for one in given:
-            try:
-                found = relation(one)
-            except ValueError as error:
-                raise SceneError(str(error), (name or "subject_to",)) from None
-            symbols = ", ".join(dict.fromkeys(symbol.name() for symbol in ca.symvar(found.expression)))
-            called = name or symbols or "subject_to"
-            wrong = found.low > found.high
-            if wrong.any():
-                low, high = found.low[wrong][0], found.high[wrong][0]
-                raise SceneError(f"found {low:g} <= ... <= {high:g}, accepted: the lower bound first", (called,))
-            self._refuse_strange(called, found.expression)
-            self.required.append(Required(self._once(called), found))
-
-    def minimise(self, expression: ca.MX | float) -> None:
-        """What shall be least; of further calls the sum.
-
-        Raises
-        ------
-        SceneError
-            More than one number, or a symbol that is none of this problem.
-        """
-        expression = ca.MX(expression)
-        if expression.numel() != 1:
-            raise SceneError(f"found {expression.numel()} numbers, accepted: one", ("minimise",))
-        self._refuse_strange("minimise", expression)
-        self.objective = self.objective + expression
-
     def stable(self, margin: float = 0.0) -> None:
         """Only stable cases are answers: each lowest eigenvalue, N, is at least the margin.
 
@@ -354,20 +242,6 @@ class Formulation:
         if not margin >= 0.0:
             raise SceneError(f"found {margin}, accepted: zero or more", ("stable",))
         self.margin = float(margin)
-
-    def _refuse_strange(self, name: str, expression: ca.MX) -> None:
-        known: list[Free | Asked] = [*self.free.values(), *self.asked.values()]
-        hashes = {one.symbol.__hash__() for one in known}
-        for symbol in ca.symvar(expression):
-            if symbol.__hash__() not in hashes:
-                accepted = "what variable, answer and unknown of this problem give"
-                raise SceneError(f"found the symbol {symbol.name()!r}, accepted: {accepted}", (name,))
-
-    def _once(self, name: str) -> str:
-        names = {one.name for one in self.required}
-        if name not in names:
-            return name
-        return next(f"{name} ({i})" for i in range(2, len(names) + 3) if f"{name} ({i})" not in names)
 
     # -- what follows ---------------------------------------------------------------------------------
 
@@ -429,3 +303,45 @@ class Formulation:
         reach += [*values, *found.default]
         low, high = min(reach), max(reach)
         return replace(found, low=low, high=high) if low < high else found
+
+
+class Cases(Problem):
+    """What problems over several cases have in common.
+
+    Attributes
+    ----------
+    statement : Formulation
+    """
+
+    statement: Formulation
+
+    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
+        """Free numbers under a name of their own, which ``set`` makes numbers of the scene of.
+
+        Parameters
+        ----------
+        guess : number, (n,) or (n, m): where to begin, and the shape
+        low, high : broadcast to it
+
+        Raises
+        ------
+        SceneError
+            A name that is there already, bounds that contradict each other, or a guess outside.
+        """
+        return self.statement.unknown(name, guess, low, high)
+
+    def stable(self, margin: float = 0.0) -> None:
+        """Only stable cases are answers, each lowest eigenvalue (``certificate.smallest``, N) at least the margin."""
+        self.statement.stable(margin)
+
+    def _free(self, label: str) -> ca.MX:
+        """An unknown by its name.
+
+        Raises
+        ------
+        SceneError
+            There is none of this name.
+        """
+        if label not in self.statement.free:
+            raise SceneError(not_known(label, list(self.statement.free), "unknowns"), ("variable",))
+        return self.statement.free[label].symbol

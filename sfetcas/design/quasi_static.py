@@ -16,10 +16,11 @@ from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt
+from ..mathematics.statements import Bounds
 from ..mechanics.equations import State
 from ..parametric.arguments import Parameter
 from .certifying import Certified, prepared_case
-from .formulation import Bounds, Formulation
+from .formulation import Cases, Formulation
 from .solving import Iterate, Solved, Solving
 
 __all__ = ["QuasiStatic", "QuasiStaticAnswer", "QuasiStaticIterate"]
@@ -109,7 +110,7 @@ class QuasiStaticAnswer:
         return self.scenes[point]
 
 
-class QuasiStatic:
+class QuasiStatic(Cases):
     """Inputs that lead a mechanism along a path of equilibria, slowly.
 
     Parameters
@@ -161,7 +162,7 @@ class QuasiStatic:
         if not inputs:
             raise SceneError("found none, accepted: one number of the scene or more", ("inputs",))
         self.s = np.linspace(0.0, 1.0, points)
-        self._formulation = Formulation(scene, [f"s = {x:.4g}" for x in self.s], accuracy)
+        self.statement = Formulation(scene, [f"s = {x:.4g}" for x in self.s], accuracy)
         self._kernels, self._inputs = kernels, list(inputs)
         starts = dict(guess or {})
         for name, bounds in inputs.items():
@@ -173,22 +174,18 @@ class QuasiStatic:
             raise SceneError(not_known(next(iter(starts)), known, "unknowns"), ("guess",))
 
     def _vary(self, name: str, bounds: Bounds | Parameter, guess: ArrayLike | None, *, everywhere: bool) -> None:
-        low, high = self._formulation.bounds(name, name, bounds, guess)
-        known = self._formulation.numbers(name)
+        low, high = self.statement.bounds(name, name, bounds, guess)
+        known = self.statement.numbers(name)
         start = np.array(known.default, dtype=float)
         shape = start.shape if everywhere else (len(self.s), len(start))
         if guess is not None:
             start = np.asarray(guess, dtype=float)
         elif low < high:
             start = np.clip(start, low, high)
-        symbol = self._formulation.unknown(name, np.broadcast_to(start, shape), low, high)
+        symbol = self.statement.unknown(name, np.broadcast_to(start, shape), low, high)
         self.set(name, symbol, between=(low, high))
 
     # -- expressions --------------------------------------------------------------------------------
-
-    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
-        """Free numbers under a name of their own, which :meth:`set` makes numbers of the scene of."""
-        return self._formulation.unknown(name, guess, low, high)
 
     def set(self, name: str, value: ArrayLike | ca.MX, *, between: Bounds | None = None) -> None:
         """What a number of the scene is: everywhere, or with a row for each point.
@@ -198,30 +195,28 @@ class QuasiStatic:
         SceneError
             The scene has no such number, or there are more or fewer values.
         """
-        count, points = len(self._formulation.numbers(name).names), len(self.s)
+        count, points = len(self.statement.numbers(name).names), len(self.s)
         shape = value.shape if isinstance(value, ca.MX) else np.shape(value)
         every = shape in ((points, count), *([(points,), (points, 1)] if count == 1 else []))
-        for i, case in enumerate(self._formulation.cases):
+        for i, case in enumerate(self.statement.cases):
             own: ArrayLike | ca.MX = value
             if every:
                 own = value[i, :] if isinstance(value, ca.MX) else np.asarray(value)[i]
-            self._formulation.set(name, own, case=case, between=between)
+            self.statement.set(name, own, case=case, between=between)
 
     def input(self, name: str) -> ca.MX:
         """An input, (points, n)."""
         if name not in self._inputs:
             raise SceneError(not_known(name, self._inputs, "inputs"), ("inputs",))
-        return self._formulation.free[name].symbol
+        return self.statement.free[name].symbol
 
     def variable(self, name: str) -> ca.MX:
         """An unknown by its name, as it was declared."""
-        if name not in self._formulation.free:
-            raise SceneError(not_known(name, list(self._formulation.free), "unknowns"), ("variable",))
-        return self._formulation.free[name].symbol
+        return self._free(name)
 
     def answer(self, name: str, at: Sequence[float] | None = None) -> ca.MX:
         """An answer along the path, (points, n); along members the numbers of a place after those of the one before."""
-        return self._formulation.ask(name, range(len(self.s)), name, at, rows=True)
+        return self.statement.ask(name, range(len(self.s)), name, at, rows=True)
 
     def at(self, expression: ca.MX, place: float) -> ca.MX:
         """The row of an expression at a point of the path, from 0 to 1, as a column.
@@ -254,19 +249,7 @@ class QuasiStatic:
         derivative = self.rate(self.input(name))
         if order == 2:
             derivative = self.rate(derivative)
-        self._formulation.minimise(weight * ca.sumsqr(derivative) / derivative.shape[0])
-
-    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
-        """Relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element."""
-        self._formulation.subject_to(*relations, name=name)
-
-    def minimise(self, expression: ca.MX | float) -> None:
-        """What shall be least; of further calls the sum."""
-        self._formulation.minimise(expression)
-
-    def stable(self, margin: float = 0.0) -> None:
-        """Only paths of stable equilibria are answers, see :meth:`sfetcas.design.designing.Design.stable`."""
-        self._formulation.stable(margin)
+        self.statement.minimise(weight * ca.sumsqr(derivative) / derivative.shape[0])
 
     # -- the answer -----------------------------------------------------------------------------------
 
@@ -280,7 +263,7 @@ class QuasiStatic:
         SolveError
             None was found; ``last`` is the last :class:`QuasiStaticIterate`.
         """
-        solving = Solving(self._formulation, solver, self._kernels)
+        solving = Solving(self.statement, solver, self._kernels)
         try:
             return self._answered(solving.solve(), solving.iterations)
         except SolveError as error:
@@ -317,7 +300,7 @@ class QuasiStatic:
             multipliers=solved.multipliers,
             notes=tuple(notes),
             iterations=iterations,
-            scenes=tuple(self._formulation.case_scene(i, solved.iterate.values) for i in range(count)),
+            scenes=tuple(self.statement.case_scene(i, solved.iterate.values) for i in range(count)),
         )
 
     def _leads(self, solved: Solved, i: int) -> bool:
@@ -329,7 +312,7 @@ class QuasiStatic:
         state = before.equilibrium.state
         for share in SHARES:
             numbers = (1.0 - share) * solved.numbers[i - 1] + share * solved.numbers[i]
-            scene = self._formulation.scene_with(dict(zip(names, numbers.tolist(), strict=True)))
+            scene = self.statement.scene_with(dict(zip(names, numbers.tolist(), strict=True)))
             prepared = prepared_case(scene, solved.equations, solved.mesh)
             found = prepared.correct(state, prepared.model.loading(here.equilibrium.factor), most=1.0)
             if not found.converged:

@@ -13,10 +13,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..description.answers import answer_name
 from ..description.records import nearest
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.nlp import NLP, Ipopt, NLPResult, Solver
+from ..mathematics.statements import Statement
 from ..mechanics.equations import State
 from ..mechanics.model import Model
 from .prepared import Prepared
@@ -36,8 +38,8 @@ def equilibrium_nlp(model: Model | Prepared, factor: float = 1.0) -> OpenProblem
     Example
     -------
     >>> problem = equilibrium_nlp(assemble(scene, uniform_mesh(scene, 4, 8)))      # doctest: +SKIP
-    >>> x, y = ca.vertsplit(problem.position("tip"))                              # doctest: +SKIP
-    >>> answer = problem.with_row("tip on the line", y - 0.2, unit=1.0).solve()   # doctest: +SKIP
+    >>> tip = problem.answer("nodes.tip.position")                                # doctest: +SKIP
+    >>> answer = problem.subject_to(tip[1] == 0.2, name="tip on the line").solve()  # doctest: +SKIP
     """
     prepared = model if isinstance(model, Prepared) else Prepared(model)
     prepared.model.check_complete()
@@ -99,7 +101,58 @@ class OpenProblem:
         _known(member, self.model.members, "member")
         return self.parts.strain(member, at) / self.model.scales.length
 
+    def answer(self, name: str) -> ca.MX:
+        """An answer by its name, as everywhere.
+
+        ``nodes.tip.position``; ``nodes.tip.angle``, in space ``nodes.tip.quaternion``; ``members.beam.curvature at 0.5``,
+        less that of the unloaded member.
+
+        Raises
+        ------
+        SceneError
+            Another name.
+        """
+        asked = answer_name(name, "answer")
+        kind, turned = (asked.kind.table, asked.kind.key), "quaternion" if self.model.space else "angle"
+        if kind == ("nodes", "position"):
+            found = self.position(asked.record)
+        elif kind == ("nodes", turned):
+            found = self.rotation(asked.record)
+        elif kind == ("members", "curvature") and asked.at is not None:
+            found = self.curvature(asked.record, asked.at)
+        else:
+            accepted = f"nodes.NAME.position, nodes.NAME.{turned}, members.NAME.curvature at PLACE"
+            raise SceneError(f"found {name!r}, accepted: {accepted}", ("answer",))
+        # In the plane there is one curvature, about b3, and no z.
+        number = asked.component if found.numel() > 1 else None
+        return found if number is None else found[number]
+
     # -- extensions -----------------------------------------------------------------------------
+
+    def subject_to(self, *relations: ca.MX, name: str = "", unit: float = 1.0) -> OpenProblem:
+        """With relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.
+
+        Parameters
+        ----------
+        name : what they are called among the multipliers; what they are made of without
+        unit : their size, to make them dimensionless
+
+        Raises
+        ------
+        SceneError
+            What is given is no relation, its bounds contradict each other, or it has a symbol of another problem.
+        """
+        statement, found = Statement(), self
+        for symbol in (self.nlp.x, self.nlp.p):
+            statement.known(symbol)
+        statement.subject_to(*relations, name=name)
+        for one in statement.required:
+            found = found.with_row(one.name, one.relation.expression, one.relation.low, one.relation.high, unit=unit)
+        return found
+
+    def minimise(self, energy: ca.MX) -> OpenProblem:
+        """The same as :meth:`with_energy`: the potential energy and what is added to it is least."""
+        return self.with_energy(energy)
 
     def with_row(
         self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None, *, unit: float = 1.0

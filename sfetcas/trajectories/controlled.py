@@ -27,7 +27,7 @@ from ..mechanics.expressions import moved_by
 from ..mechanics.masses import masses_of
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
-from ..parametric.arguments import Arguments, argument
+from ..parametric.arguments import Arguments, argument, asked_for
 from ..parametric.equilibrium import Place, chosen_places
 from ..parametric.moving import answers_of_motion, motion_of, parametric_stages
 from ..parametric.results import Result, Results
@@ -81,11 +81,7 @@ class ControlledSystem:
             base = assemble(self.scene, base.mesh, assembly="nodal", scales=scales)
         members = [n for n, member in self.scene.members.items() if member.type == "flexible"]
         known = [argument(self.scene, one.name) for one in controls]
-        # Where it is varied its range says where the model has to be known.
-        spans = [
-            (one.low, one.high) if np.isfinite(one.high - one.low) and one.low < one.high else None for one in variables
-        ]
-        known += [argument(self.scene, one.name, span) for one, span in zip(variables, spans, strict=True)]
+        known += asked_for(self.scene, {one.name: one.parameter for one in variables})
         for one in known:
             if len(one.default) != 1:
                 accepted = ", ".join(one.names)

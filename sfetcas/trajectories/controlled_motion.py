@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..description.loads import History
 from ..description.records import unknown
@@ -234,4 +235,8 @@ class ControlledMotion:
 
     def with_variables(self, scene: Scene) -> Scene:
         """A scene with what was found for the variables."""
-        return changed(scene, self.variables) if self.variables else scene
+        found: dict[str, ArrayLike] = {}
+        for one in self.transcription.statement.variables:
+            value = self.variables[one.name]
+            found |= {one.name: value} if one.parameter is None else one.parameter.numbers(value)
+        return changed(scene, found) if found else scene

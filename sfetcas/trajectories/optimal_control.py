@@ -17,19 +17,21 @@ from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.nlp import NLP, Ipopt, NLPResult
+from ..mathematics.statements import Bounds, Problem, bounds_of
 from ..mathematics.threads import single_threaded
 from ..mechanics.mesh import Mesh
+from ..parametric.arguments import Parameter
 from ..parametric.equilibrium import Place
 from .controlled import ControlledSystem
 from .controlled_motion import Check, ControlledMotion
-from .statement import Statement, Variable, bounds_of, controls_of
+from .statement import MotionStatement, controls_of, variable_of
 from .transcription import Course, Transcription
 from .warm import at_rest, carried_over, restaged, rigid, straight
 
 __all__ = ["OptimalControl", "moving"]
 
 
-class OptimalControl:
+class OptimalControl(Problem):
     """A motion of a scene that is looked for.
 
     Parameters
@@ -47,7 +49,7 @@ class OptimalControl:
         Of the controls in an interval: 1 linear and continuous, 0 constant with jumps.
     rates : mapping of str to float
         Largest rates of controls, per s.
-    variables : mapping of str to (low, high)
+    variables : mapping of str to (low, high) or Parameter
         Numbers of the scene that are looked for and do not change: stiffness, loads, not masses.
     stages : int
         Of Radau IIA in an interval, 3 (order 5) or 2 (order 3).
@@ -72,6 +74,8 @@ class OptimalControl:
     >>> motion.check.difference, motion.check.residual_vibration                          # doctest: +SKIP
     """
 
+    statement: MotionStatement
+
     def __init__(
         self,
         scene: Scene,
@@ -81,21 +85,21 @@ class OptimalControl:
         intervals: int | Sequence[float] = 60,
         order: Literal[0, 1] = 1,
         rates: Mapping[str, float] | None = None,
-        variables: Mapping[str, tuple[float, float]] | None = None,
+        variables: Mapping[str, Bounds | Parameter] | None = None,
         stages: Literal[2, 3] = 3,
         places: Place | None = None,
         settings: Settings | None = None,
     ) -> None:
         check_scene(scene, "OptimalControl({}, ...)")
         duration = _duration(time)
-        known = [Variable(name, *bounds_of(name, pair)) for name, pair in (variables or {}).items()]
+        known = [variable_of(name, given) for name, given in (variables or {}).items()]
         if not controls and not known:
             raise SceneError("controls: found none, accepted: at least one number that changes the motion")
         if order not in (0, 1) or stages not in (2, 3):
             raise SceneError(f"found order {order} and {stages} stages, accepted: order 0 or 1, 2 or 3 stages")
         if order == 0 and rates:
             raise SceneError("rates: found rates of controls that jump, accepted: order = 1 with rates")
-        self.statement = Statement(
+        self.statement = MotionStatement(
             controls_of(controls, rates or {}), known, duration, _shares(intervals), order, stages
         )
         self._settings, self._places = settings or Settings(), places or {}
@@ -174,22 +178,8 @@ class OptimalControl:
         """
         self.statement.resting = True
         for one in self.statement.controls:
-            self.statement.rests.setdefault(one.name, ca.MX.sym(f"{one.name} at rest"))
+            self.statement.rest(one.name)
         return dict(self.statement.rests)
-
-    # -- what is asked ------------------------------------------------------------------------------------
-
-    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
-        """Constraints: relations at all times, or once where nothing in them changes with time.
-
-        ``problem.subject_to(-1 <= (torque <= 1))``, ``problem.subject_to(problem.at_tf(angle) == 1.5)``.
-        """
-        for given in relations:
-            self.statement.subject_to(given, name or f"constraint {len(self.statement.rows) + 1}")
-
-    def minimise(self, cost: ca.MX) -> None:
-        """A term of the cost: of ``time``, ``integral(...)``, ``at_tf(...)``, variables."""
-        self.statement.minimise(cost)
 
     # -- solution -----------------------------------------------------------------------------------------
 
@@ -348,7 +338,7 @@ class _Run:
         return found
 
     def _searched(
-        self, statement: Statement, system: ControlledSystem, course: Course
+        self, statement: MotionStatement, system: ControlledSystem, course: Course
     ) -> tuple[Transcription, NLP, NLPResult]:
         """One program about a course, solved."""
         begin = clock.perf_counter()
@@ -408,7 +398,7 @@ class _Run:
         return replace(bare, scene=bare.with_variables(problem.scene))
 
 
-def _short_of(check: Check, size: float, statement: Statement) -> Iterator[str]:
+def _short_of(check: Check, size: float, statement: MotionStatement) -> Iterator[str]:
     """What a replay says against an answer."""
     if check.difference > FAR:
         yield f"the replay is off by {check.difference:.2g} of the size: more intervals or elements are needed"
@@ -417,11 +407,11 @@ def _short_of(check: Check, size: float, statement: Statement) -> Iterator[str]:
         yield f"after the end the replay does not rest: nodes move by {left:.2g} of the size"
 
 
-def _why(transcription: Transcription, nlp: NLP, result: NLPResult, statement: Statement) -> str:
+def _why(transcription: Transcription, nlp: NLP, result: NLPResult, statement: MotionStatement) -> str:
     """What IPOPT reported, what is violated most, and what may help."""
     worst = transcription.pieces.violated(nlp, result.x)
     # What was asked for first: equations are missed along with it.
-    own = {name for name, _ in statement.rows} | {"rest at the end"}
+    own = {one.name for one in statement.required} | {"rest at the end"}
     worst.sort(key=lambda item: item[0] not in own)
     told = "; ".join(f"{name} by {amount:.3g}" for name, amount in worst[:3])
     parts = [f"IPOPT: {result.message.replace('_', ' ')} after {result.iterations} iterations"]

@@ -8,7 +8,7 @@ variable of the scene, an integral, a control at which the motion comes to rest.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import casadi as ca
@@ -18,9 +18,10 @@ from ..description.records import unknown
 from ..dynamics.methods import RADAU
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mathematics.relations import Relation, relation
+from ..mathematics.statements import Bounds, Statement, bounds_of
+from ..parametric.arguments import Parameter
 
-__all__ = ["Control", "Kind", "Signal", "Statement", "Variable", "bounds_of", "controls_of"]
+__all__ = ["Control", "Kind", "MotionStatement", "Signal", "Variable", "controls_of", "variable_of"]
 
 Kind = Literal["control", "rate", "answer", "time"]
 """What a signal is of."""
@@ -54,11 +55,14 @@ class Variable:
     ----------
     name : str
     low, high : float
+    parameter : Parameter or None
+        What numbers of the scene follow a name of one's own.
     """
 
     name: str
     low: float
     high: float
+    parameter: Parameter | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +86,10 @@ class Signal:
     end: ca.MX
 
 
-@dataclass
-class Statement:
-    """Everything that is asked; what is asked of is a scene that the statement does not know.
+class MotionStatement(Statement):
+    """Everything that is asked of a motion; of which scene it does not know.
 
-    Attributes
+    Parameters
     ----------
     controls : sequence of Control
     variables : sequence of Variable
@@ -98,24 +101,38 @@ class Statement:
         Of the controls in an interval: 0 constant, 1 linear and continuous.
     stages : int
         Of Radau IIA in an interval, 2 or 3.
+
+    Attributes
+    ----------
+    signals : dict
+    end_time : MX
+    integrals : list of (MX, MX)
+        Their symbols, and what is integrated.
+    rests : dict of str to MX
+        Controls at which the motion comes to rest.
+    resting : bool
+    constants : dict of str to MX
+        Symbols of the variables.
     """
 
-    controls: Sequence[Control]
-    variables: Sequence[Variable]
-    duration: tuple[float, float]
-    shares: Array
-    order: int
-    stages: int
-    signals: dict[tuple[str, str], Signal] = field(default_factory=dict)
-    end_time: ca.MX = field(default_factory=lambda: ca.MX.sym("end_time"))
-    integrals: list[tuple[ca.MX, ca.MX]] = field(default_factory=list)
-    rows: list[tuple[str, Relation]] = field(default_factory=list)
-    costs: list[ca.MX] = field(default_factory=list)
-    rests: dict[str, ca.MX] = field(default_factory=dict)
-    resting: bool = False
-
-    def __post_init__(self) -> None:
-        self.constants = {one.name: ca.MX.sym(one.name) for one in self.variables}
+    def __init__(
+        self,
+        controls: Sequence[Control],
+        variables: Sequence[Variable],
+        duration: tuple[float, float],
+        shares: Array,
+        order: int,
+        stages: int,
+    ) -> None:
+        super().__init__()
+        self.controls, self.variables, self.duration = controls, variables, duration
+        self.shares, self.order, self.stages = shares, order, stages
+        self.signals: dict[tuple[str, str], Signal] = {}
+        self.end_time = self.known(ca.MX.sym("end_time"))
+        self.integrals: list[tuple[ca.MX, ca.MX]] = []
+        self.rests: dict[str, ca.MX] = {}
+        self.resting = False
+        self.constants = {one.name: self.known(ca.MX.sym(one.name)) for one in variables}
 
     @property
     def fractions(self) -> Array:
@@ -129,7 +146,7 @@ class Statement:
         """A signal, made when it is first asked for."""
         key = (kind, name)
         if key not in self.signals:
-            symbols = [ca.MX.sym(f"{kind} {name}{where}", size) for where in ("", " at t0", " at tf")]
+            symbols = [self.known(ca.MX.sym(f"{kind} {name}{where}", size)) for where in ("", " at t0", " at tf")]
             self.signals[key] = Signal(kind, name, size, *symbols)
         return self.signals[key]
 
@@ -147,10 +164,9 @@ class Statement:
 
     def integral(self, expression: ca.MX) -> ca.MX:
         """The integral of an expression over the time, by a symbol."""
-        given = _expression(expression, "integral")
-        if given.numel() != 1:
-            raise SceneError(f"integral: found {given.numel()} numbers, accepted: one")
-        symbol = ca.MX.sym(f"integral {len(self.integrals)}")
+        given = self.one(expression, "integral")
+        self.refuse_strange("integral", given)
+        symbol = self.known(ca.MX.sym(f"integral {len(self.integrals)}"))
         self.integrals.append((symbol, given))
         return symbol
 
@@ -159,59 +175,32 @@ class Statement:
         own = {signal.along.__hash__() for signal in self.signals.values()}
         return any(symbol.__hash__() in own for symbol in ca.symvar(expression))
 
-    # -- what is asked --------------------------------------------------------------------------------
+    def rest(self, name: str) -> ca.MX:
+        """What a control is at rest."""
+        return self.rests.setdefault(name, self.known(ca.MX.sym(f"{name} at rest")))
 
-    def subject_to(self, given: ca.MX, name: str) -> None:
-        """A relation that holds at all times, or once if nothing in it changes with time.
-
-        Raises
-        ------
-        SceneError
-            What is given is no relation, or contradicts itself.
-        """
-        try:
-            found = relation(given)
-        except ValueError as error:
-            raise SceneError(f"{name}: {error}") from None
-        if (found.low > found.high).any():
-            i = int((found.low > found.high).argmax())
-            message = f"{name}: found {found.low[i]:g} as least and {found.high[i]:g} as largest value"
-            raise SceneError(f"{message}, accepted: bounds that do not contradict each other")
-        self.rows.append((name, found))
-
-    def minimise(self, cost: ca.MX) -> None:
-        """A term of the cost.
-
-        Raises
-        ------
-        SceneError
-            It changes with time.
-        """
-        cost = _expression(cost, "cost")
-        if cost.numel() != 1:
-            raise SceneError(f"cost: found {cost.numel()} numbers, accepted: one")
-        if self.along(cost):
-            raise SceneError(
-                "cost: found what changes with time, accepted: integral(...), at_t0(...) or at_tf(...) of it"
-            )
-        self.costs.append(cost)
+    def minimise(self, cost: Any) -> None:
+        """A term of the cost, which has one value."""
+        expression = self.one(cost, "minimise")
+        if self.along(expression):
+            accepted = "integral(...), at_t0(...) or at_tf(...) of it"
+            raise SceneError(f"found what changes with time, accepted: {accepted}", ("minimise",))
+        super().minimise(expression)
 
 
-def bounds_of(name: str, given: object) -> tuple[float, float]:
-    """Least and largest value of a number that is looked for.
+def variable_of(name: str, given: Bounds | Parameter) -> Variable:
+    """A variable by its bounds, or as a :class:`~sfetcas.parametric.arguments.Parameter` with bounds.
 
     Raises
     ------
     SceneError
         They are none, or contradict each other.
     """
-    try:
-        low, high = (float(x) for x in given)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise SceneError(f"{name}: found {given!r}, accepted: a pair (least, largest)") from None
-    if np.isnan([low, high]).any() or low > high:
-        raise SceneError(f"{name}: found {low:g} to {high:g}, accepted: bounds from the least to the largest value")
-    return low, high
+    if not isinstance(given, Parameter):
+        return Variable(name, *bounds_of(name, given))
+    if given.low is None or given.high is None:
+        raise SceneError("found no bounds, accepted: a lower and an upper bound, low and high", (name,))
+    return Variable(name, *bounds_of(name, (given.low, given.high)), given)
 
 
 def controls_of(given: Mapping[str, object], rates: Mapping[str, float]) -> list[Control]:
@@ -222,17 +211,3 @@ def controls_of(given: Mapping[str, object], rates: Mapping[str, float]) -> list
         if np.ndim(rate) or np.asarray(rate).dtype.kind not in "iuf" or not rate > 0.0:
             raise SceneError(f"rates: found {rate!r} for {name}, accepted: the largest rate, a number above zero")
     return [Control(name, *bounds_of(name, pair), rate=float(rates.get(name, np.inf))) for name, pair in given.items()]
-
-
-def _expression(given: Any, what: str) -> ca.MX:
-    """What CasADi takes for an expression.
-
-    Raises
-    ------
-    SceneError
-        It takes it for none.
-    """
-    try:
-        return ca.MX(given)
-    except NotImplementedError:
-        raise SceneError(f"{what}: found {given!r}, accepted: an expression of CasADi or a number") from None

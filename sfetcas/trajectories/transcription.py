@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..description.records import unknown
 from ..dynamics.methods import RADAU
 from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array, Index
@@ -26,7 +25,7 @@ from ..mathematics.interpolation import differentiation, integration
 from ..mathematics.pieces import Pieces, Unknown
 from ..mathematics.relations import Relation
 from .controlled import ControlledSystem
-from .statement import Signal, Statement
+from .statement import MotionStatement, Signal
 
 __all__ = ["Course", "Transcription"]
 
@@ -65,12 +64,12 @@ class Transcription:
 
     Parameters
     ----------
-    statement : Statement
+    statement : MotionStatement
     system : ControlledSystem
     guess : Course
     """
 
-    def __init__(self, statement: Statement, system: ControlledSystem, guess: Course) -> None:
+    def __init__(self, statement: MotionStatement, system: ControlledSystem, guess: Course) -> None:
         self.statement, self.system, self.guess = statement, system, guess
         self.places = RADAU[statement.stages]
         self.intervals, self.stages = len(statement.shares), statement.stages
@@ -229,13 +228,13 @@ class Transcription:
         statement = self.statement
         self.integrals: dict[int, Index] = {}
         cost, summed = self._split_cost()
-        bounded = {symbol.__hash__() for _, found in statement.rows for symbol in ca.symvar(found.expression)}
+        bounded = {symbol.__hash__() for one in statement.required for symbol in ca.symvar(one.relation.expression)}
         bounded |= {symbol.__hash__() for symbol in ca.symvar(cost)}
         for number, (symbol, _) in enumerate(statement.integrals):
             if symbol.__hash__() in bounded:
                 self._integrate(number, symbol)
-        for name, found in statement.rows:
-            varying = _varying(name, found)
+        for one in statement.required:
+            name, varying = one.name, _varying(one.name, one.relation)
             if not len(varying.low):
                 continue
             function, index = self.expression(name, varying.expression)
@@ -259,7 +258,7 @@ class Transcription:
 
         An integral that is an unknown of its own would hide from the solver that its integrand is convex.
         """
-        cost = sum(self.statement.costs, ca.MX(0))
+        cost = self.statement.objective
         symbols = [symbol for symbol, _ in self.statement.integrals]
         slopes = {i: ca.jacobian(cost, symbol) for i, symbol in enumerate(symbols)}
         linear = {i: slope for i, slope in slopes.items() if not ca.symvar(slope)}
@@ -323,7 +322,7 @@ class Transcription:
             size = self._unit_of(one.low, one.high, system.arguments.defaults[k])
             guess = float(np.clip(0.0, one.low, one.high))
             block = self.pieces.unknowns(f"{one.name} at rest", guess, one.low, one.high, size)
-            self.statement.rests.setdefault(one.name, ca.MX.sym(f"{one.name} at rest"))
+            self.statement.rest(one.name)
             self._lifted[f"{one.name} at rest"] = self.resting[one.name] = block
             numbers.append(block.index.ravel())
         numbers += [block.index.ravel() for block in self.variables]
@@ -436,9 +435,7 @@ class Transcription:
         places = []
         for symbol in symbols:
             found = self._places_of(symbol)
-            if found is None:
-                accepted = "symbols of this problem: controls, answers, variables, times, integrals"
-                raise SceneError(f"{name}: {unknown(symbol.name(), [], accepted)}")
+            assert found is not None, symbol
             places.append(found)
         n = max((len(part) for part in places), default=1)
         index = np.concatenate(

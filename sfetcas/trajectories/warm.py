@@ -19,7 +19,7 @@ from ..mathematics.nlp import Ipopt
 from ..mathematics.pieces import Pieces
 from ..mechanics.expressions import moved_by
 from .controlled import ControlledSystem
-from .statement import Statement
+from .statement import MotionStatement
 from .transcription import Course
 
 __all__ = ["at_rest", "carried_over", "restaged", "rigid", "straight"]
@@ -41,7 +41,9 @@ def rigid(scene: Scene) -> Scene | None:
     return Scene.from_dict(table)
 
 
-def at_rest(statement: Statement, system: ControlledSystem, end: float, controls: Mapping[str, ArrayLike]) -> Course:
+def at_rest(
+    statement: MotionStatement, system: ControlledSystem, end: float, controls: Mapping[str, ArrayLike]
+) -> Course:
     """The scene as it begins, at all times.
 
     Parameters
@@ -83,7 +85,7 @@ def at_rest(statement: Statement, system: ControlledSystem, end: float, controls
     )
 
 
-def straight(statement: Statement, system: ControlledSystem, start: Course) -> Course:
+def straight(statement: MotionStatement, system: ControlledSystem, start: Course) -> Course:
     """A motion that turns evenly from the begin to a shape that meets what is asked of answers at the end.
 
     It is the shape nearest to the begin, and obeys joints and closings only; without one, or where nothing is asked,
@@ -99,10 +101,14 @@ def straight(statement: Statement, system: ControlledSystem, start: Course) -> C
     return _still(statement, system, start, q)
 
 
-def _end_shape(statement: Statement, system: ControlledSystem) -> Array | None:
+def _end_shape(statement: MotionStatement, system: ControlledSystem) -> Array | None:
     """Rotation vectors from the begin to the nearest shape that meets what is asked of answers at the end."""
     ends = {s.end.__hash__(): s for s in statement.signals.values() if s.kind == "answer"}
-    rows = [r for _, r in statement.rows if all(s.__hash__() in ends for s in ca.symvar(r.expression))]
+    rows = [
+        one.relation
+        for one in statement.required
+        if all(s.__hash__() in ends for s in ca.symvar(one.relation.expression))
+    ]
     rows = [r for r in rows if ca.symvar(r.expression)]
     if not rows:
         return None
@@ -131,7 +137,7 @@ def _end_shape(statement: Statement, system: ControlledSystem) -> Array | None:
     return pieces.value(d, result.x)[:turning] if result.status is Status.SOLVED else None
 
 
-def _still(statement: Statement, system: ControlledSystem, start: Course, q: Array) -> Course:
+def _still(statement: MotionStatement, system: ControlledSystem, start: Course, q: Array) -> Course:
     """A motion through rotations (stages, rotations, components), with controls and variables of a start."""
     near = np.tile(system.begin.state.wound, (len(q), 1))
     y, x = _placed(system, q, near, _numbers(statement, start))
@@ -143,7 +149,9 @@ def _still(statement: Statement, system: ControlledSystem, start: Course, q: Arr
     return Course(start.end, q, d, x, v, a, near, start.controls, start.variables)
 
 
-def carried_over(statement: Statement, stiff: ControlledSystem, course: Course, system: ControlledSystem) -> Course:
+def carried_over(
+    statement: MotionStatement, stiff: ControlledSystem, course: Course, system: ControlledSystem
+) -> Course:
     """The motion of the rigid scene as one of the flexible scene, whose members stay as they were made."""
     source = _sources(stiff, system)
     q = np.stack(
@@ -156,7 +164,7 @@ def carried_over(statement: Statement, stiff: ControlledSystem, course: Course, 
     return _still(statement, system, course, q)
 
 
-def restaged(statement: Statement, system: ControlledSystem, course: Course, stages: int) -> Course:
+def restaged(statement: MotionStatement, system: ControlledSystem, course: Course, stages: int) -> Course:
     """A motion told at so many stages of each interval, at the stages of the statement instead."""
     n, begin = len(statement.shares), system.begin
     old, new = np.append(0.0, RADAU[stages]), RADAU[statement.stages]
@@ -199,7 +207,7 @@ def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
     return source
 
 
-def _numbers(statement: Statement, course: Course) -> Array:
+def _numbers(statement: MotionStatement, course: Course) -> Array:
     """Controls and variables at all stages, (stages, numbers)."""
     places, n = RADAU[statement.stages], len(statement.shares)
     if statement.order:
@@ -239,7 +247,7 @@ def _whole(values: Array, begin: Array, intervals: int, stages: int) -> Array:
     return np.concatenate([before[:, None], inside], axis=1)
 
 
-def _rates(statement: Statement, span: float, values: Array, begin: Array) -> Array:
+def _rates(statement: MotionStatement, span: float, values: Array, begin: Array) -> Array:
     """Derivatives of the collocation polynomials at all stages."""
     slopes = differentiation(np.append(0.0, RADAU[statement.stages]))[1:]
     n, s = len(statement.shares), statement.stages

@@ -1,0 +1,230 @@
+"""What a problem asks for in the words of CasADi: unknowns, relations that have to hold, what shall be least.
+
+Relations are ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.  This module knows no mechanics; what
+numbers and answers of a scene are is known by those who make symbols of them (:meth:`Statement.known`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SceneError
+from .arrays import Array
+from .relations import Relation, relation
+
+__all__ = ["Bounds", "Free", "Problem", "Required", "Statement", "bounds_of"]
+
+Bounds = tuple[float, float]
+"""Least and largest value; infinite where there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Free:
+    """Free numbers.
+
+    Attributes
+    ----------
+    name : str
+    symbol : MX
+        In expressions, in the shape of the guess.
+    guess, low, high : ndarray
+        All of one shape.
+    """
+
+    name: str
+    symbol: ca.MX
+    guess: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Required:
+    """Rows with bounds, and what they are called."""
+
+    name: str
+    relation: Relation
+
+
+def bounds_of(name: str, given: object) -> Bounds:
+    """Least and largest value of what is looked for.
+
+    Raises
+    ------
+    SceneError
+        They are no two numbers, or contradict each other.
+    """
+    try:
+        low, high = (float(x) for x in given)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise SceneError(f"found {given!r}, accepted: a lower and an upper bound", (name,)) from None
+    if not low <= high:
+        raise SceneError(f"found the bounds {low:g} and {high:g}, accepted: the lower one first", (name,))
+    return low, high
+
+
+class Statement:
+    """What is asked for.
+
+    Attributes
+    ----------
+    free : dict of str to Free
+    required : list of Required
+    costs : list of MX
+        Terms of what shall be least.
+    """
+
+    def __init__(self) -> None:
+        self.free: dict[str, Free] = {}
+        self.required: list[Required] = []
+        self.costs: list[ca.MX] = []
+        self._symbols: dict[int, ca.MX] = {}
+
+    def known(self, symbol: ca.MX) -> ca.MX:
+        """A symbol that expressions may contain from now on."""
+        # Kept, so that no other symbol gets its hash.
+        self._symbols[symbol.__hash__()] = symbol
+        return symbol
+
+    def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
+        """Free numbers under a name of their own.
+
+        Parameters
+        ----------
+        guess : number, (n,) or (n, m): where to begin, and the shape
+        low, high : broadcast to it
+
+        Raises
+        ------
+        SceneError
+            A name that is there already, bounds that contradict each other, or a guess outside.
+        """
+        if name in self.free:
+            raise SceneError(f"found the unknown {name!r} twice, accepted: once")
+        start = np.atleast_1d(np.asarray(guess, dtype=float))
+        least, most = (np.broadcast_to(np.asarray(x, dtype=float), start.shape) for x in (low, high))
+        for a, x, b in zip(least.flat, start.flat, most.flat, strict=True):
+            bounds_of(name, (a, b))
+            if not a <= x <= b:
+                raise SceneError(f"found the guess {x:g}, accepted: {a:g} to {b:g}, as its bounds say", (name,))
+        self.free[name] = Free(name, self.known(ca.MX.sym(name, *start.shape)), start, least, most)
+        return self.free[name].symbol
+
+    def subject_to(self, *given: ca.MX, name: str = "") -> None:
+        """Relations that have to hold.
+
+        Parameters
+        ----------
+        name : what they are called in messages and among the multipliers; what they are made of without
+
+        Raises
+        ------
+        SceneError
+            What is given is no relation, its bounds contradict each other, or it has a symbol of another problem.
+        """
+        for one in given:
+            try:
+                found = relation(one)
+            except ValueError as error:
+                raise SceneError(str(error), (name or "subject_to",)) from None
+            symbols = ", ".join(dict.fromkeys(symbol.name() for symbol in ca.symvar(found.expression)))
+            called = name or symbols or "subject_to"
+            wrong = found.low > found.high
+            if wrong.any():
+                low, high = found.low[wrong][0], found.high[wrong][0]
+                raise SceneError(f"found {low:g} <= ... <= {high:g}, accepted: the lower bound first", (called,))
+            self.refuse_strange(called, found.expression)
+            self.required.append(Required(self._once(called), found))
+
+    def minimise(self, cost: Any) -> None:
+        """What shall be least; of further calls the sum.
+
+        Raises
+        ------
+        SceneError
+            No expression, more than one number, or a symbol of another problem.
+        """
+        expression = self.one(cost, "minimise")
+        self.refuse_strange("minimise", expression)
+        self.costs.append(expression)
+
+    @property
+    def objective(self) -> ca.MX:
+        """The sum of all costs."""
+        return sum(self.costs, ca.MX(0))
+
+    @staticmethod
+    def one(given: Any, where: str) -> ca.MX:
+        """An expression of one number.
+
+        Raises
+        ------
+        SceneError
+            It is none.
+        """
+        try:
+            expression = ca.MX(given)
+        except NotImplementedError:
+            raise SceneError(f"found {given!r}, accepted: an expression of CasADi or a number", (where,)) from None
+        if expression.numel() != 1:
+            raise SceneError(f"found {expression.numel()} numbers, accepted: one", (where,))
+        return expression
+
+    def refuse_strange(self, name: str, expression: ca.MX) -> None:
+        """Refuse a symbol that is none of this problem.
+
+        Raises
+        ------
+        SceneError
+            Names it.
+        """
+        for symbol in ca.symvar(expression):
+            if symbol.__hash__() not in self._symbols:
+                accepted = "symbols that this problem has given: of its variables, answers and unknowns"
+                raise SceneError(f"found the symbol {symbol.name()!r}, accepted: {accepted}", (name,))
+
+    def _once(self, name: str) -> str:
+        names = {one.name for one in self.required}
+        if name not in names:
+            return name
+        return next(f"{name} ({i})" for i in range(2, len(names) + 3) if f"{name} ({i})" not in names)
+
+
+class Problem:
+    """What all problems say in the same words.
+
+    Attributes
+    ----------
+    statement : Statement
+    """
+
+    statement: Statement
+
+    def subject_to(self, *relations: ca.MX, name: str = "") -> None:
+        """Relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.
+
+        Parameters
+        ----------
+        name : what they are called in messages and among the multipliers; what they are made of without
+
+        Raises
+        ------
+        SceneError
+            What is given is no relation, its bounds contradict each other, or it has a symbol of another problem.
+        """
+        self.statement.subject_to(*relations, name=name)
+
+    def minimise(self, cost: ca.MX | float) -> None:
+        """What shall be least; of further calls the sum.
+
+        Raises
+        ------
+        SceneError
+            More than one number, or a symbol of another problem.
+        """
+        self.statement.minimise(cost)
