@@ -104,8 +104,8 @@ class OpenProblem:
     def answer(self, name: str) -> ca.MX:
         """An answer by its name, as everywhere.
 
-        ``nodes.tip.position``; ``nodes.tip.angle``, in space ``nodes.tip.quaternion``; ``members.beam.curvature at 0.5``,
-        less that of the unloaded member.
+        ``nodes.tip.position``; ``nodes.tip.angle``, in space ``nodes.tip.quaternion``; and
+        ``members.beam.curvature at 0.5``, less that of the unloaded member.
 
         Raises
         ------
