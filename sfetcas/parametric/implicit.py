@@ -6,7 +6,8 @@ step, ``K = dF/dstep`` and ``S = dstep/dp = -K^-1 dF/dp``
 
     da/dp = a_step S + a_p,      K^T m = -a_step^T,      d2a/dp2 = [S; I]^T d2(a + m.F) [S; I],
 
-exact whatever the step means, as long as it means the same in both.
+exact whatever the step means, as long as it means the same in both.  Equations and answers know of the numbers by the
+*data* only, whose own derivatives are put between: ``d/dp = d/ddata ddata/dp``.
 
 Source: Hinze, Pinnau, Ulbrich and Ulbrich 2009, section 1.6 (sensitivities and adjoints; the second derivatives).
 """
@@ -14,7 +15,6 @@ Source: Hinze, Pinnau, Ulbrich and Ulbrich 2009, section 1.6 (sensitivities and 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,19 +97,20 @@ class Implicit:
         self.turning = self._program.equations.turning_unknowns
         self._symmetric = self._program.model.has_potential
         self._batches: dict[str, Batch] = {}
+        self._data = _Data(arguments)
 
     # -- functions ----------------------------------------------------------------------------------
 
     @functools.cached_property
     def _symbols(self) -> tuple[ca.MX, ca.MX]:
-        """Step and numbers in one, and the state that the step goes from."""
-        return ca.MX.sym("x", self.total + self._count), ca.MX.sym("state", self._program.states)
+        """Step and data in one, and the state that the step goes from."""
+        return ca.MX.sym("x", self.total + self._data.size), ca.MX.sym("state", self._program.states)
 
     def _at(self, expression: ca.MX, *, moved: bool = True) -> ca.MX:
-        """An expression of the program's state and given, and of :attr:`_numbers`, after the step or before it."""
+        """An expression of the program's state and given, and of :attr:`_rest`, after the step or before it."""
         program, (x, state) = self._program, self._symbols
-        step, p = ca.vertsplit(x, [0, self.total, self.total + self._count])
-        given = self._arguments.given(p)
+        step, data = ca.vertsplit(x, [0, self.total, self.total + self._data.size])
+        given, rest = self._data.whole(data)
         hold = ca.Function("hold", [program.state_symbol, program.symbol], [program.held_expression])
         there = hold.call([state, given], True)[0]
         if moved:
@@ -117,35 +118,43 @@ class Implicit:
             q, y, lam = program.moved_expression(by)
             move = ca.Function("move", [program.state_symbol, by], [ca.vertcat(ca.vec(q), y, lam, program.parts[3])])
             there = move.call([there, step], True)[0]
-        function = ca.Function("at", [self._numbers, program.state_symbol, program.symbol], [ca.densify(expression)])
-        return function.call([p, there, given], True)[0]
+        function = ca.Function("at", [self._rest, program.state_symbol, program.symbol], [ca.densify(expression)])
+        return function.call([rest, there, given], True)[0]
 
     @functools.cached_property
-    def _numbers(self) -> ca.MX:
-        return ca.MX.sym("p", self._count)
+    def _rest(self) -> ca.MX:
+        return ca.MX.sym("rest", self._data.told)
 
     @functools.cached_property
     def _told(self) -> ca.MX:
         """The answers after a step."""
-        undeformed = self._arguments.undeformed(self._numbers)
-        return self._at(self._results.expression(self._program, undeformed, short=True))
+        return self._at(self._results.expression(self._program, self._rest, short=True))
+
+    @functools.cached_property
+    def _seeds(self) -> ca.MX:
+        """Derivatives of the data by the numbers, as an argument."""
+        return ca.MX.sym("seeds", self._data.pattern)
 
     def _directions(self, steps: ca.MX | ca.DM) -> ca.MX:
-        """Directions of step and numbers, one for each number."""
-        return ca.vertcat(steps, ca.DM.eye(self._count))
+        """Directions of step and data, one for each number."""
+        return ca.vertcat(steps, self._seeds)
 
     @functools.cached_property
     def _equations(self) -> ca.Function:
-        """(x, state) -> derivative of the equations by the numbers, and the entries of the matrix."""
+        """(x, state, seeds) -> derivative of the equations by the numbers, and the entries of the matrix."""
         residual = self._at(self._program.forces.residual, moved=False)
         entries = self._at(self._program.matrix.nz[:], moved=False)
-        found: Any = self._expanded(residual, entries) or (*self._symbols, (residual, entries))
-        x, state, (balance, stiff) = found
-        by_p = ca.jtimes(balance, x, self._directions(ca.DM(self.total, self._count)))
-        return ca.Function("equations", [x, state], [ca.densify(by_p), stiff])
+        x, state, seeds, (balance, stiff) = self._expanded(residual, entries) or (
+            *self._symbols,
+            self._seeds,
+            (residual, entries),
+        )
+        by_p = ca.jtimes(balance, x, ca.vertcat(ca.DM(self.total, self._count), seeds))
+        return ca.Function("equations", [x, state, seeds], [ca.densify(by_p), stiff])
 
-    def _expanded(self, *results: ca.MX) -> tuple[ca.SX, ca.SX, Sequence[ca.SX]] | None:
-        """Functions of x and state as scalar operations, which are ten times as fast; None where these are too many."""
+    def _expanded(self, *results: ca.MX) -> Any:
+        """Functions of x, state and seeds as scalar operations, which are ten times as fast; None where these are too
+        many."""
         if self.total > EXPANDED:
             return None
         try:
@@ -154,24 +163,26 @@ class Implicit:
             # What solves linear systems.
             return None
         x, state = (ca.SX.sym(symbol.name(), symbol.shape[0]) for symbol in self._symbols)
-        return x, state, function.call([x, state])
+        return x, state, ca.SX.sym("seeds", self._data.pattern), function.call([x, state])
 
     @functools.cached_property
     def _by_all(self) -> ca.Function | None:
-        """(x, state) -> the answers, and their derivatives by x, sparse; None where :attr:`_along` is meant for it."""
+        """(x, state, seeds) -> the answers, their derivatives by the step, sparse, and by the numbers where that stays;
+        None where :attr:`_along` is meant for it."""
         found = self._expanded(self._told)
         if found is None:
             return None
-        x, state, (told,) = found
-        return ca.Function("by_all", [x, state], [told, ca.jacobian(told, x)])
+        x, state, seeds, (told,) = found
+        by_data = ca.jtimes(told, x, ca.vertcat(ca.DM(self.total, self._count), seeds))
+        return ca.Function("by_all", [x, state, seeds], [told, ca.jacobian(told, x[: self.total]), ca.densify(by_data)])
 
     @functools.cached_property
     def _along(self) -> ca.Function:
-        """(x, state, steps) -> the answers, and their derivatives in directions, one for each number."""
+        """(x, state, seeds, steps) -> the answers, and their derivatives in directions, one for each number."""
         x, state = self._symbols
         steps = ca.MX.sym("steps", self.total, self._count)
         found = ca.jtimes(self._told, x, self._directions(steps))
-        return ca.Function("along", [x, state, steps], [self._told, ca.densify(found)])
+        return ca.Function("along", [x, state, self._seeds, steps], [self._told, ca.densify(found)])
 
     @functools.cached_property
     def _by_step(self) -> ca.Function:
@@ -183,19 +194,25 @@ class Implicit:
 
     @functools.cached_property
     def _curved(self) -> ca.Function:
-        """(x, state, weights, multipliers, steps) -> second derivatives of weighted answers by the numbers."""
+        """(x, state, seeds, weights, multipliers, steps) -> second derivatives of weighted answers by the numbers.
+
+        But for what the data add that are curved themselves: by the second result, their gradient, which is returned.
+        """
         x, state = self._symbols
         weights, m = ca.MX.sym("weights", self._results.size), ca.MX.sym("multipliers", self.total)
         steps = ca.MX.sym("steps", self.total, self._count)
         lagrangian = ca.dot(weights, self._told) + ca.dot(m, self._at(self._program.forces.residual))
-        along = self._directions(steps)
-        found = ca.mtimes(along.T, ca.jtimes(ca.gradient(lagrangian, x), x, along))
-        return ca.Function("curved", [x, state, weights, m, steps], [ca.densify(found)])
+        along, gradient = self._directions(steps), ca.gradient(lagrangian, x)
+        found = ca.mtimes(along.T, ca.jtimes(gradient, x, along))
+        results = [ca.densify(found), ca.densify(gradient[self.total :])]
+        return ca.Function("curved", [x, state, self._seeds, weights, m, steps], results)
 
     # -- numbers ------------------------------------------------------------------------------------
 
-    def _x(self, p: Array) -> Array:
-        return np.concatenate([np.zeros(self.total), p])
+    def _x(self, p: Array) -> tuple[Array, Array]:
+        """Step and data, and the derivatives of these by the numbers, as :attr:`_seeds` takes them."""
+        data, seeds = self._data.at(p)
+        return np.concatenate([np.zeros(self.total), data]), seeds
 
     @single_threaded
     def slopes(self, p: Array, state: Array) -> Slopes:
@@ -206,35 +223,38 @@ class Implicit:
         SolveError
             The equilibrium is singular.
         """
-        by_p, entries = self._called("_equations", self._x(p), state)
+        x, seeds = self._x(p)
+        by_p, entries = self._called("_equations", x, state, seeds)
         right = -by_p.reshape(self._count, self.total).T
         steps = self._solved(entries, right)
         if steps is None:
-            return self._softened(p, state, entries, right)
-        return self._slopes(p, state, entries, steps)
+            return self._softened((x, seeds), state, entries, right)
+        return self._slopes((x, seeds), state, entries, steps)
 
-    def _slopes(self, p: Array, state: Array, entries: Array, steps: Array) -> Slopes:
+    def _slopes(self, at: tuple[Array, Array], state: Array, entries: Array, steps: Array) -> Slopes:
+        x, seeds = at
         if self._by_all is None:
-            answers, jacobian = self._called("_along", self._x(p), state, steps.T)
+            answers, jacobian = self._called("_along", x, state, seeds, steps.T)
             return Slopes(steps, answers, jacobian.reshape(self._count, -1).T.copy(), entries)
-        answers, values = self._called("_by_all", self._x(p), state)
-        whole = np.zeros((len(answers), self.total + self._count))
-        whole[self._filled] = values
-        return Slopes(steps, answers, whole[:, : self.total] @ steps + whole[:, self.total :], entries)
+        answers, values, by_data = self._called("_by_all", x, state, seeds)
+        by_step = np.zeros((len(answers), self.total))
+        by_step[self._filled] = values
+        return Slopes(steps, answers, by_step @ steps + by_data.reshape(self._count, -1).T, entries)
 
     @functools.cached_property
     def _filled(self) -> tuple[Array, Array]:
-        """Places of the derivatives of the answers by x."""
+        """Places of the derivatives of the answers by the step."""
         assert self._by_all is not None
         return places_of(self._by_all.sparsity_out(1))
 
     @single_threaded
     def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
         """Second derivatives (numbers, numbers) of the answers, each times its weight and added up."""
-        (right,) = self._called("_by_step", self._x(p), state, weights)
+        x, seeds = self._x(p)
+        (right,) = self._called("_by_step", x, state, weights)
         multipliers = self._transposed(slopes.entries, -right)
-        (found,) = self._called("_curved", self._x(p), state, weights, multipliers, slopes.steps.T)
-        found = found.reshape(self._count, self._count)
+        found, gradient = self._called("_curved", x, state, seeds, weights, multipliers, slopes.steps.T)
+        found = found.reshape(self._count, self._count) + self._data.curved(p, gradient)
         return 0.5 * (found + found.T)
 
     def _called(self, name: str, *given: Array) -> list[Array]:
@@ -296,13 +316,13 @@ class Implicit:
         entries[diagonal[self.total - self._rows :]] -= DUAL
         return entries
 
-    def _softened(self, p: Array, state: Array, entries: Array, right: Array) -> Slopes:
+    def _softened(self, at: tuple[Array, Array], state: Array, entries: Array, right: Array) -> Slopes:
         """Derivatives with a little softness in all neutral directions, if none of the numbers acts along these."""
         found = []
         for proximal in PROXIMAL:
             soft = self._soft(entries, proximal)
             self._straight.factor(soft)
-            found.append(self._slopes(p, state, soft, self._straight.solve(right)))
+            found.append(self._slopes(at, state, soft, self._straight.solve(right)))
         one, other = (slopes.jacobian for slopes in found)
         if not np.abs(one - other).max(initial=0.0) <= APART * np.abs(one).max(initial=0.0):
             raise SolveError(Status.SINGULAR, "a limit point, a bifurcation, or what nothing resists")
@@ -312,3 +332,49 @@ class Implicit:
         solver, order = self._across
         solver.factor(entries[order])
         return solver.solve(right)
+
+
+class _Data:
+    """What is given and what is told of the undeformed scene, as far as it depends on the numbers: the *data*.
+
+    However they depend on them, their derivatives are found by themselves, and those of the equations and answers
+    by the data.
+
+    Attributes
+    ----------
+    size, told : int
+        Of the data; of what is told of the undeformed scene.
+    pattern : Sparsity (size, numbers)
+        Of their derivatives.
+    """
+
+    def __init__(self, arguments: Arguments) -> None:
+        p = ca.MX.sym("p", len(arguments.defaults))
+        given, rest = ca.densify(arguments.given(p)), ca.densify(arguments.undeformed(p))
+        flat, self.told = ca.vertcat(given, rest), rest.numel()
+        rows = sorted(set(ca.jacobian_sparsity(flat, p).row()))
+        data = flat[rows]
+        self._rows, self.size, self._given = rows, len(rows), given.numel()
+        self._constant = ca.Function("constant", [p], [flat])(arguments.defaults)
+        derivative = ca.jacobian(data, p)
+        self.pattern = derivative.sparsity()
+        self._first = ca.Function("data", [p], [data, derivative])
+        weights = ca.MX.sym("weights", self.size)
+        self._second = ca.Function("curved", [p, weights], [ca.densify(ca.hessian(ca.dot(weights, data), p)[0])])
+
+    def whole(self, data: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """What is given, and what is told of the undeformed scene."""
+        flat = ca.MX(self._constant)
+        if self.size:
+            flat[self._rows] = data
+        given, rest = ca.vertsplit(flat, [0, self._given, self._given + self.told])
+        return given, rest
+
+    def at(self, p: Array) -> tuple[Array, Array]:
+        """The data, and the entries of their derivatives."""
+        data, derivative = self._first(p)
+        return np.array(data).ravel(), np.array(derivative.nonzeros())
+
+    def curved(self, p: Array, weights: Array) -> Array:
+        """Second derivatives (numbers, numbers) of the data, each times its weight and added up."""
+        return np.array(self._second(p, weights))
