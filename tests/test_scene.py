@@ -9,6 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from sfetcas import solve
+from sfetcas.description.answers import answer_name
 from sfetcas.description.scene import Analysis, Expect, History, Load, Member, Motion, Node, Scene
 from sfetcas.description.sections import CrossSection
 from sfetcas.description.supports import drives
@@ -730,3 +731,15 @@ def test_expected_values_keep_their_type():
     assert Expect(quantity="x", value=np.array([1.0, 2.0]), tolerance=0).value == (1.0, 2.0)
     assert Expect(quantity="x", value="neutral").value == "neutral"
     assert Motion(node="A", rotation=1).rotation == 1.0
+
+
+def test_standard_terms_are_other_names():
+    lifted = {"node": "B", "displacement": [0, 0.1, 0]}
+    held = {"nodes/B/support": "clamped", "members/beam/type": "superelement"}
+    one, other = made({**held, "prescribed": {"lift": lifted}}), made({**held, "motions": {"lift": lifted}})
+    assert one == other
+    assert one.members["beam"].type == "small"
+    assert answer_name("prescribed.lift.force.y").text == "motions.lift.force.1"
+    both = {**held, "prescribed": {"lift": lifted}, "motions": {"lift": lifted}}
+    refused(both, "found 'motions' and 'prescribed', which are the same table, accepted: one of them")
+    refused({"members/beam/type": "superelements"}, "members.beam.type: found 'superelements', accepted: ")

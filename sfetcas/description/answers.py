@@ -319,6 +319,7 @@ def selected(text: str) -> tuple[str, dict[str, float]]:
 def _named(text: str) -> AnswerName:
     """A name without selectors."""
     words = text.split(".")
+    words[0] = {"prescribed": "motions"}.get(words[0], words[0])
     kinds = [kind for kind in ANSWERS if (kind.table or kind.name) == words[0]]
     if not kinds:
         raise SceneError(unknown(words[0], dict.fromkeys(kind.table or kind.name for kind in ANSWERS)))

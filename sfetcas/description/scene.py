@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
@@ -55,7 +55,8 @@ class Scene(Record):
     dimension : plane (x-y), space, or auto: plane where everything lies in x-y
     gravity : (3,), m/s2, fixed axes
     rotating : (3,), rad/s - the axes turn with this about the origin, and the answers are in them
-    sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only
+    sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only; ``prescribed``
+        is another name of ``motions``, which prescribe displacements and rotations
     analysis : what is asked for
     expect : what is known about the answer
 
@@ -92,6 +93,16 @@ class Scene(Record):
     contacts: Named[Contact] = Field(default_factory=dict)
     analysis: Analysis = Analysis()
     expect: tuple[Expect, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _prescribed(cls, values: Any) -> Any:
+        """Prescribed displacements and rotations by their other name."""
+        if not isinstance(values, Mapping) or "prescribed" not in values:
+            return values
+        if "motions" in values:
+            raise SceneError("found 'motions' and 'prescribed', which are the same table, accepted: one of them")
+        return {("motions" if key == "prescribed" else key): table for key, table in values.items()}
 
     @model_validator(mode="after")
     def _check(self) -> Scene:

@@ -58,6 +58,10 @@ def _weld(value: Any) -> Any:
     return "rigid" if value == "weld" else value
 
 
+def _superelement(value: Any) -> Any:
+    return "small" if value == "superelement" else value
+
+
 def _welds(value: Any) -> tuple[Any, ...]:
     return tuple(_weld(entry) for entry in _ends(value))
 
@@ -165,7 +169,7 @@ class Member(Record):
     nodes : names of the nodes at its first and second end; a small member with a stiffness may have more
     section : name of the cross-section; a rigid member needs it for its mass only, a small one has it instead of
         a stiffness
-    type : flexible, rigid, or small (linear elasticity in a frame that the member carries)
+    type : flexible, rigid, or small (or superelement: linear elasticity in a frame that the member carries)
     shape : the unloaded centre line
     b2 : (3,), fixed axes - direction of the section's axis b2 at the first end; left out: b3 along z
         where the member lies in x-y
@@ -184,7 +188,7 @@ class Member(Record):
 
     nodes: Annotated[tuple[str, ...], BeforeValidator(_ends)]
     section: str | None = None
-    type: Literal["flexible", "rigid", "small"] = "flexible"
+    type: Annotated[Literal["flexible", "rigid", "small"], BeforeValidator(_superelement)] = "flexible"
     shape: Shape = Straight()
     b2: Direction | None = None
     element: Literal["SFET2", "SFET3", "SFET4", "SFET5", "SFET6", "SFET7", "SFET8", "SFET9"] | None = None
