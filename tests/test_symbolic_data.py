@@ -8,7 +8,7 @@ import pytest
 from scenes import cantilever
 from systems import EVERYTHING
 
-from sfetcas import Parameter, Scene, SceneError, assemble, first_mesh, parametric
+from sfetcas import Parameter, Scene, SceneError, assemble, first_mesh, parametric, solve
 from sfetcas.mathematics import quaternion
 from sfetcas.mathematics.active import Active
 from sfetcas.mathematics.arrays import normals, numbers, plus, scattered, unit
@@ -16,7 +16,7 @@ from sfetcas.mathematics.interpolation import evaluation, legendre_values, power
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.expressions import Expressions
 from sfetcas.parametric import arguments as module
-from sfetcas.parametric.arguments import FACTOR, Arguments, argument, asked_for, with_numbers
+from sfetcas.parametric.arguments import FACTOR, Arguments, argument, asked_for, with_cuts, with_numbers
 from sfetcas.parametric.results import Results, default_results
 from sfetcas.solvers.program import Program
 
@@ -129,9 +129,10 @@ def told(known, values):
     return [*np.split(np.array(given).ravel(), bounds[1:-1]), np.array(rest).ravel()]
 
 
-def assembled(scene, known, base, results):
+def assembled(scene, numbers, known, base, results):
     """The same of a scene with these numbers, assembled by itself; the loads at their defaults."""
-    model = assemble(scene, base.mesh, assembly=base.assembly, scales=base.scales)
+    mesh = with_cuts(base.scene, base.mesh, numbers)
+    model = assemble(scene, mesh, assembly=base.assembly, scales=base.scales)
     program = Program(Expressions(Equations(model, kernels="interpreted"), "interpreted"), known.program.sizes)
     found, first = 0.0, program.slice_of_loads.start
     for history, loading in model.groups.items():
@@ -152,14 +153,15 @@ def test_every_number_is_a_symbol_or_refused(name):
     for path in leaves(table):
         try:
             (one,) = asked_for(scene, [path])
-            known = Arguments(scene, base, [one], results.rest)
+            known = Arguments(scene, base, [one], results)
             values = known.defaults * (1.0 + random.uniform(-0.03, 0.03, len(known.defaults)))
-            other = with_numbers(scene, dict(zip(one.names, values.tolist(), strict=True)))
+            single = dict(zip(one.names, values.tolist(), strict=True))
+            other = with_numbers(scene, single)
         except SceneError:
             # What moves nothing, or cannot move alone.
             continue
         count += 1
-        for here, there in zip(told(known, values), assembled(other, known, base, results), strict=True):
+        for here, there in zip(told(known, values), assembled(other, single, known, base, results), strict=True):
             size = max(np.abs(there).max(initial=0.0), np.finfo(float).tiny)
             assert np.abs(here - there).max(initial=0.0) <= ROUNDING * size, path
     assert count > 4
@@ -181,3 +183,45 @@ def test_a_model_is_assembled_once_more(monkeypatch):
     long, stiff = solver.solve({"length": 3.0, "sections.s.EI3": 9.0}), solver.solve()
     assert long["nodes.B.position"] == pytest.approx(3.0 * stiff["nodes.B.position"], rel=1e-9)
     assert len(calls) == 1
+
+
+def loaded_within(at, **more):
+    """A cantilever with a force within it, and another one where ``more`` says."""
+    table = cantilever([0.0, 0.3])
+    table["loads"]["inner"] = {"type": "force", "member": "m", "at": at, "value": [0.5, 2.0]}
+    for name, place in more.items():
+        table["loads"][name] = {"type": "force", "member": "m", "at": place, "value": [0.1, -0.3]}
+    return Scene.from_dict(table)
+
+
+def test_a_load_moves_along_its_member():
+    solver = parametric(loaded_within(0.4, other=0.8), ["loads.inner.at"], ["nodes.B.position", "energy.elastic"])
+    answer = solver.solve({"loads.inner.at": 0.6})
+    there = solve(loaded_within(0.6, other=0.8), accuracy=1e-9).last
+    # Elements that move with the load are as fine as where they were made, at an accuracy of 1e-4 and better.
+    assert answer["nodes.B.position"] == pytest.approx(there.position("B"), abs=1e-6)
+    h = 1e-4
+    sides = [solver.solve({"loads.inner.at": 0.6 + k * h}, answer)["energy.elastic"] for k in (1, -1)]
+    # Differences of second order.
+    slope = (sides[0] - sides[1]) / (2.0 * h)
+    assert answer.jacobian["energy.elastic"]["loads.inner.at"] == pytest.approx(slope, rel=1e-6)
+    with pytest.raises(SceneError, match=r"values.loads.inner.at: found 0.9, accepted: 8e-07 to 0.799999"):
+        solver.solve({"loads.inner.at": 0.9})
+
+
+PLACES = [
+    (loaded_within(0.4, other=0.4), None, "found 0.4, where a kink, another load or an end is, accepted: a place by"),
+    (loaded_within(1.0), None, "found 1, where a kink, another load or an end is"),
+    (loaded_within(0.4), (0.2, 1.2), "found 0.2 to 1.2, accepted: a range between 0 and 1"),
+]
+
+
+@pytest.mark.parametrize(("scene", "span", "sentence"), PLACES)
+def test_loads_stay_between_what_is_beside_them(scene, span, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        parametric(scene, {"loads.inner.at": span}, ["nodes.B.position"])
+
+
+def test_where_elements_move_nothing_is_told_along_them():
+    with pytest.raises(SceneError, match=r"found members\.m\.moment, along a member on which a load moves, accepted"):
+        parametric(loaded_within(0.4), ["loads.inner.at"], ["members.m.moment"])

@@ -171,7 +171,7 @@ def time_step(
     base = assemble(scene, mesh, assembly="nodal")
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
     told = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
-    known = Arguments(scene, base, asked_for(scene, arguments), told.rest, f"{name}_")
+    known = Arguments(scene, base, asked_for(scene, arguments), told, f"{name}_")
     own = StageEquations(Equations(base), masses_of(base), "interpreted")
     system = parametric_stages(known, own.masses)
     begun, _ = simulation.begun(own)

@@ -71,7 +71,7 @@ class CaseEquations:
         base = assemble(scene, mesh, assembly=of_all)
         self.scales = base.scales
         self.results = Results(base, results, places)
-        self.arguments = Arguments(scene, base, arguments, self.results.rest, "design_")
+        self.arguments = Arguments(scene, base, arguments, self.results, "design_")
         self.program = self.arguments.program
         self.model = self.arguments.model
         self.total = self.program.expressions.total

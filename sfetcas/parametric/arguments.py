@@ -21,8 +21,10 @@ from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import picked
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
+from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import Model, assemble
 from ..solvers.program import Program, data_of, is_data
+from .results import Results
 
 __all__ = [
     "FACTOR",
@@ -34,6 +36,7 @@ __all__ = [
     "asked_for",
     "default_arguments",
     "single_numbers",
+    "with_cuts",
     "with_numbers",
 ]
 
@@ -120,7 +123,7 @@ def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
     for name, span in spans.items():
         _check_asked(name, span)
-        if re.fullmatch(r"loads\.[^.]+\.at|members\.[^.]+\.elements", name):
+        if re.fullmatch(r"members\.[^.]+\.elements", name):
             message = "found a number that changes the elements, and with them the unknowns"
             raise SceneError(f"{message}, accepted: one that leaves them as they are", ("arguments", name))
     return [
@@ -211,6 +214,8 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     if low is not None and high is not None and not low < high:
         raise SceneError(f"found {low:g} to {high:g}, accepted: a range from low to high", ("arguments", name))
     found = _argument(scene, name, low, high)
+    if re.fullmatch(r"loads\.[^.]+\.at", name):
+        found = _within(scene, found)
     outside = [x for x in found.default if not found.limits[0] <= x <= found.limits[1]]
     if outside:
         message = f"found {outside[0]:g} in the scene, accepted: a range from low to high that has it"
@@ -242,6 +247,40 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
         values = tuple(float(value[i]) for i in chosen)
         return Argument(name, values, _unit(scene, path), _meaning(path), low, high, tuple(chosen))
     return Argument(name, (float(value),), _unit(scene, path), _meaning(path), low, high)
+
+
+def _within(scene: Scene, place: Argument) -> Argument:
+    """The place of a load along its member, which stays between the kinks, loads and ends beside it.
+
+    Raises
+    ------
+    SceneError
+        Something else is there too, or a range goes further.
+    """
+    (at,), (low, here, high) = place.default, _beside(scene, place.name)
+    if not low + APART < here < high - APART:
+        message = f"found {at:g}, where a kink, another load or an end is, accepted: a place by itself"
+        raise SceneError(message, ("arguments", place.name))
+    least, most = low + APART * (high - low), high - APART * (high - low)
+    wanted = (least if place.low is None else place.low), (most if place.high is None else place.high)
+    if wanted[0] < least or wanted[1] > most:
+        message = f"found {wanted[0]:g} to {wanted[1]:g}, accepted: a range between {low:g} and {high:g}"
+        raise SceneError(f"{message}, where kinks, other loads or ends are", ("arguments", place.name))
+    return replace(place, low=wanted[0], high=wanted[1])
+
+
+def _beside(scene: Scene, name: str) -> tuple[float, float, float]:
+    """The place of a load along its member, between the kinks, other loads and ends beside it."""
+    load = scene.loads[name.split(".")[1]]
+    others = {key: one for key, one in scene.loads.items() if one is not load}
+    breaks = breaks_of(scene.model_copy(update={"loads": others}), str(load.member))
+    at = float(load.at or 0.0)
+    after = min(max(int(np.searchsorted(breaks, at + APART)), 1), len(breaks) - 1)
+    return float(breaks[after - 1]), at, float(breaks[after])
+
+
+APART = 1e-6
+"""Share of the way between what is beside a load on its member that it keeps from either: elements need a length."""
 
 
 def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
@@ -324,7 +363,7 @@ class Arguments:
         scene: Scene,
         base: Model,
         arguments: Sequence[Argument],
-        rest: Callable[[Model], Array],
+        results: Results,
         prefix: str = "",
     ) -> None:
         self.arguments, self._scene = tuple(arguments), scene
@@ -337,11 +376,12 @@ class Arguments:
         self._own = [i for i, name in enumerate(self._names) if not _is_factor(name)]
         self._symbols = ca.SX.sym("numbers", len(self._own))
         symbolic = self._assembled(base) if self._own else base
+        results.refuse_along(name for name, cuts in symbolic.mesh.cuts.items() if isinstance(cuts, Active))
         self.model = _at_values(symbolic)
         self.expressions = Expressions(Equations(self.model, kernels="interpreted"), "interpreted")
         everything = Program(self.expressions, self._every())
         self._layout, self._groups = everything.sizes, list(self.model.groups)
-        told, data = Active.of(rest(symbolic)), self._data(symbolic, everything)
+        told, data = Active.of(results.rest(symbolic)), self._data(symbolic, everything)
         self._told, self._given = (_Part(part, self._symbols, name) for part, name in ((told, "rest"), (data, "data")))
         self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
@@ -359,7 +399,7 @@ class Arguments:
         plain, symbolic = (self._followed(each.tolist()) for each in (values, Active(values, self._symbols)))
         try:
             known = depending(with_numbers(self._scene, plain), symbolic)
-            return assemble(known, base.mesh, assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
+            return assemble(known, with_cuts(self._scene, base.mesh, symbolic), assembly=assembly, scales=base.scales)  # type: ignore[arg-type]
         except SceneError as error:
             raise SceneError(f"{error} (asked for by the arguments)") from None
 
@@ -480,6 +520,21 @@ class Arguments:
         """(arguments) -> given."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
+    """The mesh with elements that go with the places of loads along their members."""
+    cuts = dict(mesh.cuts)
+    for name, place in symbolic.items():
+        if not re.fullmatch(r"loads\.[^.]+\.at", name):
+            continue
+        member = str(scene.loads[name.split(".")[1]].member)
+        if member in cuts:
+            low, at, high = _beside(scene, name)
+            inside = (mesh.cuts[member] >= low) & (mesh.cuts[member] <= high)
+            moved = np.interp(mesh.cuts[member], [low, at, high], numbers([low, place, high]))
+            cuts[member] = np.where(inside, moved, cuts[member])
+    return replace(mesh, cuts=cuts)
 
 
 NEAR = 0.01

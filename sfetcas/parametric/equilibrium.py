@@ -183,7 +183,7 @@ def equilibrium_solver(
     unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
     names = results or default_results(base, unique=unique)
     told = Results(base, names, chosen_places(members, places or {}), unique=unique)
-    known = Arguments(scene, base, asked_for(scene, arguments), told.rest, f"{name}_")
+    known = Arguments(scene, base, asked_for(scene, arguments), told, f"{name}_")
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.

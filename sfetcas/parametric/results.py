@@ -7,7 +7,7 @@ points: both as accurate as the positions.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -225,6 +225,20 @@ class Results:
         """Members whose curvature is told, or follows into what is."""
         bent = (result.asked for result in self.results if result.asked.kind.key in BY_FORCES[2:])
         return list(dict.fromkeys(name.record for name in bent))
+
+    def refuse_along(self, members: Iterable[str]) -> None:
+        """Refuse answers at places of members whose elements move, and with them where in an element a place is.
+
+        Raises
+        ------
+        SceneError
+            Names the first.
+        """
+        moving = set(members)
+        for result in self.results:
+            if result.asked.kind.along and result.asked.record in moving:
+                message = f"found {result.name}, along a member on which a load moves, accepted: answers of nodes"
+                raise SceneError(message, ("results",))
 
     def rest(self, model: Model) -> Array:
         """Undeformed positions (m) of all nodes, then of the places of all members, flat; then what curvatures need."""

@@ -87,7 +87,7 @@ class ControlledSystem:
                 accepted = ", ".join(one.names)
                 raise SceneError(f"{one.name}: found {len(one.default)} numbers, accepted: one of them, as {accepted}")
         self.results = Results(base, list(answers), chosen_places(members, places or {}), motion=True)
-        self.arguments = Arguments(self.scene, base, known, self.results.rest)
+        self.arguments = Arguments(self.scene, base, known, self.results)
         own = masses_of(base)
         self.system = parametric_stages(self.arguments, own)
         self.model, self.time = self.arguments.model, own.time
