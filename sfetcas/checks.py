@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
+from . import tolerances
 from .description.answers import answer_name
 from .description.records import say
 from .description.scene import Expect, Scene, check_scene
@@ -121,7 +122,7 @@ def _entry_on_path(path: Path, expect: Expect) -> Equilibrium:
     if expect.step is None:
         return path.last
     factor = expect.step
-    met = [step for step in path.steps if math.isclose(step.factor, factor, abs_tol=1e-12)]
+    met = [step for step in path.steps if math.isclose(step.factor, factor, abs_tol=tolerances.DECIMAL)]
     return _numbered(met, expect.crossing or 1, "crossing")
 
 

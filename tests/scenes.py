@@ -217,6 +217,23 @@ SPACE = {f.__name__: f for f in (bend_45, tripod, hinged_space, helix)}
 ZOO = {**PLANE, **SPACE}
 
 
+def three_parallel_cranks(shift, force, **analysis):
+    """Three upright cranks of 1 m under one coupler, a spring at the first; the last one leans by ``shift`` m."""
+    ground = {name: {"position": [x, 0, 0], "support": "hinge"} for x, name in enumerate("abc")}
+    coupler = {"A": [0, 1, 0], "B": [1, 1, 0], "C": [2 + shift, 1, 0]}
+    cranks = {
+        a + b: {"nodes": [a, b], "type": "rigid", "release": ["rigid", "hinge"]}
+        for a, b in zip("abc", "ABC", strict=True)
+    }
+    return {
+        "nodes": ground | {name: {"position": place} for name, place in coupler.items()},
+        "members": cranks | {name: {"nodes": list(name), "type": "rigid"} for name in ("AB", "BC")},
+        "springs": {"s": {"type": "rotational", "node": "a", "stiffness": 10.0}},
+        "loads": {"f": {"type": "force", "node": "A", "value": list(force)}},
+        "analysis": {"type": "static", **analysis},
+    }
+
+
 def made(table):
     return Scene.from_dict(copy.deepcopy(table))
 

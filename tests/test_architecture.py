@@ -22,6 +22,7 @@ ORDER = [
     "errors",
     "files",
     "processes",
+    "tolerances",
     "mathematics",
     "mathematics.arrays",
     "mathematics.active",

@@ -321,7 +321,7 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
         monkeypatch.setattr(stability_module, "DENSE_WITH_TRAVEL", 10_000)
         dense = prepared._test.negative(point)
         entries = prepared._test._weighted(point)
-        limit = stability_module.NEUTRAL + stability_module.ROUNDING * float(np.abs(entries).max())
+        limit = stability_module.NEUTRAL + stability_module.ENTRIES_BLUR * float(np.abs(entries).max())
         assert prepared._test._below_bordered(point, -limit) == dense
         counts.add(dense)
     assert max(counts) > 0

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.obstacles import members_of, nearest
 from ..description.scene import Scene
 from ..description.supports import along
@@ -29,14 +30,8 @@ from .touching import Toucher
 
 __all__ = ["ContactRun", "Pressed"]
 
-INSIDE = 1e-9
-"""How deep a place may be inside an obstacle over the size of the scene: rounding, and what curves between nodes."""
-
 WEAK = 1e-9
 """Forces of obstacles below this share of the largest force hardly touch."""
-
-PARALLEL = 1e-6
-"""Square of the sine of an angle up to which a direction lies in a plane."""
 
 STAYS = "unstable, and no stable equilibrium was found along its escape shape"
 """A note."""
@@ -94,7 +89,7 @@ class ContactRun:
         self.settler, self.reviser = self.toucher.settler, self.toucher.reviser
         self.stability = self.toucher.stability
         self.cushions = self.toucher.cushions
-        self.fine = max(INSIDE, 0.1 * accuracy)
+        self.fine = max(tolerances.CLOSED, 0.1 * accuracy)
         self.prepare = prepare
         self.last: tuple[float, Held] | None = None
         self.jumps: list[float] = []
@@ -179,7 +174,7 @@ class ContactRun:
                     found += [
                         Touch(contact, member, float(p), way=way)
                         for p, gap in zip(places, gaps, strict=True)
-                        if abs(gap) < INSIDE * self.scene.size
+                        if abs(gap) < tolerances.CLOSED * self.scene.size
                     ]
                     continue
                 gaps = stop.gaps(line.positions(x), line.tangents(x))
@@ -188,7 +183,7 @@ class ContactRun:
 
     def _lying(self, contact: str, member: str, x: Array, gaps: Array) -> Iterator[Touch]:
         """Places and stretches of the undeformed member at no distance."""
-        near = np.abs(gaps) < INSIDE * self.scene.size
+        near = np.abs(gaps) < tolerances.CLOSED * self.scene.size
         edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
         nodes = self.scene.members[member].nodes
         for a, b in zip(edges[::2], edges[1::2], strict=True):
@@ -212,7 +207,7 @@ class ContactRun:
 
         def allowed(before: State, at: Loading, after: State, loading: Loading) -> bool:
             there = held(after, loading)
-            if there.touched.inside({}, self.reviser.sides, INSIDE * self.scene.size):
+            if there.touched.inside({}, self.reviser.sides, tolerances.CLOSED * self.scene.size):
                 return False
             return not self.toucher.passing.possible(held(before, at), there, {})
 
@@ -279,7 +274,7 @@ class ContactRun:
             return
         normals = np.array([stop.normals(np.zeros((1, 3)), np.zeros((1, 3)))[0][:axes] for stop in stops.values()])
         _, sizes, ways = np.linalg.svd(free @ normals.T @ normals @ free.T)
-        for way in ways[sizes < PARALLEL]:
+        for way in ways[sizes < tolerances.PARALLEL**2]:
             direction = unit(way @ free)
             detail = f"nothing holds it along {along(direction)}, not the frictionless {', '.join(self.named(None))}"
             raise SolveError(Status.FAILED, detail)

@@ -50,7 +50,7 @@ PUSHED = 1e-3
 NEARLY = 0.9
 """Share of a push that counts as all of it."""
 
-TINY = 1e-6
+UNPRESSED = 1e-6
 """Share of the largest push that stands for none where a member lies without pressure."""
 
 NEARBY = 0.5
@@ -349,7 +349,7 @@ class Cushions:
             near = held.touched.gaps(contact, member, cuts, 0.0) < reach
             first, last = np.flatnonzero(push > 0.0)[[0, -1]] if push.any() else (0, 0)
             if near[first : last + 1].all():
-                push[first : last + 1] = np.maximum(push[first : last + 1], push.max() * TINY)
+                push[first : last + 1] = np.maximum(push[first : last + 1], push.max() * UNPRESSED)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], push > 0.0, [False]]).astype(int)))
         for number, (a, b) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
             if self.scene.members[member].type == "rigid":

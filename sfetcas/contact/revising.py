@@ -7,14 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.obstacles import members_of, obstacle, takes_part
 from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mathematics.arrays import TINY, first_of_largest
 from ..mechanics.loading import Loading
-from ..mechanics.mesh import SAME, Touch
+from ..mechanics.mesh import Touch
 from ..mechanics.model import Model
-from .settling import APART, Held, Ran, Way, moved
+from .settling import ONE_PLACE, Held, Ran, Way, moved
 from .touches import MOST_RISE, NOISE, Gap, Loose, obstacles_of
 
 __all__ = ["Reviser", "Tried"]
@@ -156,7 +157,7 @@ class Reviser:
                 place = place + np.pad(shift[model.nodes.index(node)], (0, 3 - model.element.axes))
                 tangent = np.array([[1.0, 0.0, 0.0]])
                 gap = stops[touch.contact].gaps(place[None, :], tangent, way.offsets.get(touch.contact, 0.0))[0]
-                if gap > SAME * self.scene.size:
+                if gap > tolerances.DECIMAL * self.scene.size:
                     touch = moved(touch, k, x + (0.05 if k == 0 else -0.05) * (float(touch.to or 0.0) - touch.at))
             found.append(touch)
         return tuple(found)
@@ -165,7 +166,7 @@ class Reviser:
         """What has to touch otherwise at this state, after what was ``tried``; None where all is right."""
         tried = tried or Tried()
         touched, touches = held.touched, held.mesh.touches
-        smallest = 1e-9 * held.prepared.model.scales.force
+        smallest = tolerances.BALANCED * held.prepared.model.scales.force
         pulls = [(touched.push(touch), i) for i, touch in enumerate(touches) if touch.to is None]
         if pulls and min(pulls)[0] < -smallest:
             i = min(pulls)[1]
@@ -336,7 +337,7 @@ class Reviser:
                 continue
             x = np.linspace(touch.at, touch.to, 9)
             pressed = held.touched.pressures(touch, x)
-            if pressed.min() < -1e-6 * max(np.abs(pressed).max(), held.prepared.model.scales.force):
+            if pressed.min() < -tolerances.NEGLIGIBLE * max(np.abs(pressed).max(), held.prepared.model.scales.force):
                 if pressed.max() <= 0.0:
                     # Pulled off all along it lies on the obstacle nowhere, but for what is beside it.
                     ends = (replace(touch, at=x, to=None) for x in touch.places)
@@ -381,7 +382,7 @@ class Reviser:
             return (*rest, replace(touch, at=low, to=high))
         at = gap.at
         if 0.0 < at < 1.0:
-            at = float(np.clip(at, 2.0 * APART, 1.0 - 2.0 * APART))
+            at = float(np.clip(at, 2.0 * ONE_PLACE, 1.0 - 2.0 * ONE_PLACE))
         return (*touches, Touch(gap.contact, gap.member, at, way=gap.way))
 
     @staticmethod

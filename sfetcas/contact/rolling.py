@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.mesh import Touch
 from ..mechanics.rotations import STIFF, end_joints
@@ -23,9 +24,6 @@ from ..solvers.newton import Corrected
 from .settling import Held
 
 __all__ = ["rolling"]
-
-LEVEL = 1e-6
-"""Slope of a member to the obstacle at the node up to which it lies along it."""
 
 
 def rolling(held: Held) -> Corrected:
@@ -85,5 +83,5 @@ def _smooth(held: Held, touch: Touch, node: str) -> list[Touch]:
     normal = touched.normal(touch, touch.at)
     tangents = [touched.fields.tangents(side.member, np.array([side.at]))[0] for side in sides]
     out = [(1.0 - 2.0 * side.at) * tangent for side, tangent in zip(sides, tangents, strict=True)]
-    along = np.linalg.norm(out[0] + out[1]) < LEVEL and abs(float(out[0] @ normal)) < LEVEL
+    along = np.linalg.norm(out[0] + out[1]) < tolerances.PARALLEL and abs(float(out[0] @ normal)) < tolerances.PARALLEL
     return sides if along else []

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Equations, State
@@ -24,7 +25,8 @@ from ..solvers.prepared import Prepared
 from .touches import Touched
 
 __all__ = [
-    "APART",
+    "ONE_PLACE",
+    "OPEN",
     "SETTLED",
     "Held",
     "Ran",
@@ -40,7 +42,7 @@ __all__ = [
 NEAR = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
 
-APART = 1e-7
+ONE_PLACE = 1e-7
 """Places nearer to each other, or to the end of a member, are the same: fractions of the length."""
 
 CLOSE = 1e-4
@@ -125,7 +127,7 @@ def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
             e = int(np.clip(np.searchsorted(old, x) - 1, 0, len(old) - 2))
             keep &= np.abs(old - x) > NEAR * (old[e + 1] - old[e])
         keep |= np.isin(old, breaks)
-        far = [x for x in places if np.abs(breaks - x).min() > APART]
+        far = [x for x in places if np.abs(breaks - x).min() > ONE_PLACE]
         cuts[name] = np.unique(np.concatenate([old[keep], far]))
     return replace(base, cuts=cuts, touches=touches)
 
@@ -150,7 +152,7 @@ def stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | No
                 pairs |= dict(zip(old.places, new.places, strict=True))
         before = np.array(sorted(pairs))
         after = np.array([pairs[x] for x in before])
-        if (np.diff(after) < 0.2 * APART).any():
+        if (np.diff(after) < 0.2 * ONE_PLACE).any():
             return None
         cuts[name] = np.interp(cuts[name], before, after)
     return replace(mesh, cuts=cuts, touches=touches)
@@ -166,7 +168,7 @@ def balanced(equations: Equations, state: State, loading: Loading) -> State:
     chosen = (equations.row >= n) & (equations.column < n)
     rows = np.zeros((equations.rows, n))
     rows[equations.row[chosen] - n, equations.column[chosen]] = point.entries[chosen]
-    return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=1e-12)[0])
+    return replace(state, lam=np.linalg.lstsq(rows.T, -point.residual[:n], rcond=tolerances.RANK)[0])
 
 
 def _carried(source: tuple[Model, State], loading: Loading, model: Model, state: State) -> State:
@@ -191,7 +193,7 @@ def closed(equations: Equations, state: State, loading: Loading, known: Collecti
         return state
     gaps = equations.at(state, loading).residual[n : n + rows]
     y = state.y.copy()
-    y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=1e-12)[0]
+    y[new] -= np.linalg.lstsq(positions.W.full()[:, new], gaps, rcond=tolerances.RANK)[0]
     return replace(state, y=y)
 
 
@@ -244,7 +246,7 @@ class Settler:
         if way.since is not None:
             drag = Drag(prepared.equations, transferred(*way.since, prepared.model), way.drag)
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN, drag=drag)
-        if not corrected.converged and not corrected.residual <= 1e-9:
+        if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
             return None
         return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
 
@@ -273,7 +275,7 @@ class Settler:
             near = ran is not None or _nearest(held.mesh.touches, free) is not None
             crowded = crowded + 1 if near else 0
             end = ran or end
-            if ran is not None and room < 10.0 * APART:
+            if ran is not None and room < 10.0 * ONE_PLACE:
                 return ran
             size, before = float(np.abs(step).max()), size
             if end is not None and crowded > PATIENCE and size > ARRIVING * before:
@@ -307,9 +309,9 @@ class Settler:
         mesh = stretched(self.scene, held.mesh, tuple(touches))
         source = held.prepared.model, held.corrected.state
         if mesh is None:
-            if any(min(x, 1.0 - x) < APART for i, k in free for x in [touches[i].places[k]]):
+            if any(min(x, 1.0 - x) < ONE_PLACE for i, k in free for x in [touches[i].places[k]]):
                 return None
-            if any(touch.to is not None and touch.to - touch.at < APART for touch in touches):
+            if any(touch.to is not None and touch.to - touch.at < ONE_PLACE for touch in touches):
                 return None
             mesh = placed(self.scene, replace(held.mesh, touches=()), tuple(touches))
             return self.solved(mesh, source, way)
@@ -318,8 +320,8 @@ class Settler:
     def _beside(self, touch: Touch, k: int, x: float) -> float:
         """A place, not nearer to a load or a kink of the section than its cut may be: on the side it comes from."""
         breaks = breaks_of(self.scene, touch.member)[1:-1]
-        near = breaks[np.abs(breaks - x) < 2.0 * APART]
-        return x if not len(near) else float(near[0] + np.copysign(2.0 * APART, touch.places[k] - near[0]))
+        near = breaks[np.abs(breaks - x) < 2.0 * ONE_PLACE]
+        return x if not len(near) else float(near[0] + np.copysign(2.0 * ONE_PLACE, touch.places[k] - near[0]))
 
     def slopes(self, held: Held, way: Way) -> Array | None:
         """Derivative of the conditions by the places, by differences."""
@@ -392,7 +394,7 @@ def _shortened(touches: tuple[Touch, ...], free: list[tuple[int, int]], step: Ar
         if touch.to is not None and (touch.places[1 - k] > x) == (change > 0.0):
             room, collapsed, met = abs(touch.places[1 - k] - x), True, None
         # Half of the room again and again: a double root at its end, as of a weight that hangs over.
-        if (abs(change) > 0.4 * room or room < 10.0 * APART) and room < least:
+        if (abs(change) > 0.4 * room or room < 10.0 * ONE_PLACE) and room < least:
             ran, least = Ran(touches, i, k, collapsed, met), room
         # Two places may both move towards each other.
         factor = min(factor, 0.45 * room / abs(change))

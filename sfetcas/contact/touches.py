@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.obstacles import Obstacle, members_of, nearest, obstacle, takes_part
 from ..description.scene import Scene
 from ..mathematics.arrays import Array, unit
@@ -31,7 +32,7 @@ __all__ = ["COARSE", "MOST_RISE", "NOISE", "Gap", "Loose", "Opened", "Touched", 
 COARSE = 1e-6
 """Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
 
-BESIDE = np.geomspace(1e-5, 1e-2, 10)
+BESIDE_END = np.geomspace(1e-5, 1e-2, 10)
 """Fractions of the length from an end that touches at which gaps are looked at too."""
 
 NOISE = 1e-4
@@ -242,7 +243,7 @@ class Touched:
             away = np.cross(axis, self._tangent(touch, at)) @ normal
             bends = float((1.0 - 2.0 * at) * (moment @ axis) * away)
             held = model.scene.nodes[node].support != "free"
-            if push < -1e-9 * model.scales.force or (abs(bends) > 1e-8 and not held):
+            if push < -tolerances.BALANCED * model.scales.force or (abs(bends) > 1e-8 and not held):
                 return Loose(at, *self._risen(touch, push, bends * model.scales.moment, at))
         return None
 
@@ -456,7 +457,7 @@ class Touched:
     def _beside_ends(self, contact: str, member: str, x: Array) -> Array:
         """The samples, and some close to ends that touch: what begins to lie there dips in over a short way."""
         touches = [t for t in self.model.mesh.touches if (t.contact, t.member) == (contact, member) and t.to is None]
-        close = [abs(touch.at - BESIDE) for touch in touches if touch.at in (0.0, 1.0)]
+        close = [abs(touch.at - BESIDE_END) for touch in touches if touch.at in (0.0, 1.0)]
         return np.unique(np.concatenate([x, *close]))
 
     def _wavers(self, contact: str, member: str, begin: float, end: float) -> bool:

@@ -18,6 +18,7 @@ import numpy as np
 from ..description.scene import Scene
 from ..errors import SolveError, Status
 from ..mechanics.mesh import Mesh, Touch
+from ..solvers.continuation import NARROW
 from ..solvers.prepared import Prepared
 from .contact_stability import ContactStability, can_leave
 from .cushions import Cushioned, Cushions
@@ -69,9 +70,6 @@ DEPARTS = 0.15
 
 FIRST, AFTER_JUMP = 0.25, 0.05
 """Parts of the way of the first step, and of the one after a state was left."""
-
-NARROW = 0.02
-"""The share of the way done at which a stable and an unstable state are near enough to leave between them."""
 
 
 class Toucher:

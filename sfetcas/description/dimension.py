@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mathematics.quaternion import rotate
 from .contacts import Contact
@@ -18,8 +19,6 @@ __all__ = ["out_of_plane"]
 
 Triple = tuple[float, float, float]
 Finding = tuple[tuple[str, ...], str]
-
-_ROUNDING = 1e-12
 
 
 def out_of_plane(
@@ -56,7 +55,7 @@ def _nodes(nodes: Mapping[str, Node]) -> Iterator[Finding]:
     for name, node in nodes.items():
         for key in ("position", "start"):
             point = getattr(node, key)
-            if point is not None and abs(point[2]) > _ROUNDING * size:
+            if point is not None and abs(point[2]) > tolerances.DECIMAL * size:
                 yield ("nodes", name, key), "has a z component"
         if node.velocity is not None and _leaves(node.velocity):
             yield ("nodes", name, "velocity"), "has a z component"
@@ -73,9 +72,9 @@ def _members(lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
     for name, line in lines.items():
         if line.planar:
             continue
-        if np.abs(line.tangents(x)[:, 2]).max() > _ROUNDING:
+        if np.abs(line.tangents(x)[:, 2]).max() > tolerances.DECIMAL:
             yield ("members", name, "shape"), "leaves x-y"
-        elif np.abs(line.curvatures(x)[:, 0]).max() * line.length > _ROUNDING:
+        elif np.abs(line.curvatures(x)[:, 0]).max() * line.length > tolerances.DECIMAL:
             yield ("members", name, "shape"), "twists"
         else:
             yield ("members", name, "b2"), "is neither along z nor in x-y"
@@ -141,8 +140,8 @@ def _contacts(contacts: Mapping[str, Contact]) -> Iterator[Finding]:
 
 
 def _leaves(vector: Triple | Array) -> bool:
-    return abs(vector[2]) > _ROUNDING * max(abs(vector[0]), abs(vector[1]))
+    return abs(vector[2]) > tolerances.DECIMAL * max(abs(vector[0]), abs(vector[1]))
 
 
 def _turns_out(vector: Triple) -> bool:
-    return max(abs(vector[0]), abs(vector[1])) > _ROUNDING * abs(vector[2])
+    return max(abs(vector[0]), abs(vector[1])) > tolerances.DECIMAL * abs(vector[2])

@@ -11,7 +11,9 @@ from typing import Literal
 
 from pydantic import model_validator
 
+from .. import tolerances
 from ..errors import SceneError
+from ..mathematics.arrays import TINY
 from .records import Fraction, Numbers, Record, Turn, Vector, say
 from .sections import Varying
 
@@ -147,7 +149,7 @@ class History(Record):
             terms = self._terms(i)
             size = max(size, sum(map(abs, terms)))
             rate = max(rate, sum(k * abs(c) for k, c in enumerate(terms)) / (right - left))
-        return ROUNDING * size, ROUNDING * rate
+        return tolerances.WRITTEN * size, tolerances.WRITTEN * rate
 
     def _terms(self, i: int) -> tuple[float, ...]:
         """Coefficients of the interval i in the fraction of it."""
@@ -165,14 +167,8 @@ def _derivative(terms: tuple[float, ...], span: float, x: float, k: int) -> floa
     return sum(perm(j, k) * c * x ** (j - k) for j, c in enumerate(terms) if j >= k) / max(span**k, TINY)
 
 
-TINY = 1e-300
-"""Keeps spans whose powers are no numbers of the machine from being divided by."""
-
 SMOOTH = 1e-6
 """Jumps over the largest value, of derivatives times the interval's length, up to which a history goes on smoothly."""
-
-ROUNDING = 1e-9
-"""Of the largest values: coefficients are written with ten digits or more."""
 
 
 class Load(Record):

@@ -34,7 +34,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-SAME = 1e-7
+EIGHT_DIGITS = 1e-7
 """Relative difference below which entries of a matrix are the same: files hold 8 digits and more."""
 
 LARGEST = 6000
@@ -241,7 +241,7 @@ def _check_symmetric(matrix: Floats, nodes: int, key: str) -> None:
         message = f"found {matrix.shape[0]} x {matrix.shape[1]}, accepted: {size} x {size}, 6 for each of {nodes} nodes"
         raise SceneError(message, (key,))
     gap = np.abs(matrix - matrix.T)
-    if gap.max() > SAME * np.abs(matrix).max():
+    if gap.max() > EIGHT_DIGITS * np.abs(matrix).max():
         i, j = np.unravel_index(first_of_largest(gap.ravel()), gap.shape)
         found = f"entry {i + 1}, {j + 1} is {matrix[i, j]:g} and entry {j + 1}, {i + 1} is {matrix[j, i]:g}"
         raise SceneError(f"is not symmetric: {found}", (key,))
@@ -323,7 +323,7 @@ def check_inertia(matrix: ArrayLike, rest: Floats) -> None:
 def _check_definite(scaled: Floats, key: str) -> None:
     """Refuse a matrix, rotations times a length, with a negative eigenvalue."""
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    if values[0] < -1e-7 * float(np.abs(scaled).max()):
+    if values[0] < -EIGHT_DIGITS * float(np.abs(scaled).max()):
         shape = ", ".join(f"{v + 0.0:.2g}" for v in vectors[:, 0])
         raise SceneError(f"is indefinite: eigenvalue {values[0]:.3g} of the shape [{shape}]", (key,))
 

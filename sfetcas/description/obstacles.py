@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array, unit
 from .contacts import Contact
@@ -133,7 +134,7 @@ def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle)
         return False
     guide = np.asarray(node.direction, dtype=float)
     towards = stop.normal if stop.kind == "flat" else guide @ stop.across
-    return bool(abs(guide @ towards) > PARALLEL * np.linalg.norm(guide))
+    return bool(abs(guide @ towards) > tolerances.PARALLEL * np.linalg.norm(guide))
 
 
 def swept(stop: Obstacle, before: Array, after: Array) -> bool:
@@ -149,12 +150,6 @@ def swept(stop: Obstacle, before: Array, after: Array) -> bool:
     angles = np.unwrap(np.arctan2(around[:, 1], around[:, 0]))
     return bool(abs(angles[-1] - angles[0]) > np.pi)
 
-
-PARALLEL = 1e-6
-"""Sine of the angle below which a guide leads along a plane."""
-
-ROUNDING = 1e-9
-"""Share of the scene's size by which a start may be inside an obstacle: decimal fractions in a file."""
 
 Curve = Callable[[Array], Array]
 
@@ -199,11 +194,11 @@ def check_start(obstacle: Obstacle, positions: Curve, tangents: Curve, size: flo
         assert obstacle.side is not None
         normals = obstacle.normals(positions(x), tangents(x))
         side = normals @ obstacle.side
-        if (np.abs(side) < 1e-6 * np.linalg.norm(obstacle.side)).any():
+        if (np.abs(side) < tolerances.PARALLEL * np.linalg.norm(obstacle.side)).any():
             raise SceneError("passes along the key 'side', accepted: a direction across the member")
         gaps = np.sign(side) * np.einsum("ni,ni->n", positions(x) - obstacle.place, normals)
     else:
         gaps = obstacle.gaps(positions(x), tangents(x))
     deepest = int(np.argmin(gaps))
-    if gaps[deepest] < -ROUNDING * size:
+    if gaps[deepest] < -tolerances.CLOSED * size:
         raise SceneError(f"starts inside, by {-gaps[deepest]:.3g} m at the fraction {x[deepest]:.3g} of its length")

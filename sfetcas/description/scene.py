@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.quaternion import matrix
 from .answers import answer_name, check_answer
@@ -252,7 +253,7 @@ def _check_axes(scene: Scene) -> None:
 
 def _check_axis_of_guide(name: str, node: Node) -> None:
     """A node without rotation of its own cannot turn about its guide, and members about another axis in it."""
-    if np.linalg.norm(np.cross(unit(node.axis), unit(node.turn_axis))) > SKEW:
+    if np.linalg.norm(np.cross(unit(node.axis), unit(node.turn_axis))) > tolerances.PARALLEL:
         accepted = f"along the direction of the cylindrical support, {say(node.direction)}, or a joint that is no hinge"
         raise SceneError(f"found {say(node.axis)}, accepted: {accepted}", ("nodes", name, "axis"))
 
@@ -265,7 +266,7 @@ def _check_universal(name: str, node: Node, end: bool) -> None:
         return
     if node.axis2 is None:
         raise SceneError("the key 'axis2' is missing: a universal joint has an axis on either side", ("nodes", name))
-    if abs(np.dot(unit(node.axis), unit(node.axis2))) > 1e-9:
+    if abs(np.dot(unit(node.axis), unit(node.axis2))) > tolerances.WRITTEN:
         message = f"found {say(node.axis2)}, accepted: a direction normal to the key 'axis', {say(node.axis)}"
         raise SceneError(message, ("nodes", name, "axis2"))
 
@@ -365,13 +366,9 @@ def _check_spring_axis(name: str, spring: Spring, node: Node) -> None:
     hinged = node.turn == "hinge" if parties == {"ground", spring.node} else node.joint == "hinge"
     if not hinged or spring.axis is None or ("ground" in parties and spring.node not in parties):
         return
-    if np.linalg.norm(np.cross(unit(spring.axis), unit(node.joint_axis))) > SKEW:
+    if np.linalg.norm(np.cross(unit(spring.axis), unit(node.joint_axis))) > tolerances.PARALLEL:
         accepted = f"along the axis of the hinge at node {spring.node!r}, {say(node.joint_axis)}, or left out"
         raise SceneError(f"found {say(spring.axis)}, accepted: {accepted}", ("springs", name, "axis"))
-
-
-SKEW = 1e-6
-"""Sine of the angle up to which an axis is along another one."""
 
 
 def _check_motions(scene: Scene) -> None:

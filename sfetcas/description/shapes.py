@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import first_of_largest, fixed, length_of, numbers, values_of
 from ..mathematics.curves import (
@@ -38,12 +39,8 @@ __all__ = ["Arc", "CenterLine", "Curvature", "Helix", "Shape", "Spline", "Straig
 
 Floats = NDArray[np.float64]
 
-NEAR = 1e-6
-"""What a direction (rad) or an end (in units of the length) may be off."""
-
-PLANE = 1e-12
-"""What a member in the plane may leave it by, in rad or in units of its length: rounding only."""
-
+FITS = 1e-6
+"""How far an end of a shape may be from its node, in units of its length: coordinates have seven digits and more."""
 
 # Shapes as the user says them
 
@@ -148,7 +145,7 @@ class Spline(Record):
             raise SceneError(f"found {len(self.points)}, accepted: two points or more", ("points",))
         total = sum(math.dist(a, b) for a, b in pairwise(self.points))
         for number, (a, b) in enumerate(pairwise(self.points), start=1):
-            if math.dist(a, b) <= 1e-12 * total:
+            if math.dist(a, b) <= tolerances.DECIMAL * total:
                 found = f"found points {number} and {number + 1} at {_say(b)}"
                 raise SceneError(f"{found}, accepted: each point once", ("points",))
         return self
@@ -284,9 +281,9 @@ def _curve_of(shape: Any, start: Floats, chord: Floats, b2: Floats | None) -> tu
 def _line(start: Floats, chord: Floats, length: float, curve: Curve) -> CenterLine:
     reached = length * curve.positions(np.ones(1))[0]
     gap = chord - reached
-    if _norm(gap) > NEAR * length:
+    if _norm(gap) > FITS * length:
         found = f"found its end at {_say(start + reached)}, {_norm(gap):.3g} m from the second node"
-        accepted = f"up to {NEAR:g} of its length of {length:.6g} m"
+        accepted = f"up to {FITS:g} of its length of {length:.6g} m"
         raise SceneError(f"{found} at {_say(start + chord)}, accepted: {accepted}", ("shape",))
     return CenterLine(
         start=fixed(start),
@@ -309,10 +306,10 @@ def _bending_axis(curve: Curve) -> int:
         # also holds between the samples of a helix that meet it always at the same phase
         np.abs(bending[:, :2]).max() / size,
     )
-    if level > PLANE:
+    if level > tolerances.DECIMAL:
         return 0
     out_of_plane = np.abs(frames[:, 2, 1:]).max(axis=0)
-    return 3 if out_of_plane[0] <= PLANE else 2 if out_of_plane[1] <= PLANE else 0
+    return 3 if out_of_plane[0] <= tolerances.DECIMAL else 2 if out_of_plane[1] <= tolerances.DECIMAL else 0
 
 
 # Vectors
@@ -339,11 +336,11 @@ def _frame(tangent: Floats, b2: Floats | None) -> Floats:
     """Quaternion (4,) of the frame with this tangent and b2 as :func:`place` says."""
     if b2 is None:
         b2 = numbers([-tangent[1], tangent[0], 0.0])
-        if _norm(b2) <= NEAR:
+        if _norm(b2) <= tolerances.PARALLEL:
             b2 = np.array([0.0, 1.0, 0.0])
     elif not b2.any():
         raise SceneError("found a vector of zero length, accepted: a direction across the member", ("b2",))
-    elif (angle := _norm(np.cross(tangent, _unit(b2)))) <= NEAR:
+    elif (angle := _norm(np.cross(tangent, _unit(b2)))) <= tolerances.PARALLEL:
         found = f"found {_say(b2)}, {angle:.3g} rad off the tangent at the first node {_say(tangent)}"
         raise SceneError(f"{found}, accepted: a direction across the member", ("b2",))
     for _ in range(2):  # once more, since a first projection of a nearly parallel vector loses digits
@@ -386,7 +383,7 @@ def _arc(shape: Arc, start: Floats, chord: Floats, b2: Floats | None) -> tuple[f
     distance = _chord_length(start, chord)
     normal = _unit(shape.normal)
     chord = chord - (chord @ normal) * normal
-    if _norm(chord) <= NEAR * distance:
+    if _norm(chord) <= FITS * distance:
         raise SceneError(
             "found both nodes on one line along the normal, accepted: nodes across it", ("shape", "normal")
         )
@@ -402,9 +399,9 @@ def _arc(shape: Arc, start: Floats, chord: Floats, b2: Floats | None) -> tuple[f
 
 def _check_start(start: Floats, tangent: Floats) -> None:
     angle = math.atan2(_norm(np.cross(_unit(start), tangent)), _unit(start) @ tangent)
-    if angle > NEAR:
+    if angle > tolerances.PARALLEL:
         found = f"found {_say(start)}, {angle:.3g} rad off the tangent {_say(tangent)} that angle and nodes give"
-        raise SceneError(f"{found}, accepted: up to {NEAR:g} rad, or no start", ("shape", "start"))
+        raise SceneError(f"{found}, accepted: up to {tolerances.PARALLEL:g} rad, or no start", ("shape", "start"))
 
 
 def _helix(shape: Helix, start: Floats, b2: Floats | None) -> tuple[float, Curve]:
@@ -412,9 +409,9 @@ def _helix(shape: Helix, start: Floats, b2: Floats | None) -> tuple[float, Curve
     outward = start - numbers(shape.center)
     outward = outward - (outward @ axis) * axis
     length = shape.turns * np.hypot(2.0 * math.pi * shape.radius, shape.pitch)
-    if abs(_norm(outward) - shape.radius) > min(NEAR * length, 0.5 * shape.radius):
+    if abs(_norm(outward) - shape.radius) > min(FITS * length, 0.5 * shape.radius):
         found = f"found {shape.radius:.9g}, but the first node is {_norm(outward):.9g} m from the axis"
-        raise SceneError(f"{found}, accepted: the same to {NEAR:g} of the length", ("shape", "radius"))
+        raise SceneError(f"{found}, accepted: the same to {FITS:g} of the length", ("shape", "radius"))
     round_about = 2.0 * math.pi * shape.radius * np.cross(axis, _unit(outward))
     tangent = _unit(round_about + shape.pitch * axis)
     first = _frame(tangent, -outward if b2 is None else b2)
@@ -466,9 +463,9 @@ def _spline(shape: Spline, start: Floats, b2: Floats | None) -> tuple[float, Cur
     slope, _ = derivatives(cubics, np.floor(knots[:-1]).astype(int), at)
     _check_smooth(values_of(slope), good, knots)
     length = scale * arcs.sum()
-    if (gap := _norm(points[0] - start)) > NEAR * length:
+    if (gap := _norm(points[0] - start)) > FITS * length:
         found = f"found the first point {gap:.3g} m from the first node at {_say(start)}"
-        accepted = f"up to {NEAR:g} of the length of {length:.6g} m"
+        accepted = f"up to {FITS:g} of the length of {length:.6g} m"
         raise SceneError(f"{found}, accepted: {accepted}", ("shape", "points"))
     first = _frame(_unit(cubics[0, 0]), b2)
     widths, rates, _ = sample(knots[:-1], knots[1:], cubics)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import first_of_largest
 from .loads import Motion
@@ -34,7 +35,7 @@ def drives(node: Node, displacement: Triple | None) -> bool:
     """Whether a displacement drives a slider along its guide: it has a component along it."""
     if not node.slides or node.direction is None or displacement is None or not any(displacement):
         return False
-    return bool(abs(np.dot(unit(displacement), unit(node.direction))) > 1e-12)
+    return bool(abs(np.dot(unit(displacement), unit(node.direction))) > tolerances.DECIMAL)
 
 
 def held_directions(node: Node, displacement: Triple | None = None) -> Floats:
@@ -73,7 +74,7 @@ def free_directions(held: Floats, dimension: str) -> Floats:
     if not len(held):
         return np.eye(3)[:axes]
     _, values, rows = np.linalg.svd(held[:, :axes], full_matrices=False)
-    return np.pad(rows[values < 1e-9], ((0, 0), (0, 3 - axes)))
+    return np.pad(rows[values < tolerances.PARALLEL], ((0, 0), (0, 3 - axes)))
 
 
 def check_floating(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index
 from ..mathematics.kernels import Kernels
@@ -254,7 +255,7 @@ class Assembled:
     @staticmethod
     def _refuse_false(name: str, function: ca.Function, at: Array, low: Array, high: Array, depends: Array) -> None:
         values = np.array(function(at)).ravel()
-        slack = 1e-9 * np.maximum(1.0, np.abs(values))
+        slack = tolerances.WRITTEN * np.maximum(1.0, np.abs(values))
         false = ~depends & ((values < low - slack) | (values > high + slack))
         if false.any():
             i = int(np.flatnonzero(false)[0])

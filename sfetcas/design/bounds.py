@@ -5,15 +5,13 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.statements import Free, Required
 from .formulation import Asked, Formulation
 
 __all__ = ["refuse_contradictions"]
-
-SLACK = 1e-9
-"""Share by which bounds may miss each other: rounding of decimal fractions."""
 
 
 def refuse_contradictions(formulation: Formulation) -> None:
@@ -59,7 +57,7 @@ def _take(required: Required, row: int, slope: Array, offset: float, low: Array,
     ends = np.stack([slope[used] * low[used], slope[used] * high[used]])
     least, most = offset + ends.min(axis=0).sum(), offset + ends.max(axis=0).sum()
     wanted = required.relation.low[row], required.relation.high[row]
-    slack = SLACK * max([1.0, *(abs(x) for x in (*wanted, least, most) if np.isfinite(x))])
+    slack = tolerances.WRITTEN * max([1.0, *(abs(x) for x in (*wanted, least, most) if np.isfinite(x))])
     if wanted[0] > most + slack or wanted[1] < least - slack:
         asked = f"{wanted[0]:g}" if wanted[0] == wanted[1] else f"{wanted[0]:g} to {wanted[1]:g}"
         message = f"found {asked}, accepted: {least:g} to {most:g}, which bounds and other relations leave"

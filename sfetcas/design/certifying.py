@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..equilibria.single import finished, unjudged
 from ..equilibria.solution import Equilibrium
@@ -17,14 +18,11 @@ from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
-from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.prepared import Prepared
 from .equations import CaseEquations
 from .formulation import labelled
 
 __all__ = ["Certified", "certified", "prepared_case"]
-
-MOVED = 1e-4
-"""How far Newton's method may lead from an answer of the program, rad: a thousand times its tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +62,7 @@ def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -
     factor = float(scene.analysis.steps[-1])
     loading = prepared.model.loading(factor)
     found = prepared.correct(state, loading)
-    if not found.residual <= SOLVED or prepared.distance(found.state, state) > MOVED:
+    if not found.residual <= tolerances.BALANCED or prepared.distance(found.state, state) > tolerances.SAME_STATE:
         raise SolveError(Status.FAILED, labelled(case, "what was found is no equilibrium of the scene"), state)
     stability = prepared.stability(found)
     error, notes = _error(scene, equations, prepared, unjudged(prepared, found, loading, factor))

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import tolerances
 from ..description.records import unknown as not_known
 from ..description.scene import Scene, check_scene
 from ..equilibria.solution import Equilibrium
@@ -24,9 +25,6 @@ from .formulation import Cases, Formulation
 from .solving import Iterate, Solved, Solving
 
 __all__ = ["QuasiStatic", "QuasiStaticAnswer", "QuasiStaticIterate"]
-
-SAME = 1e-4
-"""Rotations, rad, by which the equilibrium that a neighbour leads to may differ: Newton's method is at rounding."""
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
 """Steps from a point to the next where one does not lead there."""
@@ -227,7 +225,7 @@ class QuasiStatic(Cases):
             No point is there.
         """
         number = int(np.argmin(np.abs(self.s - place)))
-        if abs(self.s[number] - place) > 1e-9:
+        if abs(self.s[number] - place) > tolerances.WRITTEN:
             spacing = 1.0 / (len(self.s) - 1)
             raise SceneError(f"found {place:g}, accepted: a multiple of {spacing:g} from 0 to 1", ("at",))
         return expression[number, :].T
@@ -318,10 +316,10 @@ class QuasiStatic(Cases):
             if not found.converged:
                 return False
             state = found.state
-        return here.prepared.distance(state, here.equilibrium.state) < SAME
+        return here.prepared.distance(state, here.equilibrium.state) < tolerances.SAME_STATE
 
 
 def _arrives(state: State, here: Certified) -> bool:
     loading = here.prepared.model.loading(here.equilibrium.factor)
     found = here.prepared.correct(state, loading, most=1.0)
-    return found.converged and here.prepared.distance(found.state, here.equilibrium.state) < SAME
+    return found.converged and here.prepared.distance(found.state, here.equilibrium.state) < tolerances.SAME_STATE

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.records import counted
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
@@ -18,7 +19,7 @@ from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import NLP, Ipopt, NLPResult
 from ..mathematics.threads import single_threaded
 from ..mechanics.fields import transferred
-from ..mechanics.mesh import SAME, Mesh
+from ..mechanics.mesh import Mesh
 from ..parametric.equilibrium import asked_mesh
 from .assembled import REQUIRED, Assembled, Pair, places_asked
 from .bounds import refuse_contradictions
@@ -309,7 +310,7 @@ class Solving:
             if case.equilibrium.certificate.stable == "not defined":
                 message = "found a margin of stability, accepted: none, as its loads have no potential"
                 raise SceneError(message, ("stable", self.formulation.cases[i]))
-            if case.smallest < margin - BELOW * max(margin, 1.0):
+            if case.smallest < margin - VIOLATED * max(margin, 1.0):
                 new.append(self._pair(i, case, program, margin))
         if not new:
             return []
@@ -371,10 +372,6 @@ class Solving:
         )
 
 
-BELOW = 1e-6
-"""Share of a margin, or of the unit of eigenvalues, that one may miss: what IPOPT leaves."""
-
-
 def _unstable(cases: Sequence[Certified]) -> int:
     """How many cases are unstable."""
     return sum(case.equilibrium.certificate.stable is False for case in cases)
@@ -386,7 +383,7 @@ def _united(meshes: Sequence[Mesh]) -> Mesh:
     cuts = {}
     for name in first.cuts:
         every = np.unique(np.concatenate([mesh.cuts[name] for mesh in meshes]))
-        cuts[name] = every[np.append(True, np.diff(every) > SAME)]
+        cuts[name] = every[np.append(True, np.diff(every) > tolerances.DECIMAL)]
     return replace(first, cuts=cuts)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Analysis, Load, Motion, Node, Scene
 from ..description.sections import Polynomial, Table, evaluate
 from ..description.structure import SLIDING, released
@@ -186,14 +187,14 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
     right = np.concatenate([np.zeros(closings), wanted])
     # What cannot be met is missed as little as possible; then the least energy on what is given.
     u, sizes, axes = np.linalg.svd(both)
-    rank = int((sizes > RANK * sizes[0]).sum())
+    rank = int((sizes > tolerances.RANK * sizes[0]).sum())
     rates = axes[:rank].T @ ((u[:, :rank].T @ right) / sizes[:rank])
     rest = axes[rank:].T
     rates = rates - rest @ np.linalg.lstsq(root @ rest, root @ rates, rcond=None)[0]
     missed = rows @ rates - wanted
     largest = float(np.abs(wanted).max())
     # Of those that are missed alike the one that asks for most.
-    alike = np.flatnonzero(np.abs(missed) >= (1.0 - 1e-6) * np.abs(missed).max())
+    alike = np.flatnonzero(np.abs(missed) >= (1.0 - tolerances.ALIKE) * np.abs(missed).max())
     worst = int(alike[first_of_largest(wanted[alike])])
     share = float(np.abs(missed[worst])) / largest
     joints = float(np.abs(held @ rates).max(initial=0.0)) / largest
@@ -214,9 +215,6 @@ TURNING, MOVING = 1e-4, 1e-8
 
 What is thrown at one node only flies on without turning, what nothing is given of stays where it is.
 """
-
-RANK = 1e-12
-"""Singular values below this share of the largest are none."""
 
 CONTRADICTION = 1e-3
 """Share of the largest velocity up to which initial velocities are projected onto what joints allow."""

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import TINY, Array
 from ..mathematics.linear import SparseMap
 from ..mathematics.spectra import largest
 from ..solvers.arclength import Curve, Standing
 from ..solvers.beginning import begin_path
-from ..solvers.newton import DUAL, PROXIMAL
 from ..solvers.prepared import Prepared
 
 __all__ = ["buckling_factors"]
@@ -34,7 +34,7 @@ FAR = 1e-7
 """Inverse factors below this share of the largest, or of the largest rotation (rad) that the loads cause as they begin
 to grow, are what differencing leaves: linear theory does not reach so far."""
 
-BESIDE = 2
+BOTH_SIDES = 2
 """Times so many factors are looked for: those below zero belong to loads turned round, and come last."""
 
 
@@ -59,14 +59,14 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     equations = prepared.equations
     entries = start.point.entries.copy()
     turning = equations.turning_unknowns
-    entries[equations.diagonal[:turning]] += PROXIMAL * prepared.weight
-    entries[equations.diagonal[equations.unknowns : equations.total]] -= DUAL
+    entries[equations.diagonal[:turning]] += tolerances.PROXIMAL * prepared.weight
+    entries[equations.diagonal[equations.unknowns : equations.total]] -= tolerances.DUAL
     equations.solver.factor(entries)
 
     def apply(block: Array) -> Array:
         return np.asarray(equations.solver.solve(-(change @ block)))
 
-    inverse, _ = largest(apply, equations.total, BESIDE * count)
+    inverse, _ = largest(apply, equations.total, BOTH_SIDES * count)
     sizes = np.abs(inverse)
     turned = float(np.abs(start.tangent.z[:turning]).max(initial=0.0)) / abs(start.tangent.factor)
     told = sizes > FAR * max(turned, sizes.max(initial=0.0))

@@ -17,6 +17,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.quaternion import angular_velocity
@@ -46,10 +47,6 @@ FINER = 0.1
 
 USUAL = 100.0
 """Rates are as accurate as moves nothing by more than the tolerance in the whole time over this."""
-
-
-SAME = 1e-12
-"""Share of the whole time that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +135,7 @@ class Idas(Integrator):
 
     def _pieces(self, course: Course) -> list[_Piece]:
         """Pieces up to the end."""
-        unit, times, same = self.system.masses.time, course.times, SAME * course.end
+        unit, times, same = self.system.masses.time, course.times, tolerances.DECIMAL * course.end
         inside = {t / unit for history in self.system.histories if history is not None for t in history.t}
         knots = [0.0, *sorted(t for t in inside if same < t < course.end - same), course.end]
         found = []

@@ -9,6 +9,7 @@ from typing import Any, final
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from .integrating import Memory, Stepper, Taken, integrate
@@ -144,7 +145,7 @@ class Stages(Integrator):
             beyond=course.beyond,
         )
         for taken in steps:
-            within = taken.begin.t < course.end * (1.0 - 1e-12)
+            within = taken.begin.t < course.end * (1.0 - tolerances.DECIMAL)
             if within:
                 self._judge(taken)
             yield from self._sampler.feed(taken)

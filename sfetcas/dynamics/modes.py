@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..description.supports import check_floating
 from ..equilibria import statics
@@ -31,7 +32,7 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
 from ..solvers.newton import Corrected
-from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.prepared import Prepared
 from ..solvers.sides import Sides
 from ..solvers.stability import Stability
 from .buckling import buckling_factors
@@ -42,7 +43,6 @@ __all__ = [
     "HALVINGS",
     "MOST_ELEMENTS",
     "ORDER",
-    "STILL",
     "Mode",
     "Modes",
     "carried",
@@ -340,7 +340,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     if rest is not None:
         state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
     corrected = prepared.correct(state, loading, iterations=30)
-    if not corrected.converged and not corrected.residual <= SOLVED:
+    if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
         detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
         raise SolveError(Status.FAILED, detail, state)
     return prepared, corrected, loading
@@ -358,16 +358,12 @@ def carried(equations: Equations, state: State, loading: Loading) -> State:
     entries = point.entries.copy()
     entries[(equations.row < unknowns) & (equations.column < unknowns)] = 0.0
     entries[equations.diagonal[:unknowns]] = 1.0
-    entries[equations.diagonal[unknowns:]] = -SOFT
+    entries[equations.diagonal[unknowns:]] = -tolerances.DUAL
     symmetric = equations.model.has_potential
     solver = SparseSolver(equations.total, equations.row, equations.column, equations.rows, symmetric=symmetric)
     solver.factor(entries)
     right = np.concatenate([-point.residual[:unknowns], np.zeros(equations.rows)])
     return replace(state, lam=solver.solve(right)[unknowns:])
-
-
-SOFT = 1e-12
-"""Softness of rows that may depend on each other."""
 
 
 # -- shapes -------------------------------------------------------------------------------------------
@@ -405,15 +401,11 @@ def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:
     size = abs(exponent)
     return Mode(
         omega=exponent.imag / masses.time,
-        damping=-exponent.real / size if abs(exponent.real) > STILL * size else 0.0,
+        damping=-exponent.real / size if abs(exponent.real) > tolerances.REAL * size else 0.0,
         mass=masses.mass * scales.length**2 * kinetic / abs(unit) ** 2,
         nodes={n: {k: v / unit for k, v in e.items()} for n, e in nodes.items()},
         members={n: {"s": motion.model.along(n), "position": e["position"] / unit} for n, e in members.items()},
     )
-
-
-STILL = 1e-9
-"""Real parts below this share of an exponent are rounding."""
 
 
 def _joined(parts: list[Array]) -> Array:

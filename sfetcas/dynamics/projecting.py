@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
-from ..solvers.newton import DUAL
 
 __all__ = ["closed", "factor_closings", "of_unit_length", "shortest"]
 
@@ -21,7 +21,7 @@ def factor_closings(equations: Equations, point: Point) -> None:
     mixed = (equations.row >= n) != (equations.column >= n)
     entries = np.where(mixed, point.entries, 0.0)
     entries[equations.diagonal[:n]] = 1.0
-    entries[equations.diagonal[n:]] = -DUAL
+    entries[equations.diagonal[n:]] = -tolerances.DUAL
     equations.solver.factor(entries)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
@@ -88,7 +89,7 @@ class Sampler:
         self._steps.clear()
 
     def _up_to(self, end: float) -> Iterator[Sample]:
-        while self._next < len(self._times) and self._times[self._next] <= end * (1.0 + 1e-12):
+        while self._next < len(self._times) and self._times[self._next] <= end * (1.0 + tolerances.DECIMAL):
             yield self.at(self._times[self._next])
             self._next += 1
 

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..equilibria.meshing import WHERE, Meshing
 from ..equilibria.quantities import Quantity
@@ -103,10 +104,6 @@ class _Run:
     interrupted: bool = False
 
 
-SAME = 1e-12
-"""Share of the duration within which kinks are one: no step fits between them."""
-
-
 class Simulation:
     """A motion: its runs on finer and finer meshes."""
 
@@ -132,7 +129,7 @@ class Simulation:
         analysis = self.scene.analysis
         end = analysis.duration
         spacing = analysis.output or end / OUTPUTS
-        regular = spacing * np.arange(int(np.floor(end / spacing * (1.0 + 1e-12))) + 1)
+        regular = spacing * np.arange(int(np.floor(end / spacing * (1.0 + tolerances.DECIMAL))) + 1)
         wanted = [expect.time for expect in self.scene.expect if expect.time is not None]
         return np.unique(np.concatenate([np.minimum(regular, end), wanted, [end]]))
 
@@ -140,8 +137,8 @@ class Simulation:
         """Times at which loads or motions have a kink, and the end, dimensionless."""
         end = self.scene.analysis.duration
         found: list[float] = []
-        for t in sorted(t for t in self._kinks if SAME * end < t < end - SAME * end):
-            if not found or t - found[-1] > SAME * end:
+        for t in sorted(t for t in self._kinks if tolerances.DECIMAL * end < t < end - tolerances.DECIMAL * end):
+            if not found or t - found[-1] > tolerances.DECIMAL * end:
                 found.append(t)
         return [t / unit for t in (*found, end)]
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.constants import sparse
 from ..mathematics.linear import SparseMap, SparseSolver, places_of
@@ -59,9 +60,6 @@ ATTEMPTS = 6
 VANISHING = 1e-13
 """Inverses below this share of the largest are those of motions without mass."""
 
-SLOW = 1e-9
-"""Imaginary parts below this share of a square of a frequency are rounding."""
-
 WAVES = 1e-3
 """Share of an exponent that its imaginary part has to be: exponents crowd where damping stops all waves."""
 
@@ -77,7 +75,7 @@ OWN = 1e-5
 MOST_FREE = 40
 """Zero exponents that are looked for at most."""
 
-SAME = 1e-6
+ONE_MOTION = 1e-6
 """Shapes of zero exponents that differ by a smaller share, squared, are the same motion."""
 
 
@@ -312,9 +310,9 @@ class SmallMotion:
         parts = np.hstack([shapes.real, shapes.imag])
         kinetic = parts.T @ (self.mass @ parts)
         sizes = np.sqrt(np.maximum(np.diag(kinetic), TINY))
-        used = sizes > SAME * sizes.max(initial=0.0)
+        used = sizes > ONE_MOTION * sizes.max(initial=0.0)
         values = np.linalg.eigvalsh((kinetic / np.outer(sizes, sizes))[np.ix_(used, used)])
-        return int((values > SAME * values.max(initial=0.0)).sum())
+        return int((values > ONE_MOTION * values.max(initial=0.0)).sum())
 
     def _added(self, shapes: Array) -> Array:
         """What is added up in squares of frequencies of shapes."""
@@ -370,7 +368,7 @@ class SmallMotion:
 
 def _sorted(squares: Array, shapes: Array, rigid: Array, count: int, *, real: bool) -> Eigenmotions:
     """Eigenmotions of squares of frequencies: of what is unsymmetric these may be complex, one way growing."""
-    squares = np.where(np.abs(squares.imag) <= SLOW * np.abs(squares), squares.real, squares)
+    squares = np.where(np.abs(squares.imag) <= tolerances.REAL * np.abs(squares), squares.real, squares)
     grows = ~rigid & (squares.imag == 0.0) & (squares.real < 0.0)
     waves = np.flatnonzero(~rigid & ~grows)
     exponents = 1j * np.sqrt(squares[waves].astype(complex))

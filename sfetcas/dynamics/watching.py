@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .. import tolerances
 from ..description.task import Until
 from ..equilibria.quantities import value_of
 from ..errors import SceneError
@@ -48,7 +49,9 @@ class Watch:
 
     def up_to_end(self, instants: list[Instant], times: Array) -> list[Instant]:
         """The instants at the times of the answer, and that of the end where it was met."""
-        wanted = [instant for instant in instants if np.isclose(instant.time, times, rtol=1e-12, atol=0.0).any()]
+        wanted = [
+            instant for instant in instants if np.isclose(instant.time, times, rtol=tolerances.DECIMAL, atol=0.0).any()
+        ]
         if self._last is None:
             return wanted
         end = self._end(instants)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.fields import rotations_along
@@ -23,14 +24,8 @@ from ..solvers.prepared import Prepared
 
 __all__ = ["Mirror", "has_twin", "mirrored", "mirrors"]
 
-APART, STAYS = 1e-2, 1e-3
+OTHER_STATE, STAYS = 1e-2, 1e-3
 """Rotations, rad, by which a mirror image differs from its state, and by which it may miss what is in balance."""
-
-LEVEL = 1e-9
-"""Difference of the energies of twins, relative: a load that bends by more than this is no symmetry."""
-
-SAME = 1e-6
-"""Places of a centre line and of an image that are nearer than this, relative to the scene, are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +62,7 @@ def mirrors(model: Model) -> tuple[Mirror, ...]:
             # The identity of a straight plane scene about its own line is a mirror: only the matrix counts.
             if not in_plane or known or np.allclose(matrix, np.eye(3)):
                 continue
-            images = _images(places, middle, matrix, SAME * model.scene.size)
+            images = _images(places, middle, matrix, tolerances.ALIKE * model.scene.size)
             if images is not None:
                 found.append(Mirror(matrix, images))
     return tuple(found)
@@ -77,10 +72,10 @@ def has_twin(prepared: Prepared, found: Corrected, loading: Loading) -> bool:
     """Whether a mirror image of an equilibrium, another state, is an equilibrium of the same energy."""
     for mirror in mirrors(prepared.model):
         image = prepared.equations.holding(mirrored(prepared.model, found.state, mirror), loading)
-        if prepared.distance(image, found.state) < APART:
+        if prepared.distance(image, found.state) < OTHER_STATE:
             continue
         there = prepared.correct(image, loading)
-        level = abs(there.point.potential - found.point.potential) <= LEVEL * abs(found.point.potential)
+        level = abs(there.point.potential - found.point.potential) <= tolerances.LEVEL * abs(found.point.potential)
         if there.converged and level and prepared.distance(there.state, image) < STAYS:
             return True
     return False

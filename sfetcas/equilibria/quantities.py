@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.answers import ANSWERS, MOTION, AnswerName, answer_name, check_answer
 from ..description.records import nearest
 from ..description.scene import Scene
@@ -22,9 +23,6 @@ __all__ = ["WHERE", "Quantity", "component_in", "entry_of", "value_of"]
 
 WHERE = ("analysis", "accuracy_of")
 """Where a scene names what the accuracy is of."""
-
-SMALL = 1e-6
-"""Share of the unit of a quantity below which it is not relative to itself, but to this: it may be zero."""
 
 
 def value_of(step: Posture, name: str | AnswerName, at: float | None = None) -> Any:
@@ -156,12 +154,12 @@ class Quantity:
             "N": scales.force,
             "1/m": 1.0 / scales.length,
             "Pa": scales.force / scales.length**2,
-            "": SMALL,
+            "": tolerances.UNIT,
             "m/s": step.model.scene.size / time,
             "rad/s": 1.0 / time,
         }.get(kind.unit, scales.moment)
         loads = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
-        largest = [SMALL * own * loads, *(float(np.linalg.norm(value)) for value in values)]
+        largest = [tolerances.UNIT * own * loads, *(float(np.linalg.norm(value)) for value in values)]
         if kind.along:
             along = step.along(self.name.record, step.places(self.name.record))[kind.key]
             largest.append(float(np.linalg.norm(along.reshape(len(along), -1), axis=1).max()))

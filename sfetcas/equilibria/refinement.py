@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.records import counted
 from ..description.supports import free_to_move
 from ..errors import SceneError, SolveError, Status
@@ -18,8 +19,8 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.deflation import deflated
 from ..solvers.doctor import in_words, moves_nodes
-from ..solvers.newton import TINY, Corrected, loose_rows, named_in, relative_residual, stretched
-from ..solvers.prepared import BEYOND, SOLVED, Prepared
+from ..solvers.newton import LEAST_SCALE, Corrected, loose_rows, named_in, relative_residual, stretched
+from ..solvers.prepared import BEYOND, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
 from .meshing import Found, Meshing
@@ -62,7 +63,7 @@ TORN = 0.5
 MOST_TURNED = 1e8
 """Largest angle of an answer, rad: rounding leaves 1e-8 of it."""
 
-APART = 1.5
+TURN_LOST = 1.5
 """Rotations along a mesh that is asked for further than this, rad, from those on the pilot: a turn may be lost."""
 
 COARSE = 0.1
@@ -226,7 +227,7 @@ class Refinement:
         fine, coarse = pilot.prepared, now.prepared.model
         apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
         few, many = (counted(n, "element", "elements") for n in (self.meshes.target.elements, fine.model.mesh.elements))
-        if apart > APART:
+        if apart > TURN_LOST:
             detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}" + more_than(
                 self.meshes.target, pilot
             )
@@ -387,8 +388,8 @@ def _with_unique_reactions(found: Found, loading: Loading) -> Found:
     # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
     acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
-    needed = carried > CARRIED * acting.max(initial=TINY) and carried > np.abs(left).max(initial=0.0)
-    if residual <= SOLVED and not needed:
+    needed = carried > CARRIED * acting.max(initial=LEAST_SCALE) and carried > np.abs(left).max(initial=0.0)
+    if residual <= tolerances.BALANCED and not needed:
         corrected = replace(corrected, state=state, point=point, residual=residual)
     elif largest > BEYOND or needed:
         raise SolveError(Status.STRETCHED, stretched(equations, corrected.point, loose), corrected.state)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.records import counted
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
@@ -23,7 +24,6 @@ from ..mechanics.loading import Loading
 from ..solvers.deflation import deflated
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
-from .several import APART
 from .solution import Equilibrium
 
 __all__ = ["Scan", "scan"]
@@ -55,7 +55,7 @@ MOST_SAMPLES = 20_000
 ROOT, FLAT, ITERATIONS = 1e-9, 1e-6, 60
 """Roots and extrema are sought to these shares of the distance of two samples, in so many steps at most."""
 
-ROUNDED, APART_NUMBERS = 1e-15, 1e-15
+ROUNDED, NEIGHBOURS = 1e-15, 1e-15
 """Where the direction of the load changes along the member angles are exact to this; two numbers are one nearer by."""
 
 GRAZING = 1e-6
@@ -124,7 +124,7 @@ def scan(prepared: Prepared, loading: Loading, first: Corrected) -> Scan | None:
         there = prepared.correct(state, loading, iterations=25, most=1.0)
         if not there.converged:
             there = deflated(prepared, state, loading, ()) or there
-        new = all(prepared.distance(there.state, other.state) > APART for other in found)
+        new = all(prepared.distance(there.state, other.state) > tolerances.SAME_STATE for other in found)
         if new and there.converged and prepared.distance(there.state, state) < NEAR:
             found.append(there)
     return Scan(prepared, found, len(roots), shooting.grazing)
@@ -237,7 +237,7 @@ class _Shooting:
         f, d, _ = self.shot(x)
         rough = np.ones(len(x) - 1, dtype=bool)
         for _ in range(HALVINGS):
-            left = np.flatnonzero(rough & (np.diff(x) > APART_NUMBERS * np.maximum(np.abs(x[1:]), np.abs(x[:-1]))))
+            left = np.flatnonzero(rough & (np.diff(x) > NEIGHBOURS * np.maximum(np.abs(x[1:]), np.abs(x[:-1]))))
             if not len(left) or len(x) > MOST_SAMPLES:
                 break
             a, b = x[left], x[left + 1]

@@ -17,6 +17,7 @@ from functools import partial
 
 import numpy as np
 
+from .. import tolerances
 from ..description.records import counted
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.accuracy import largest_difference
@@ -30,13 +31,10 @@ from ..solvers.prepared import Prepared
 from .mirrors import Mirror, mirrored, mirrors
 from .solution import Equilibrium
 
-__all__ = ["APART", "Search", "long_elements", "missing", "same", "search"]
+__all__ = ["Search", "long_elements", "missing", "same", "search"]
 
 RUNS, FEWEST_RUNS, EFFORT = 300, 60, 40_000
 """Newton runs at most by default, fewer (but some) where runs times unknowns, twice in space, are more."""
-
-APART = 1e-4
-"""States that differ by more than this somewhere, rad, are different equilibria."""
 
 SHAPES = 4
 """Lowest shapes, of each equilibrium and of the undeformed scene, along which states are moved."""
@@ -55,9 +53,6 @@ KINK = 1.3
 
 LARGE = 700
 """From this many unknowns on all eigenvalues cost more than they bring: nudges along the escape shape alone."""
-
-EQUAL = 1e-8
-"""Energies that differ by less than this, relative, are those of one family."""
 
 FAMILY = "one of a continuous family of neutral equilibria with the same energy, of which no other is listed"
 
@@ -163,7 +158,10 @@ class Search:
 
     def _known(self, state: State) -> bool:
         equations = self.prepared.equations
-        return any(np.abs(turned_between(equations, state, f.state)).max(initial=0.0) <= APART for f in self.found)
+        return any(
+            np.abs(turned_between(equations, state, f.state)).max(initial=0.0) <= tolerances.SAME_STATE
+            for f in self.found
+        )
 
     def _kinked(self, state: State) -> bool:
         q = state.q[self.prepared.model.rotations.turns]
@@ -178,8 +176,12 @@ class Search:
             return False
         for i, other in enumerate(self.found):
             size = max(abs(other.point.strain), abs(other.point.potential), 1e-12)
-            near = abs(there.point.potential - other.point.potential) <= EQUAL * size
-            if near and abs(there.point.strain - other.point.strain) <= EQUAL * size and self._neutral(other):
+            near = abs(there.point.potential - other.point.potential) <= tolerances.LEVEL * size
+            if (
+                near
+                and abs(there.point.strain - other.point.strain) <= tolerances.LEVEL * size
+                and self._neutral(other)
+            ):
                 self.family.add(i)
                 return True
         return False

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
+
 __all__ = [
     "TINY",
     "Array",
@@ -32,12 +34,12 @@ TINY = 1e-300
 """Keeps zero from being divided by; no number that means anything is smaller."""
 
 
-def first_of_largest(values: Array, alike: float = 1e-6) -> int:
+def first_of_largest(values: Array, alike: float | None = None) -> int:
     """Place of the entry of largest size; of those that miss it by less than the share ``alike`` the first.
 
     Entries that a symmetry makes the same differ by rounding, which chooses nothing then.
     """
-    sizes = np.abs(values)
+    sizes, alike = np.abs(values), tolerances.ALIKE if alike is None else alike
     return int(np.argmax(sizes >= (1.0 - alike) * sizes.max()))
 
 
@@ -124,6 +126,6 @@ def normals(direction: Array) -> Array:
         return numbers([[-d[1], d[0]]])
     # From the axis that is the farthest from it, of those as far the first.
     sizes, axis = np.abs(d), np.zeros(3)
-    axis[int(np.argmax(sizes <= sizes.min() + 1e-6))] = 1.0
+    axis[int(np.argmax(sizes <= sizes.min() + tolerances.ALIKE))] = 1.0
     first = unit(np.cross(d, axis))
     return numbers([first, np.cross(d, first)])

@@ -12,6 +12,7 @@ import io
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from .arrays import TINY, Array, Index
 from .keeping import kept
 from .kernels import Batch
@@ -108,7 +109,7 @@ class SparseSolver:
         self.n, self._row, self._column = n, row, column
         self._small, self._few, self._symmetric = n <= DENSE, rows <= FEW_ROWS, symmetric
         self._rows = rows
-        self._sides = np.repeat([SOFT, -SOFT], [n - rows, rows])
+        self._sides = np.repeat([tolerances.SOFT, -tolerances.SOFT], [n - rows, rows])
 
     def factor(self, entries: Array) -> None:
         """Take a matrix; it is factorised when it is solved with (CasADi does so at each call anyway)."""
@@ -155,7 +156,7 @@ class SparseSolver:
             if not error < last:
                 break
             gained, best, last = last > 4.0 * error, x, error
-            if error <= ROUNDING or not gained:
+            if error <= NOTHING_TO_GAIN or not gained:
                 break
         return best, last
 
@@ -255,16 +256,10 @@ class _Factors:
 FEW_ROWS = 12
 """Up to this many constraints factors with pivots are as fast (measured)."""
 
-SOFT = 5e-8
-"""Softness of all unknowns, beside entries of the size of one: refinement gains about four digits a round.
-
-Its square stays above rounding: two rows on one soft displacement differ by that share of their pivots.
-"""
-
 ROUNDS = 8
 """Rounds of refinement at most; usual are three."""
 
-ROUNDING = 1e-16
+NOTHING_TO_GAIN = 1e-16
 """Residual, relative to matrix times solution, at which there is nothing left to gain."""
 
 SOLVED = 1e-13

@@ -27,7 +27,7 @@ CONVERGED = 1e-11
 SYMMETRIC = 1e-8
 """The same with an inner product in which the operator is symmetric: eigenvalues are then known to its square."""
 
-ROUNDING = 1e-14
+NOTHING_TO_GAIN = 1e-14
 """The same over the largest eigenvalue, at which there is nothing left to gain."""
 
 STALLED = 4
@@ -87,7 +87,7 @@ def largest(
         values, vectors, residuals, enough = space.pairs(pick or first)
         sizes = np.abs(values)
         shares = residuals / np.maximum(sizes, TINY)
-        good = (shares <= limit) | (residuals <= ROUNDING * sizes.max(initial=0.0))
+        good = (shares <= limit) | (residuals <= NOTHING_TO_GAIN * sizes.max(initial=0.0))
         course.append(float(shares.max(initial=0.0)))
         stalled = course[-1] <= SMALL and course[-1] > 0.5 * min(course[:-STALLED], default=np.inf)
         block = space.orthonormal(space.images[:, -block.shape[1] :])

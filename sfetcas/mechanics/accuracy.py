@@ -25,7 +25,7 @@ Their leading error vanishes at its ends and at the zeros of the Jacobi polynomi
 the middle where p is odd: each of these places is away from them for some p, and for all p one of them is.
 """
 
-ROUNDING = 1e-12
+BLUR = 1e-12
 """Differences of positions below this share of the size are rounding, which no halving makes less."""
 
 
@@ -72,7 +72,7 @@ def remaining(difference: float, gain: float) -> float:
     """
     # The order is that of small errors: of larger ones the next term is as much as the square root of them.
     gain = max(gain, np.sqrt(difference))
-    return max(difference * min(1.0, SAFETY * gain), min(difference, ROUNDING))
+    return max(difference * min(1.0, SAFETY * gain), min(difference, BLUR))
 
 
 def roughness(fields: Fields) -> Array:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import tolerances
 from ..description.matrices import rigid_motions
 from ..description.scene import Scene
 from ..description.sections import breaks
@@ -35,9 +36,6 @@ __all__ = ["BodyData", "Lever", "body_of", "lever_along", "own_axes", "quadratur
 PANELS, POINTS, PANELS_A_RADIAN = 24, 6, 4.0
 """Quadrature along a member: exact for polynomials of degree 11 a panel; so many panels where anything varies along it,
 and so many at least that none turns by more than a quarter of a radian."""
-
-RIGID = 1e-11
-"""Compliances below this share of the largest do not exist."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +186,7 @@ def _against(scene: Scene, name: str, compliance: Array) -> tuple[Array, Array]:
     own = np.arange(6) if scene.resolved_dimension == "space" else np.array([0, 1, 5])
     energies = (compliance / unit[:, None] / unit[None, :])[np.ix_(own, own)]
     values, vectors = np.linalg.eigh(values_of(energies))
-    still = numbers(vectors[:, values <= RIGID * values[-1]].T)
+    still = numbers(vectors[:, values <= tolerances.RANK * values[-1]].T)
     if line.turning == 0.0:
         # The length of what is straight, whatever rounding says.
         still = np.concatenate([line.tangents(np.array([0.0]))[0], np.zeros(3)])[None, own]

@@ -18,16 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import tolerances
 from ..description.matrices import rigid_motions
 from ..description.scene import Scene
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .bodies import BodyData, body_of, quadrature, shapes_along
 
-__all__ = ["SMALLEST", "BodyMass", "body_mass", "euler_weights"]
-
-SMALLEST = 1e-12
-"""Inertia below this share of the largest is none: rounding is four digits below it."""
+__all__ = ["BodyMass", "body_mass", "euler_weights"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +103,7 @@ def _possible(stiff: Array, rest: Array) -> Array:
     size = float(np.abs(rest).max())
     unit = np.tile([size, size, size, 1.0, 1.0, 1.0], len(rest))
     rows = stiff * unit
-    kept = np.eye(len(unit)) - np.linalg.pinv(rows, rcond=SMALLEST) @ rows
+    kept = np.eye(len(unit)) - np.linalg.pinv(rows, rcond=tolerances.RANK) @ rows
     return np.asarray(unit[:, None] * kept / unit)
 
 
@@ -116,7 +114,7 @@ def _from_matrix(matrix: Array, rest: Array, mass: float, centre: Array) -> Body
     # About the centre: moments of inertia, angular momentum of the freedoms, and the rotation that has the same.
     inertia = ends[3:] @ motions[:, 3:] - mass * across.T @ across
     momentum = ends[3:] - mass * across.T @ shift
-    turning = np.linalg.pinv(inertia, rcond=SMALLEST, hermitian=True) @ momentum
+    turning = np.linalg.pinv(inertia, rcond=tolerances.RANK, hermitian=True) @ momentum
     spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     spins = np.cross(turning[:, None, :], np.eye(3)[:, :, None], axis=0)
     shear = np.einsum("aj,bjk->abk", spread, spins)
@@ -132,7 +130,7 @@ def _strained(relative: Array, spread: Array, arms: Array) -> Array:
     another, c, the same where nodes and particles do move alike; the smaller one keeps the rest of the energy positive.
     """
     values, axes = np.linalg.eigh(spread)
-    present = np.flatnonzero(values > SMALLEST * values[-1])
+    present = np.flatnonzero(values > tolerances.RANK * values[-1])
     shear, left = np.zeros((3, 3, len(relative))), relative
     for i, j in itertools.combinations_with_replacement(present, 2):
         dyad = np.outer(axes[:, i], axes[:, j])

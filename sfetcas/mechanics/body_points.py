@@ -26,9 +26,10 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from .body_masses import SMALLEST, BodyMass
+from .body_masses import BodyMass
 from .connections import freedoms
 from .joints import Body
 from .terms import Side, Term
@@ -91,7 +92,7 @@ def points_of(name: str, body: BodyMass, space: bool, length: float) -> tuple[Bo
     values, axes = np.linalg.eigh(body.spread[:n, :n])
     # With their mass, points at these places have the spread.
     for value, axis in zip(np.sqrt(np.maximum(values, 0.0) / body.mass), axes.T, strict=True):
-        if value**2 * body.mass > SMALLEST * values[-1]:
+        if value**2 * body.mass > tolerances.RANK * values[-1]:
             at.append(value * axis)
             by.append(np.einsum("a,abk->bk", axis, shear) / (body.mass * value))
     size = float(np.abs(body.rest).max())
@@ -114,5 +115,5 @@ def _factor(matrix: Array, taken: list[Array], unit: Array) -> tuple[Array, floa
     left = (matrix - sum(b.T @ b for b in taken)) / unit[:, None] / unit
     largest = float(np.abs(matrix / unit[:, None] / unit).max())
     values, vectors = np.linalg.eigh(left)
-    kept = values > SMALLEST * largest
+    kept = values > tolerances.RANK * largest
     return (vectors[:, kept] * np.sqrt(values[kept])).T * unit, float(values[0]) / largest

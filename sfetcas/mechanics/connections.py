@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import tolerances
 from ..description.obstacles import Obstacle, obstacle, rounded, takes_part
 from ..description.scene import Scene
 from ..description.structure import SLIDING
@@ -40,7 +41,7 @@ from .joints import (
 )
 from .mesh import Cushion, Mesh, Touch
 from .parts import Parts
-from .rotations import PARALLEL, Pin, Rotations, Turn, end_joints
+from .rotations import Pin, Rotations, Turn, end_joints
 from .segments import Segments, cushioned
 from .terms import GROUND, Group, One
 
@@ -194,7 +195,7 @@ class _Maker:
                 continue
             one, two = unit(node.axis), unit(node.axis2)
             for carrier, other, along, across in ((base, pin.turn, one, two), (pin.turn, base, two, one)):
-                if np.linalg.norm(np.cross(axis, along)) < PARALLEL:
+                if np.linalg.norm(np.cross(axis, along)) < tolerances.PARALLEL:
                     return True, (carrier, other), [*(axis if carrier == first else -axis), *across]
         return False, (first, second), [*axis]
 

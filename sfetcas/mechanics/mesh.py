@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene, check_scene
 from ..description.sections import breaks as kinks
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried
 
-__all__ = ["SAME", "Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
-
-SAME = 1e-12
-"""Fractions nearer than this are the same place: rounding of a decimal fraction in a file."""
+__all__ = ["Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "uniform_mesh"]
 
 
 @dataclass(frozen=True)
@@ -153,7 +151,7 @@ def breaks_of(scene: Scene, member: str) -> Array:
             places += [] if load.at is None else [load.at]
             places += [] if load.profile is None else list(kinks(load.profile))
     places = sorted(places)
-    keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > SAME]
+    keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > tolerances.DECIMAL]
     return np.array([*keep, 1.0])
 
 
@@ -230,6 +228,6 @@ def _graded(cuts: Array, breaks: Array, layer: float) -> Array:
         places += [left + distances, right - distances]
     merged = np.unique(np.concatenate(places))
     # Cuts that nearly meet others would make slivers; breaks stay, and elements that turning needs shorter than layers.
-    least = 0.3 * min(layer, float(np.median(np.diff(cuts)))) if np.isfinite(layer) else SAME
+    least = 0.3 * min(layer, float(np.median(np.diff(cuts)))) if np.isfinite(layer) else tolerances.DECIMAL
     sliver = np.diff(merged, prepend=-1.0) < least
     return merged[~sliver | np.isin(merged, breaks)]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import tolerances
 from ..description.loads import Load
 from ..description.scene import Scene
 from ..description.sections import Table
@@ -17,9 +18,6 @@ from ..mathematics.quaternion import conjugate, rotate
 from .rotations import end_joints
 
 __all__ = ["is_pressure"]
-
-ROUNDING = 1e-12
-"""Share of a load by which it may be along the axis, or by which pressures may differ: decimal fractions."""
 
 
 def is_pressure(scene: Scene) -> bool:
@@ -40,7 +38,9 @@ def is_pressure(scene: Scene) -> bool:
             if joint == "slot" or joint == "slider":
                 return False
             left[load.history, node] = left.get((load.history, node), 0.0) + way * pressure
-    return all(abs(p) <= ROUNDING * size or scene.nodes[node].support != "free" for (_, node), p in left.items())
+    return all(
+        abs(p) <= tolerances.DECIMAL * size or scene.nodes[node].support != "free" for (_, node), p in left.items()
+    )
 
 
 def _pressure(scene: Scene, load: Load) -> float | None:
@@ -55,12 +55,12 @@ def _pressure(scene: Scene, load: Load) -> float | None:
     else:
         profile = load.profile.polynomial if not any(load.profile.polynomial[1:]) else None
     line = scene.center_lines[str(load.member)]
-    if profile is None or (load.frame == "follower" and line.turning > ROUNDING):
+    if profile is None or (load.frame == "follower" and line.turning > tolerances.DECIMAL):
         return None
     value, turned = np.asarray(load.vector), line.quaternions(np.zeros(1))
     b2, b3 = (rotate(turned, axis)[0] for axis in np.eye(3)[1:])
     along = value if load.frame == "section" else rotate(conjugate(turned), value)[0]
-    if abs(along[0]) > ROUNDING * float(np.linalg.norm(along)):
+    if abs(along[0]) > tolerances.DECIMAL * float(np.linalg.norm(along)):
         return None
     left = np.cross([0.0, 0.0, 1.0], rotate(turned, np.eye(3)[0])[0])
     return float(profile[0] * (along[1] * (b2 @ left) + along[2] * (b3 @ left)))

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Member, Node, Scene
 from ..mathematics.arrays import Array, Index, numbers, unit
 from .elements import Element
 from .mesh import Mesh
 
-__all__ = ["PARALLEL", "STIFF", "Pin", "Rotations", "Turn", "end_joints", "number_rotations"]
+__all__ = ["STIFF", "Pin", "Rotations", "Turn", "end_joints", "number_rotations"]
 
 
 class Turn(enum.IntEnum):
@@ -167,12 +168,9 @@ def _together(limits: list[tuple[Turn, tuple[float, float, float]]]) -> tuple[Tu
     axes = [unit(axis) for turn, axis in limits if turn == Turn.AXIS]
     if not axes:
         return Turn.FREE, about
-    same = all(np.linalg.norm(np.cross(axes[0], axis)) < PARALLEL for axis in axes)
+    same = all(np.linalg.norm(np.cross(axes[0], axis)) < tolerances.PARALLEL for axis in axes)
     return (Turn.AXIS, next(axis for turn, axis in limits if turn == Turn.AXIS)) if same else (Turn.HELD, about)
 
-
-PARALLEL = 1e-9
-"""Sine of the angle below which two axes of hinges are the same: rounding of directions in a file."""
 
 STIFF = ("rigid", "slider")
 """How an end is joined to its node when it turns with it."""

@@ -13,16 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, numbers
 from .joints import DrivenTurn, Turning
 from .loading import Loading
-from .rotations import PARALLEL, Turn
+from .rotations import Turn
 from .terms import GROUND, Group
 
 __all__ = ["Winding", "winding_of"]
 
-SAME = 1e-6
+MISCOUNTED = 1e-6
 """Angle, rad, by which a counted angle may miss the one that a motion prescribes: they differ by turns or not."""
 
 
@@ -142,7 +143,7 @@ class Winding:
             return f"{self.names[angle]}: its axis has swung half round, where its angle is not defined"
         for angle, group, number, sign in self.driven:
             wanted = sign * float(loading.loads[group][number, 0])
-            if abs(found[angle] - wanted) > SAME:
+            if abs(found[angle] - wanted) > MISCOUNTED:
                 stands = f"{self.names[angle]} stands at {found[angle]:g} rad"
                 return f"{stands} where its joint is driven to {wanted:g}"
         return None
@@ -185,7 +186,7 @@ def _driven(connections: tuple[Group, ...], sides: Index, axis: Array) -> list[t
             continue
         for i, (pair, about) in enumerate(zip(group.turns, group.data, strict=True)):
             for angle, (own, line) in enumerate(zip(sides, axis, strict=False)):
-                if set(own) != set(pair) or np.linalg.norm(np.cross(line, about)) > PARALLEL:
+                if set(own) != set(pair) or np.linalg.norm(np.cross(line, about)) > tolerances.PARALLEL:
                     continue
                 sign = float(np.sign(line @ about)) * (1.0 if own[0] == pair[0] else -1.0)
                 found.append((angle, number, i, sign))

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import tolerances
 from ..description import records
 from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
@@ -156,16 +157,12 @@ def _own(scene: Scene, name: str, given: Parameter) -> Argument:
         raise SceneError(message, ("arguments", name))
     for number, value in single_numbers(scene, given.numbers(given.value)).items():
         (stands,) = argument(scene, number).default
-        if abs(value - stands) > SAME * max(abs(value), abs(stands)):
+        if abs(value - stands) > tolerances.WRITTEN * max(abs(value), abs(stands)):
             found = f"{number} is {stands:g} in the scene, but {value:g} where the parameter is {given.value:g}"
             accepted = "both the same: change that number of the scene, or the value of the parameter"
             raise SceneError(f"{found}, accepted: {accepted}", ("arguments", name))
     unit, meaning = given.unit or "as its numbers", given.meaning
     return Argument(name, (float(given.value),), unit, meaning, given.low, given.high, None, given.numbers)
-
-
-SAME = 1e-9
-"""Share by which numbers of a parameter may differ from those of the scene."""
 
 
 def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, float]:

@@ -204,10 +204,10 @@ def _same(solver: EquilibriumSolver) -> bool:
     if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
         return False
     found, wanted = (solver.arguments.program.state(flat) for flat in (outcome.state, _answered(solver)))
-    return Prepared(solver.model).distance(found, wanted) < APART
+    return Prepared(solver.model).distance(found, wanted) < ELSEWHERE
 
 
-APART = 0.05
+ELSEWHERE = 0.05
 """Rotations that differ by more, rad, are those of another equilibrium: meshes differ by less."""
 
 NOT_UNIQUE = "reactions are not unique"

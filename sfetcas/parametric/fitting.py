@@ -22,7 +22,7 @@ from ..description.answers import AnswerName, answer_name
 from ..description.scene import Scene, check_scene
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from .arguments import Asked, argument
 from .solving import ParametricAnswer, ParametricEquilibrium, Values, parametric
 
@@ -356,9 +356,6 @@ SHORT = 1e-8
 
 MOST = 100
 """Steps of a search."""
-
-TINY = 1e-300
-"""Lower limits below this say no more than that a number is above zero."""
 
 UNDETERMINED = 1e-7
 """Share of the largest singular value, of parameters over their size, below which a direction is not determined."""

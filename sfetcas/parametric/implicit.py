@@ -21,6 +21,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.kernels import Batch
@@ -31,6 +32,9 @@ from .results import Results
 
 __all__ = ["Implicit", "Slopes"]
 
+FIRMER = 1000.0
+"""Times the weight for a second attempt: where numbers act along a neutral direction both differ."""
+
 SINGULAR = 1e-5
 """Eigenvalues of the weighted matrix, usually of the size of one, below which an equilibrium may be singular.
 
@@ -38,16 +42,10 @@ Rounding of 1e-13 in the equations leaves that over the eigenvalue in the state,
 derivatives no more than three digits are left.
 """
 
-PROXIMAL = (1e-10, 1e-7)
-"""Weights on the diagonal that make neutral directions harmless: where numbers act along one both differ."""
-
-DUAL = 1e-12
-"""Softness of closings that depend on each other."""
-
 EXPANDED = 1000
 """Up to this many unknowns functions are expanded to scalar operations: with more that takes longer than it gains."""
 
-APART = 1e-3
+DISAGREE = 1e-3
 """Share by which the derivatives of both may differ."""
 
 
@@ -313,18 +311,18 @@ class Implicit:
         row, column = self._places
         diagonal = np.flatnonzero(row == column)
         entries[diagonal] += proximal * self._weight
-        entries[diagonal[self.total - self._rows :]] -= DUAL
+        entries[diagonal[self.total - self._rows :]] -= tolerances.DUAL
         return entries
 
     def _softened(self, at: tuple[Array, Array], state: Array, entries: Array, right: Array) -> Slopes:
         """Derivatives with a little softness in all neutral directions, if none of the numbers acts along these."""
         found = []
-        for proximal in PROXIMAL:
+        for proximal in (tolerances.PROXIMAL, FIRMER * tolerances.PROXIMAL):
             soft = self._soft(entries, proximal)
             self._straight.factor(soft)
             found.append(self._slopes(at, state, soft, self._straight.solve(right)))
         one, other = (slopes.jacobian for slopes in found)
-        if not np.abs(one - other).max(initial=0.0) <= APART * np.abs(one).max(initial=0.0):
+        if not np.abs(one - other).max(initial=0.0) <= DISAGREE * np.abs(one).max(initial=0.0):
             raise SolveError(Status.SINGULAR, "a limit point, a bifurcation, or what nothing resists")
         return found[0]
 

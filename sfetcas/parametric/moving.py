@@ -7,6 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..dynamics.simulation import Simulation
 from ..dynamics.stages import StageEquations
@@ -80,4 +81,4 @@ def _same(one: Masses, other: Masses) -> bool:
     pairs += [(one.places.value, other.places.value)]
     pairs += [(a.mass, b.mass) for a, b in zip(one.observables, other.observables, strict=True)]
     pairs += [(a.damping, b.damping) for a, b in zip(one.observables, other.observables, strict=True)]
-    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=0.0) for a, b in pairs)
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=tolerances.DECIMAL, atol=0.0) for a, b in pairs)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact.settling import SETTLED, Held, free_places, moved, stretched
+from ..contact.settling import OPEN, SETTLED, Held, free_places, moved, stretched
 from ..contact.touches import Touched
 from ..description.scene import Scene
 from ..mathematics.arrays import Array
@@ -35,9 +35,6 @@ NUDGE = 1e-6
 
 AHEAD = 1e-4
 """Way along the curve with places held over which conditions are differenced: second order, so 1e-8."""
-
-SINGULAR = 1e-9
-"""Ratio of singular values of the derivative of the conditions from which on they leave a place open."""
 
 FLAT = 1e-8
 """Share of the larger rate of the factor at both sides of a limit point that is rounding of differences."""
@@ -118,7 +115,7 @@ class ContactCurve:
             return None
         turns = [part[0] for part in beside if part is not None]
         own = np.column_stack([part[1] for part in beside if part is not None]) if free else np.zeros((0, 0))
-        if free and np.linalg.cond(own) > 1.0 / SINGULAR:
+        if free and np.linalg.cond(own) > 1.0 / OPEN:
             return None
         sliding = -np.linalg.solve(own, ahead) if free else np.zeros(0)
         whole = Tangent(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import tolerances
 from ..contact.contact_balance import refuse_lost_forces, refuse_unbalanced
 from ..contact.contact_statics import ContactRun
 from ..contact.touches import COARSE
@@ -28,7 +29,7 @@ from .contact_curve import Stood
 from .contact_trace import Trace, Tracer
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
 
-__all__ = ["follow_in_contact"]
+__all__ = ["MARGIN", "STEADY", "follow_in_contact"]
 
 LEVELS, MOST_ELEMENTS = 6, 1000
 """Most halvings of the first mesh, and elements of the finest."""
@@ -142,7 +143,7 @@ class ContactPath:
             if len(ours) != len(theirs):
                 errors[kind, -1] = np.inf
             for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
-                factor = abs(one.factor - other.factor) / max(abs(other.factor), 1e-6 * widest)
+                factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * widest)
                 apart = largest_difference(one.held.touched.fields, other.held.touched.fields)
                 errors[kind, j] = max(apart, factor)
         return errors

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..contact.contact_statics import ContactRun
 from ..contact.settling import Held, Ran, free_places, moved, placed
 from ..equilibria.solution import Equilibrium
@@ -21,6 +22,7 @@ from ..mechanics.mesh import Mesh, Touch
 from ..mechanics.model import Model
 from ..solvers.arclength import Tangent
 from ..solvers.critical import root
+from ..solvers.tracing import FAR
 from .contact_curve import ContactCurve, Stood
 
 __all__ = ["Trace", "Tracer"]
@@ -33,9 +35,6 @@ SHARE = 30
 
 TURNING, SHARPEST = 0.25, 0.6
 """Angle between the tangents of neighbouring points that steps aim at, and the largest one, rad."""
-
-FAR = 0.5
-"""A point farther from the expected one than this share of the step is not on the same curve."""
 
 EVENT = 1e-3
 """So near to a change of what touches the state beyond it is looked for: rad, or shares of the unit."""
@@ -130,7 +129,7 @@ class Tracer:
         """The factor that would turn the structure by a radian were it linear, if that is in the range."""
         share = (stood.tangent.factor / self.curve.unit) ** 2
         if share < 0.5:
-            least = 1e-6 * self.curve.unit
+            least = tolerances.UNIT * self.curve.unit
             self.curve.unit = max(abs(stood.tangent.factor) / np.sqrt(1.0 - share), least)
 
     def _looking(self, held: Held, factor: float, sign: float, arc: float) -> Stood | None:

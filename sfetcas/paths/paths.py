@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..equilibria.solution import Equilibrium, equilibrium
 from ..equilibria.statics import Settings, pilot_of
@@ -27,9 +28,9 @@ from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, check_slack
 from ..solvers.critical import Event, at_factors, shapes_at
 from ..solvers.newton import Corrected, relative_residual, with_sharing
-from ..solvers.prepared import SOLVED, Prepared
+from ..solvers.prepared import Prepared
 from ..solvers.tracing import Traced, passes, switched, trace, without
-from .contact_path import follow_in_contact
+from .contact_path import MARGIN, STEADY, follow_in_contact
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
 from .vibrations import shaken, with_modes
 
@@ -37,9 +38,6 @@ __all__ = ["follow_path", "switch"]
 
 LEVELS = 10
 """Most halvings of the first mesh."""
-
-MARGIN = 16.0
-"""A halving gains this many times less than its order promises, as far as estimates go."""
 
 HOPED = 4.0
 """Times more than that is hoped for when meshes are skipped."""
@@ -61,9 +59,6 @@ SAMPLES = 8
 
 EVALUATIONS = 500.0
 """About as often the equations are evaluated along a path."""
-
-STEADY = 0.3
-"""Share of the factor in the tangent from which on a point may be compared at its factor."""
 
 LEAST_WAY = 1e-3
 """A path that ends before this share of its range is none."""
@@ -326,7 +321,7 @@ class _Run:
                 if len(ours) != len(theirs):
                     errors[i, kind, -1] = np.inf
                 for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
-                    factor = abs(one.factor - other.factor) / max(abs(other.factor), 1e-6 * self._widest)
+                    factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * self._widest)
                     errors[i, kind, j] = max(_apart(coarse.curve, one, fine.curve, other), factor)
             errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
         return errors
@@ -402,7 +397,9 @@ class _Run:
 
     def _entry(self, curve: Curve, at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
         prepared = curve.prepared
-        state, point = with_sharing(curve.equations, at.state, at.loading, at.point, SOLVED, reactions=True)
+        state, point = with_sharing(
+            curve.equations, at.state, at.loading, at.point, tolerances.BALANCED, reactions=True
+        )
         residual = relative_residual(curve.equations, point)
         stability = prepared.stability(Corrected(state, point, True, at.iterations, 0.0, 0.0, residual))
         finite = error if error is not None and np.isfinite(error) else None

@@ -19,18 +19,19 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
-from ..dynamics.modes import HALVINGS, MOST_ELEMENTS, ORDER, STILL, carried, prepared_for_motion
+from ..dynamics.modes import HALVINGS, MOST_ELEMENTS, ORDER, carried, prepared_for_motion
 from ..dynamics.small_motion import SmallMotion
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.fields import transferred
-from ..mechanics.mesh import SAME, Mesh, breaks_of
+from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
-from ..solvers.critical import sought
+from ..solvers.critical import ONE_EVENT, sought
 from ..solvers.deflation import turned_between
 from ..solvers.newton import Corrected, relative_residual
 from ..solvers.prepared import Prepared
@@ -53,9 +54,6 @@ BEYOND, MET = 1e-6, 1e-3
 It grows in proportion to the way, and over the whole of that becomes about one.  Two that come among the lowest from
 above have their difference at once.
 """
-
-APART = 1e-6
-"""Flutter points within this share of the way between two points of the path are one."""
 
 TRIES = 3
 """Times at most that more motions are looked for, until all that grow are among them."""
@@ -118,7 +116,7 @@ def shaken(path: Path, branch: Branch) -> Branch:
 
 def _halves(scene: Scene, member: str, cuts: Array) -> Array:
     """Every other cut, and those where something has to be."""
-    kept = np.abs(cuts[:, None] - np.array(breaks_of(scene, member))).min(axis=1) < SAME
+    kept = np.abs(cuts[:, None] - np.array(breaks_of(scene, member))).min(axis=1) < tolerances.DECIMAL
     kept[::2] = True
     return cuts[kept]
 
@@ -223,7 +221,7 @@ class _Level:
         a, b = self.place(branch, number), self.place(branch, number + 1)
         before, after = self.growing(a.exponents), self.growing(b.exponents)
         met = [point for rank in range(before, after) if (point := self._met(a, b, rank, after)) is not None]
-        apart, found = APART * (b.standing.arc - a.standing.arc), list[_Flutter]()
+        apart, found = ONE_EVENT * (b.standing.arc - a.standing.arc), list[_Flutter]()
         for point in sorted(met, key=lambda point: point.standing.arc):
             if found and point.standing.arc - found[-1].standing.arc <= apart:
                 found[-1] = replace(found[-1], multiplicity=found[-1].multiplicity + 1)
@@ -234,7 +232,7 @@ class _Level:
     def growing(self, exponents: Array) -> int:
         """Number of motions that grow while they oscillate."""
         sizes = np.abs(exponents)
-        share = STILL if self.damped else COMPLEX
+        share = tolerances.REAL if self.damped else COMPLEX
         return int(((exponents.real > share * sizes) & (exponents.imag > COMPLEX * sizes)).sum())
 
     def _met(self, a: _Place, b: _Place, rank: int, after: int) -> _Flutter | None:
@@ -303,7 +301,7 @@ class _Level:
 
     def _point(self, point: PathPoint, place: _Place) -> PathPoint:
         exponents = place.exponents[: self.count]
-        growth = np.where(np.abs(exponents.real) > STILL * np.abs(exponents), exponents.real, 0.0)
+        growth = np.where(np.abs(exponents.real) > tolerances.REAL * np.abs(exponents), exponents.real, 0.0)
         return replace(point, omega=exponents.imag / self.time, growth=growth / self.time)
 
     def _entry(self, point: _Flutter, error: float | None) -> FlutterPoint:

@@ -35,7 +35,7 @@ MARKS = {"limit point": "o", "bifurcation": "s"}
 LOADED = 5.0
 """A loaded node is told of unless another one moves by more than this many times as far."""
 
-SHAPES, ALIKE = 6, 2e-3
+SHAPES, OVER_EACH_OTHER = 6, 2e-3
 """Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
 SAMPLES = np.linspace(0.0, 1.0, 61)
 SHADES = ("#0B1F4B", "#134B86", "#2A7AB8", "#5DA5D6", "#9CC7E8")
@@ -202,7 +202,7 @@ def _shapes(path: Path) -> list[_Shape]:
         point = path.branches[branch].points[index]
         line = np.vstack([path.fields(point).along(name, SAMPLES)["position"] for name in path.model.members])
         size = float(np.ptp(np.vstack([*seen, line]), axis=0).max())
-        if min(float(np.abs(line - other).max()) for other in seen) > ALIKE * size:
+        if min(float(np.abs(line - other).max()) for other in seen) > OVER_EACH_OTHER * size:
             seen.append(line)
             colour = SHADES[round(index * len(SHADES) / (count - 1)) - 1] if branch == 0 else _colour(branch)
             state = "" if point.stable is True else f", {dict(KINDS)[point.stable]}"

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.loads import Load, Motion
 from ..description.obstacles import obstacle
 from ..description.sections import evaluate
@@ -348,9 +349,9 @@ def _sketch_reaction(sketch: Sketch, name: str, largest: float) -> None:
     moments = [largest * arm, norm(moment), *(float(np.abs(values).max()) for values in sketch.course.values)]
     ink = Ink(f"reaction-{name}", REACTION, 1.1)
     rounding = 1e-11 * sketch.step.model.scales.force
-    if norm(force) > max(1e-6 * max(largest, max(moments) / arm), rounding):
+    if norm(force) > max(tolerances.NEGLIGIBLE * max(largest, max(moments) / arm), rounding):
         _sketch_force(sketch, point, force, largest, ink, pushing=True)
-    if norm(moment) > max(1e-6 * max(moments), rounding * arm):
+    if norm(moment) > max(tolerances.NEGLIGIBLE * max(moments), rounding * arm):
         _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
 
 
@@ -361,7 +362,7 @@ def _sketch_pushes(sketch: Sketch, name: str, largest: float) -> None:
     for member, at, force in zip(
         *([entry[k]] if not several else entry[k] for k in ("member", "at", "force")), strict=True
     ):
-        if at is not None and norm(force) > 1e-6 * largest:
+        if at is not None and norm(force) > tolerances.NEGLIGIBLE * largest:
             point = sketch.along(member, np.array([np.mean(at)]))[0]
             _sketch_force(sketch, point, force, largest, Ink(f"push-{name}", REACTION, 1.1), pushing=True)
 

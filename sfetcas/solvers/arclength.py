@@ -17,21 +17,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Point, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from .deflation import turned_between
 from .neutral import Neutral
-from .newton import DUAL, PROXIMAL, ROUNDING, loose_rows, met, redundant, relative_residual, rounded, with_sharing
+from .newton import loose_rows, met, redundant, relative_residual, rounded, with_sharing
 from .prepared import Prepared
 from .sharing import shared
 from .stability import LIGHT, NEUTRAL, Inertia
 
 __all__ = ["PASSING", "Curve", "Standing", "Tangent"]
-
-TOLERANCE = 1e-12
-"""Relative residual that counts as converged; one more iteration is made while it gains."""
 
 PASSING = 1e-10
 """The same for points in passing, which nobody asked for by name."""
@@ -131,7 +129,7 @@ class Curve:
         lengths = sum(line.length for line in prepared.model.scene.center_lines.values())
         self.weight[:turning] = equations.mass * prepared.model.scales.length / lengths
         self.weight[equations.elastic_displacements] = LIGHT
-        self._turning, self._proximal = turning, PROXIMAL * prepared.weight
+        self._turning, self._proximal = turning, tolerances.PROXIMAL * prepared.weight
         self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
         self._driven = any(np.any(group.turn) for group in self.model.groups.values())
         self._linear = set(self.model.groups) == {None}
@@ -233,7 +231,7 @@ class Curve:
         """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
         entries = point.entries.copy()
         entries[self._diagonal[0]] += firm * self._proximal
-        entries[self._diagonal[1]] -= DUAL
+        entries[self._diagonal[1]] -= tolerances.DUAL
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
@@ -309,7 +307,7 @@ class Curve:
         point = _balanced(met(equations, equations.at(state, loading)), neutral)
         residual, last, turned = relative_residual(equations, point), np.inf, 0.0
         for count in range(ITERATIONS):
-            if count and (residual <= ROUNDING if sharp else self._passes(point, residual)):
+            if count and (residual <= tolerances.EXACT if sharp else self._passes(point, residual)):
                 break
             try:
                 rights = [-point.residual, -self.slope(state, factor, point)]
@@ -328,7 +326,7 @@ class Curve:
             if (
                 not np.isfinite(length + change)
                 or turned > TURN
-                or (count and residual > 1e-9 and length > max(last, SHORT))
+                or (count and residual > tolerances.BALANCED and length > max(last, SHORT))
             ):
                 return None
             last = length
@@ -337,24 +335,24 @@ class Curve:
             there = _balanced(met(equations, equations.at(trial, loading)), neutral)
             gained = relative_residual(equations, there)
             still = count and gained > 0.25 * residual
-            if still and (residual <= TOLERANCE or rounded(equations, state, point)):
+            if still and (residual <= tolerances.CONVERGED or rounded(equations, state, point)):
                 break
             state, factor, point, residual = trial, factor + change, there, gained
             if not np.isfinite(residual):
                 return None
-        good = residual <= TOLERANCE or (not sharp and self._passes(point, residual))
+        good = residual <= tolerances.CONVERGED or (not sharp and self._passes(point, residual))
         if not good and not rounded(equations, state, point):
             return None
         loading = self.loading(factor)
         point = equations.at(state, loading) if equations.redundant or neutral is not None else point
-        state, point = with_sharing(equations, state, loading, point, max(residual, TOLERANCE))
+        state, point = with_sharing(equations, state, loading, point, max(residual, tolerances.CONVERGED))
         tangent, doubtful = self.tangent(state, factor, point, across)
         return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
 
     def _passes(self, point: Point, residual: float) -> bool:
         """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
         gaps = float(np.abs(point.residual[self.equations.unknowns :]).max(initial=0.0))
-        return residual <= PASSING and gaps <= TOLERANCE
+        return residual <= PASSING and gaps <= tolerances.CONVERGED
 
     def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
         """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import tolerances
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
@@ -46,7 +47,7 @@ def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, St
     share = (tangent.factor / widest) ** 2
     # The unit is the factor that would turn the structure by a radian were it linear, if that is in the range.
     if share < 0.5:
-        curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), 1e-6 * widest)
+        curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), tolerances.UNIT * widest)
     start = curve.standing(state, factor, along)
     loose = loose_rows(curve.equations, start.point)
     if loose.size:

@@ -20,7 +20,7 @@ from ..mechanics.model import Model
 from .newton import Corrected
 from .prepared import Prepared
 
-__all__ = ["JUMPED", "Followed", "between", "follow", "near_factor"]
+__all__ = ["JUMPED", "NARROW", "Followed", "between", "follow", "near_factor"]
 
 STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
@@ -31,7 +31,7 @@ CONTRACTION = 0.35
 SHORTEST = 1e-4
 """Steps below this share of the way done end the search on this branch."""
 
-TINY = 1e-12
+LEAST_STEP = 1e-12
 """The first step is never below this part of the way."""
 
 HALF_TURN, LINEAR = np.pi, 1e-3
@@ -149,13 +149,13 @@ def follow(
             if done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far:
                 # No step moves the state any more, and something is out of balance, in a short step as in a long one.
                 break
-            if step > max(SHORTEST * done, TINY):
+            if step > max(SHORTEST * done, LEAST_STEP):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
                 continue
             # What is no equilibrium has no escape shape, whatever a first step balances to rounding.
             if not leave or not now.converged:
                 break
-            trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + TINY)
+            trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
             snapped = _left(prepared, now, way(trial))
             if snapped is None or not free(snapped.state, trial):
                 break

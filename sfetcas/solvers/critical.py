@@ -18,7 +18,7 @@ from .arclength import Curve, Standing, Tangent
 from .sides import Sides
 from .stability import NEUTRAL
 
-__all__ = ["FIRM", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
+__all__ = ["FIRM", "ONE_EVENT", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
 SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
@@ -35,7 +35,7 @@ BLURRED = 100.0
 That is what counts as neutral.
 """
 
-APART = 1e-6
+ONE_EVENT = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
 
 CLOSE = 0.1
@@ -50,7 +50,7 @@ FIRM = 1e6
 NEAR = 0.02
 """An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
 
-BESIDE = 1e-3
+AROUND_LIMIT = 1e-3
 """Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
 
 
@@ -83,8 +83,8 @@ def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     if abs(b.inertia.negative - a.inertia.negative) == 1:
         return [Event("limit", limit)]
     at, arc, place = curve.between(a, b), b.arc - a.arc, limit.arc - a.arc
-    left = at(place - min(BESIDE * arc, 0.5 * place)) or a
-    right = at(place + min(BESIDE * arc, 0.5 * (arc - place))) or b
+    left = at(place - min(AROUND_LIMIT * arc, 0.5 * place)) or a
+    right = at(place + min(AROUND_LIMIT * arc, 0.5 * (arc - place))) or b
     return [*_bifurcations(curve, a, left), Event("limit", limit), *_bifurcations(curve, right, b)]
 
 
@@ -98,7 +98,7 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
         # Of two that vanish together rounding leaves the same root twice, by a search to the last digit.
-        together = max(APART * abs(value(b) - value(a)), NEUTRAL)
+        together = max(ONE_EVENT * abs(value(b) - value(a)), NEUTRAL)
         same = next((e for e in found if abs(value(e.standing)) <= together), None)
         if same is not None:
             found[found.index(same)] = replace(same, multiplicity=same.multiplicity + 1)
@@ -107,7 +107,7 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
         if standing is None:
             continue
         standing = _settled(curve, a, b, standing)
-        twin = next((e for e in found if abs(e.standing.arc - standing.arc) <= APART * (b.arc - a.arc)), None)
+        twin = next((e for e in found if abs(e.standing.arc - standing.arc) <= ONE_EVENT * (b.arc - a.arc)), None)
         if twin is not None:
             found[found.index(twin)] = Event("bifurcation", twin.standing, twin.multiplicity + 1)
         else:
@@ -211,7 +211,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
         else:
             c, fc, b, fb, a, fa = b, fb, a, fa, x, fx
         least = tolerance / max(abs(b - a), TINY)
-        known = blur and abs(fa) <= BLURRED * blur and least > SHARP / APART
+        known = blur and abs(fa) <= BLURRED * blur and least > SHARP / ONE_EVENT
         if abs(fa) <= least_value or least > 0.5 or known:
             break
         line = fa / (fc - fa) * (a - c) / (b - a) if fc * fa > 0.0 and fc != fa else 1.0

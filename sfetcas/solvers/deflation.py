@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
 from ..mathematics.keeping import kept
@@ -32,10 +33,7 @@ LONGEST = 0.7
 NEAR = 1e-3
 """Steps shorter than this, rad, go on without deflation."""
 
-OPEN = 1e-6
-"""Gaps of closings, in the size of the scene, that start places leave where they can be reached."""
-
-BESIDE = 1.5
+OTHER_TURN = 1.5
 """An equilibrium that turns a node by more than this, rad, from where it was led to is not the one that was meant."""
 
 ITERATIONS = 40
@@ -70,8 +68,8 @@ def nearest(prepared: Prepared, loading: Loading) -> Corrected | None:
     A minimisation from there would slide down from one that is unstable.
     """
     state, gap = prepared.guess(loading, settle=False)
-    found = deflated(prepared, state, loading, ()) if gap <= OPEN else None
-    return found if found is not None and prepared.distance(found.state, state) <= BESIDE else None
+    found = deflated(prepared, state, loading, ()) if gap <= tolerances.REACHED else None
+    return found if found is not None and prepared.distance(found.state, state) <= OTHER_TURN else None
 
 
 def _slope(equations: Equations, state: State, other: State, step: Array) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point
 from .newton import independent
-from .stability import LIGHT, NEUTRAL, ROUNDING, Inertia, Stability
+from .stability import ENTRIES_BLUR, LIGHT, NEUTRAL, Inertia, Stability
 
 __all__ = ["TangentTest"]
 
@@ -63,7 +63,7 @@ class TangentTest:
             before, after = across @ h, h @ across.T
             inner = before @ across.T + (largest + 1.0) * np.eye(len(across))
             h += across.T @ (inner @ across - before) - after @ across
-        return h, NEUTRAL + ROUNDING * largest, free
+        return h, NEUTRAL + ENTRIES_BLUR * largest, free
 
     def _eigenvalues(self, tangent: Array) -> Array:
         """Eigenvalues by rising real part."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import tolerances
 from ..description.records import enumerated
 from ..description.supports import along, upwards
 from ..mathematics.arrays import Array, first_of_largest
@@ -36,9 +37,6 @@ MOST = 40
 
 ITERATIONS = 4
 """Inverse iterations: each gains the ratio of the softest stiffness to the shift, seven digits."""
-
-MOVES = 1e-6
-"""What moves by less than this share of what moves most does not; the central difference leaves out 1e-10."""
 
 SHARE = 0.05
 """A member takes part in a motion when it turns by this share of the largest rotation."""
@@ -145,27 +143,27 @@ def _told_apart(motions: Array) -> Array:
     basis = motions.copy()
     for i in range(basis.shape[1]):
         # Of unknowns that move alike the first is taken, whatever rounding makes of them.
-        row = first_of_largest(np.abs(basis[:, i:]).max(axis=1), ALIKE)
+        row = first_of_largest(np.abs(basis[:, i:]).max(axis=1))
         pivot = i + first_of_largest(basis[row, i:])
         basis[:, [i, pivot]] = basis[:, [pivot, i]]
         basis[:, i] /= basis[row, i]
         others = np.arange(basis.shape[1]) != i
         basis[:, others] -= np.outer(basis[:, i], basis[row, others])
     peak = np.abs(basis).max(axis=0, initial=0.0)
-    return np.where(np.abs(basis) > 1e-6 * peak, basis, 0.0)
+    return np.where(np.abs(basis) > tolerances.NEGLIGIBLE * peak, basis, 0.0)
 
 
 def in_words(equations: Equations, motion: Array) -> str:
     """Which members turn, and which slide along their nodes, and which nodes move, in a motion."""
     model = equations.model
-    motion = np.where(np.abs(motion) > MOVES * np.abs(motion).max(initial=0.0), motion, 0.0)
+    motion = np.where(np.abs(motion) > tolerances.NEGLIGIBLE * np.abs(motion).max(initial=0.0), motion, 0.0)
     turned = np.where(equations.number >= 0, motion[equations.number], 0.0)
     sizes = np.linalg.norm(turned, axis=1)
     by_member = {name: float(sizes[list(ends)].max()) for name, ends in model.rotations.ends.items()}
     largest = max(by_member.values(), default=0.0)
     turning = [name for name, size in by_member.items() if size > SHARE * largest > 0.0]
     places = _travels(equations, motion, _undeformed(equations))
-    travels, least = places[: len(model.nodes)], MOVES * max(largest, 1.0)
+    travels, least = places[: len(model.nodes)], tolerances.NEGLIGIBLE * max(largest, 1.0)
     moved = np.linalg.norm(travels, axis=1) > least
     moving = [name for name, moves in zip(model.nodes, moved, strict=True) if moves]
     slid = _slid(equations, places)
@@ -192,9 +190,9 @@ def _slid(equations: Equations, travels: Array) -> dict[str, Array]:
 def _alike(travels: Array) -> Array | None:
     """The direction of nodes that travel alike, its largest component above zero; None of others."""
     size = float(np.linalg.norm(travels[0]))
-    if np.abs(travels - travels[0]).max() > ALIKE * size or size < ALIKE:
+    if np.abs(travels - travels[0]).max() > tolerances.PARALLEL * size or size < tolerances.PARALLEL:
         return None
-    direction = np.where(np.abs(travels[0]) > ALIKE * size, travels[0] / size, 0.0)
+    direction = np.where(np.abs(travels[0]) > tolerances.PARALLEL * size, travels[0] / size, 0.0)
     return upwards(direction)
 
 
@@ -202,10 +200,6 @@ def _together(travels: Array) -> str:
     """The direction in words, where all travel alike."""
     direction = _alike(travels)
     return "" if direction is None else f" along {along(direction)}"
-
-
-ALIKE = 1e-6
-"""Difference of directions that counts as none; the central difference leaves out 1e-10."""
 
 
 def _node_travels(equations: Equations, motion: Array, state: State | None = None) -> Array:
@@ -231,9 +225,6 @@ STEP = 1e-5
 STUCK = 0.01
 """Share of the gaps that an unknown takes away, to first order, where they are still said to be stuck."""
 
-NOTHING = 1e-9
-"""Gaps below this, in lengths of the scene or rad, are closed."""
-
 DAMPED = 40
 """Steps towards the smallest gaps."""
 
@@ -248,7 +239,7 @@ def contradiction(equations: Equations, state: State, loading: Loading) -> str:
         return ""
     state, gaps, slope = _nearest(equations, state, loading)
     size = float(np.linalg.norm(gaps))
-    if not NOTHING < size < np.inf or slope > STUCK * size:
+    if not tolerances.CLOSED < size < np.inf or slope > STUCK * size:
         return ""
     stuck = gaps / size
     changes = {name: float(stuck @ _asked(equations, state, loading, name)) for name in equations.model.scene.motions}
@@ -302,5 +293,6 @@ def moves_nodes(equations: Equations, motion: Array, state: State) -> bool:
     if not equations.model.space and np.abs(motion[: equations.turning_unknowns]).max(initial=0.0) > 0.0:
         return True
     return bool(
-        np.abs(_node_travels(equations, motion, state)).max(initial=0.0) > 1e-6 * np.abs(motion).max(initial=1.0)
+        np.abs(_node_travels(equations, motion, state)).max(initial=0.0)
+        > tolerances.NEGLIGIBLE * np.abs(motion).max(initial=1.0)
     )

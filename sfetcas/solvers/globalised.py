@@ -16,12 +16,13 @@ Sources: Nocedal and Wright 2006, chapters 3 and 18 (line search on an l1 merit 
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
 
-from ..mathematics.arrays import Array
+from .. import tolerances
+from ..mathematics.arrays import TINY, Array
 from ..mathematics.linear import places_of
 from .program import Program
 from .sides import Sides
@@ -62,9 +63,6 @@ FIRMEST = 1e12
 
 LEAST = 1e-9
 """What displacements have beside rotations where the softest shape is looked for from."""
-
-TINY = 1e-30
-"""Keeps zero from being divided by."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +111,12 @@ class Rules:
 
     iterations: int = 300
     converged: float = 1e-10
-    rounding: float = 3e-15
+    rounding: float = field(default_factory=lambda: tolerances.EXACT)
     gain: float = 0.25
     turn: float = 1.2
     near: float = 0.05
-    proximal: float = 1e-10
-    soft: float = 5e-8
+    proximal: float = field(default_factory=lambda: tolerances.PROXIMAL)
+    soft: float = field(default_factory=lambda: tolerances.SOFT)
     firm: float = 1e-3
     firmer: float = 10.0
     rounds: int = 8
@@ -378,7 +376,7 @@ class Globalised:
         sides = [self._moved(state, shape, share) for share in (1.0, -1.0)]
         up, down = (float(self.program.merit(side, given)[0]) for side in sides)
         # A symmetric pair differs by rounding only: then the first side, so that answers repeat.
-        return sides[1] if up - down > 1e-9 * max(abs(up), abs(down)) else sides[0]
+        return sides[1] if up - down > tolerances.LEVEL * max(abs(up), abs(down)) else sides[0]
 
     def _softest(self, entries: ca.DM) -> Array:
         """The shape of the lowest eigenvalue, by inverse iteration from below it."""

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
@@ -62,13 +63,13 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     for _ in range(60):
         point = equations.at(state, loading)
         gap = float(np.abs(point.residual[n:]).max())
-        if gap < 1e-9:
+        if gap < tolerances.CLOSED:
             break
         equations.solver.factor(np.where(coupling, point.entries, metric))
         step = equations.solver.solve(np.concatenate([np.zeros(n), -point.residual[n:]]))
         step[n:] = 0.0
         length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
-        state = equations.moved(state, step * min(1.0, 0.5 / max(length, 1e-30)))
+        state = equations.moved(state, step * min(1.0, 0.5 / max(length, TINY)))
     return state, gap
 
 
@@ -97,7 +98,7 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
         pull = np.linalg.solve(border.T @ base[:, 1:] + np.eye(len(chosen)) / SPRING, wanted - border.T @ base[:, 0])
         step = base[:, 0] + base[:, 1:] @ pull
         length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
-        state = equations.moved(state, step * min(1.0, 0.5 / max(length, 1e-30)))
+        state = equations.moved(state, step * min(1.0, 0.5 / max(length, TINY)))
     return state, float(np.abs(missing).max())
 
 
@@ -117,7 +118,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle
     if targets is not None:
         state = _placed(equations, state, loading, weight, targets)
     state, gap = restore(equations, state, loading, weight)
-    if gap > 1e-6 or not settle:
+    if gap > tolerances.REACHED or not settle:
         return state, gap
     return descend(equations, state, loading, weight, most=TURN if targets is None else NEAR), gap
 

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from .. import tolerances
+from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .sharing import shared
 
 __all__ = [
-    "DUAL",
-    "PROXIMAL",
-    "ROUNDING",
-    "TINY",
+    "LEAST_SCALE",
     "TURN",
     "Corrected",
     "changed_by",
@@ -35,20 +33,11 @@ __all__ = [
     "with_sharing",
 ]
 
-PROXIMAL = 1e-10
-"""Weight of the proximal term: it makes neutral directions harmless and costs no digit elsewhere."""
-
 TURN = 1.2
 """Largest rotation (rad) of a step downhill under forces."""
 
 SHORT = 0.05
 """Steps shorter than this, rad, need not shrink yet."""
-
-ROUNDING = 3e-15
-"""Relative residual at which there is nothing left to gain."""
-
-DUAL = 1e-12
-"""Softness of the closings in the matrix (not in the equations), against redundant ones."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +59,10 @@ class Corrected:
 
 def relative_residual(equations: Equations, point: Point) -> float:
     """Largest out-of-balance moment or force over what is added up at its node, or largest gap."""
-    return float((np.abs(point.residual) / np.maximum(point.scale, TINY)).max(initial=0.0))
+    return float((np.abs(point.residual) / np.maximum(point.scale, LEAST_SCALE)).max(initial=0.0))
 
 
-TINY = 1e-14
+LEAST_SCALE = 1e-14
 """Of the units of the model: where nothing acts and nothing is stiff, less than this is nothing."""
 
 
@@ -82,8 +71,8 @@ def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
     entries = point.entries.copy()
     n, total = equations.turning_unknowns, equations.total
     diagonal = equations.diagonal
-    entries[diagonal[:n]] += PROXIMAL * weight
-    entries[diagonal[equations.unknowns : total]] -= DUAL
+    entries[diagonal[:n]] += tolerances.PROXIMAL * weight
+    entries[diagonal[equations.unknowns : total]] -= tolerances.DUAL
     equations.solver.factor(entries)
     step = equations.solver.solve(-point.residual)
     if redundant(equations, point):
@@ -100,7 +89,6 @@ def correct(
     loading: Loading,
     weight: Array,
     *,
-    tolerance: float = 1e-12,
     iterations: int = 12,
     most: float = np.inf,
     contraction: float = 1.0,
@@ -108,15 +96,14 @@ def correct(
     flat: Array | None = None,
     drag: Callable[[State, Point], Point] | None = None,
 ) -> Corrected:
-    """Newton's method from a near state down to rounding.
+    """Newton's method from a near state down to rounding: as long as a step gains a factor of 4.
+
+    What rounding of the state keeps out of balance has converged as well.
 
     Parameters
     ----------
     weight : ndarray
         Weight of the proximal term, see :class:`~sfetcas.solvers.stability.StabilityTest`.
-    tolerance : float
-        Relative residual that counts as converged; iterations go on while they still gain a factor of 4.  What
-        rounding of the state keeps above it has converged as well.
     most : float
         Give up when a later step than the first turns any node by more, rad.
     contraction : float
@@ -135,6 +122,7 @@ def correct(
         point = met(equations, equations.at(state, loading))
         return point if drag is None else drag(state, point)
 
+    tolerance = tolerances.CONVERGED
     state = equations.holding(state, loading)
     point = dragged(state)
     residual = relative_residual(equations, point)
@@ -143,7 +131,7 @@ def correct(
     count = 0
     for count in range(iterations):
         # One step is always taken: under a tiny load even the whole answer is below rounding of the stiffness.
-        if residual == 0.0 or (count and residual <= ROUNDING and _balanced(equations, point)):
+        if residual == 0.0 or (count and residual <= tolerances.EXACT and _balanced(equations, point)):
             break
         try:
             here = replace(point, entries=tangent) if tangent is not None and count == 0 else point
@@ -183,7 +171,7 @@ def correct(
         state, point, residual = begun
     if residual > tolerance and drag is None and rounded(equations, state, point):
         # Rounding may leave a little more where multipliers are shared.
-        tolerance = min(FLOOR, 4.0 * residual)
+        tolerance = min(tolerances.BALANCED, 4.0 * residual)
     second = 0.0 if second == np.inf else second
     converged = residual <= tolerance
     if drag is not None or equations.redundant:
@@ -194,9 +182,6 @@ def correct(
     return Corrected(state, point, converged, count, first, second, residual)
 
 
-FLOOR = 1e-9
-"""Relative residual up to which it may be rounding."""
-
 EPSILON = 1e-15
 """Rounding of unknowns over the largest of their kind, or one."""
 
@@ -206,7 +191,7 @@ def rounded(equations: Equations, state: State, point: Point) -> bool:
 
     A residual that does not fall may as well be what no unknown balances, however small it is: that explains nothing.
     """
-    if not relative_residual(equations, point) <= FLOOR or not _balanced(equations, point):
+    if not relative_residual(equations, point) <= tolerances.BALANCED or not _balanced(equations, point):
         return False
     turning, unknowns, total = equations.turning_unknowns, equations.unknowns, equations.total
     sizes = [max(1.0, float(np.abs(part).max(initial=0.0))) for part in (state.q, state.y)]
@@ -246,37 +231,30 @@ def met(equations: Equations, point: Point) -> Point:
     loose = loose_rows(equations, point)
     left = loose.T @ point.residual[equations.unknowns :]
     # What turning by less closes is a member nearly straight, and its gap has to be closed.
-    stays = np.abs(left) > CLOSED * np.linalg.norm(changed_by(equations, point, loose), axis=0)
+    stays = np.abs(left) > TURNS_FIRST * np.linalg.norm(changed_by(equations, point, loose), axis=0)
     gaps = loose[:, stays] @ left[stays]
-    if not 0.0 < np.linalg.norm(gaps) <= MET:
+    if not 0.0 < np.linalg.norm(gaps) <= tolerances.CLOSED:
         return point
     residual = point.residual.copy()
     residual[equations.unknowns :] -= gaps
     return replace(point, residual=residual)
 
 
-CLOSED = 1e-3
+TURNS_FIRST = 1e-3
 """Turning, rad, by which gaps are closed: what takes more, to first order, no unknown closes."""
-
-MET = 1e-9
-"""Gaps of redundant closings below this, in lengths of the scene or rad, are closed."""
 
 
 def _balanced(equations: Equations, point: Point) -> bool:
     """Whether what is out of balance is little beside all that acts, too, and not only beside what is stiff."""
     n = equations.unknowns
     acting = (point.scale - equations.noise)[:n].max(initial=0.0)
-    return float(np.abs(point.residual[:n]).max(initial=0.0)) <= BALANCED * acting
-
-
-BALANCED = 1e-9
-"""Share of the largest moment or force that acts: where more is out of balance, stiffness beside it hides it."""
+    return float(np.abs(point.residual[:n]).max(initial=0.0)) <= tolerances.BALANCED * acting
 
 
 def _unresisted(equations: Equations, step: Array, point: Point, weight: Array) -> bool:
     """Whether little but the proximal term resists a step: an unloaded mechanism of rigid members has no stiffness."""
     turned = step[: equations.turning_unknowns]
-    return bool(PROXIMAL * float(weight @ turned**2) > 0.1 * abs(float(step @ point.residual)))
+    return bool(tolerances.PROXIMAL * float(weight @ turned**2) > 0.1 * abs(float(step @ point.residual)))
 
 
 def descend(
@@ -308,7 +286,7 @@ def descend(
         slope = float(point.residual[:n] @ step[:n]) + float(state.lam @ point.residual[n:]) - penalty * gaps
         slope = min(slope, 0.0)
         before = point.potential + penalty * gaps
-        scale = min(1.0, 4.0 * scale, most / max(length, 1e-30))
+        scale = min(1.0, 4.0 * scale, most / max(length, TINY))
         for _ in range(40):
             trial = equations.moved(state, np.concatenate([scale * step[:n], scale * step[n:]]))
             there = equations.at(trial, loading, convex=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
@@ -31,13 +32,10 @@ from .program import Program
 from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
 
-__all__ = ["BEYOND", "SOLVED", "Prepared"]
+__all__ = ["BEYOND", "Prepared"]
 
 MOST_COUNTED = 600
 """Up to this many unknowns the eigenvalues of a tangent, all of them, take less than a second."""
-
-SOLVED = 1e-9
-"""Relative residual after the last Newton steps that is taken for an equilibrium; usual are 1e-13 to 1e-16."""
 
 STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
 """Where IPOPT gets no nearer, as in the valley of a spin that next to nothing resists, Newton's method goes on."""
@@ -48,7 +46,7 @@ ITERATIONS = 250
 BEYOND = 1e4
 """Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
 
-SAME = 1e-3
+PRESTRESSED = 1e-3
 """Two states nearer than this, rad, are the same but for what a prestress bends."""
 
 ESCAPES, FALLEN = 8, 400
@@ -223,11 +221,11 @@ class Prepared:
         if not np.all(np.isfinite(trial.q)):
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)
-        if not polished.residual <= SOLVED and result.status not in (Status.INFEASIBLE, Status.UNBOUNDED):
+        if not polished.residual <= tolerances.BALANCED and result.status not in (Status.INFEASIBLE, Status.UNBOUNDED):
             # Quaternions leave a long valley by short steps only, rotations by long ones.
             polished = self.downhill(trial, loading) or polished
         # What falls without end has no finite residual, which no comparison would find too large.
-        if not polished.converged and not polished.residual <= SOLVED:
+        if not polished.converged and not polished.residual <= tolerances.BALANCED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
             detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if result.status is Status.SOLVED:
@@ -258,7 +256,7 @@ class Prepared:
             # Where only multipliers without bound hold it, it is in balance further down.
             return self.downhill(without, loading) or found
         least = self.correct(without, loading)
-        return least if least.converged and self.distance(least.state, found.state) < SAME else found
+        return least if least.converged and self.distance(least.state, found.state) < PRESTRESSED else found
 
     def multipliers(self, found: Corrected) -> float:
         """The largest multiplier over the loads, or over the unit of force."""
@@ -279,7 +277,7 @@ class Prepared:
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return None, outcome.iterations
         found = self.correct(method.program.state(outcome.state), loading)
-        return (found if found.residual <= SOLVED else None), outcome.iterations
+        return (found if found.residual <= tolerances.BALANCED else None), outcome.iterations
 
     def downhill(self, state: State, loading: Loading) -> Corrected | None:
         """The equilibrium below a state, or where its forces carry it without an energy; None where they do not rest.
@@ -354,7 +352,7 @@ class Prepared:
             return first
         # Near where it becomes unstable what a load gives is nearly what the strain takes.
         size = max(abs(up.potential), abs(down.potential), up.strain, down.strain)
-        return second if up.potential - down.potential > 1e-9 * size else first
+        return second if up.potential - down.potential > tolerances.LEVEL * size else first
 
     @functools.cached_property
     def _load_size(self) -> float:

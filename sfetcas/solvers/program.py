@@ -27,7 +27,7 @@ from ..mechanics.rotations import Turn
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
 from ..mechanics.terms import GROUND, energies_of
-from .newton import TINY
+from .newton import LEAST_SCALE
 
 __all__ = ["Program", "data_of", "is_data"]
 
@@ -304,7 +304,7 @@ class Program:
         state, _ = self._symbols
         residual = ca.densify(self.stationarity.residual)
         # A maximum may lose what is not a number, a sum does not.
-        shares = residual / ca.fmax(self.scale, TINY)
+        shares = residual / ca.fmax(self.scale, LEAST_SCALE)
         size = ca.norm_inf(shares) + 0.0 * ca.sum1(residual) if self.expressions.total else ca.MX(0)
         results = {
             "residual": residual,

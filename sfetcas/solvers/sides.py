@@ -16,6 +16,7 @@ import functools
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, first_of_largest
 from ..mechanics.equations import Equations
@@ -26,20 +27,14 @@ __all__ = ["Sides", "alike"]
 DECAYS = (2.0, 0.7, 4.0)
 """How fast fields die away along a member, one after the other."""
 
-TINY = 1e-9
+WITHOUT_ELEMENTS = 1e-9
 """Share of members without elements, which have no part in integrals: they count where there is no other."""
 
 LEAST = 1e-3
 """Share of a field that shapes have at least: symmetry leaves none of it, and rounding 1e-10."""
 
-TURNING = 1e-6
-"""Rotations, rad, beside displacements in lengths of the scene, below which nothing turns."""
-
 FADING = 0.125
 """Share of a field beside the one before it where all are one."""
-
-ALIKE = 1e-6
-"""Eigenvalues that are nearer to the lowest than this, beside it and the softest member, have one space of shapes."""
 
 
 class Sides:
@@ -74,7 +69,9 @@ class Sides:
                     way = frame[:, axis] if model.space else np.array([0.0, 0.0, 1.0])
                     # At the node of several members the mean by what of each has its share in an integral: of a field
                     # that jumps there, too, all meshes then have the same integrals.
-                    share = np.gradient(along) * lines[name].length * (1.0 if name in model.members else TINY)
+                    share = (
+                        np.gradient(along) * lines[name].length * (1.0 if name in model.members else WITHOUT_ELEMENTS)
+                    )
                     vectors[chain] += (share * np.exp(-decay * along))[:, None] * way / (1.0 + place)
                     shares[chain] += share
                 vectors /= np.where(shares > 0.0, shares, 1.0)[:, None]
@@ -136,7 +133,7 @@ class Sides:
         """
         begin, found = 0, shapes.copy()
         while begin < len(values):
-            near = ALIKE * max(unit, abs(float(values[begin])))
+            near = tolerances.ALIKE * max(unit, abs(float(values[begin])))
             end = begin + 1 + int((values[begin + 1 :] - values[begin] <= near).sum())
             found[:, begin:end] = self.ordered(shapes[:, begin:end], metric)
             begin = end
@@ -147,7 +144,7 @@ class Sides:
         turning = self._equations.turning_unknowns
         travels = shapes[turning:]
         largest = float(np.linalg.norm(travels, axis=0).max(initial=0.0))
-        size = max(np.sqrt(float((metric @ np.abs(shapes) ** 2).max())), TURNING * largest)
+        size = max(np.sqrt(float((metric @ np.abs(shapes) ** 2).max())), tolerances.NEGLIGIBLE * largest)
         for field in self.fields:
             weighted = metric[:turning] * field
             parts = weighted @ shapes[:turning]
@@ -172,4 +169,4 @@ class Sides:
 
 def alike(values: Array) -> int:
     """How many of rising eigenvalues, in those of the softest member or of themselves, are the lowest one."""
-    return int((values - values[0] <= ALIKE * max(1.0, abs(float(values[0])))).sum())
+    return int((values - values[0] <= tolerances.ALIKE * max(1.0, abs(float(values[0])))).sum())

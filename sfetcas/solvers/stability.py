@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import InertiaSolver, Product, SparseSolver, blurred, pattern
@@ -28,12 +29,12 @@ from ..mechanics.equations import Equations, Point
 from .newton import independent
 from .sides import Sides, alike
 
-__all__ = ["LIGHT", "NEUTRAL", "ROUNDING", "Inertia", "Stability", "StabilityTest"]
+__all__ = ["ENTRIES_BLUR", "LIGHT", "NEUTRAL", "Inertia", "Stability", "StabilityTest"]
 
 NEUTRAL = 1e-7
 """Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
 
-ROUNDING = 2e-15
+ENTRIES_BLUR = 2e-15
 """The same, relative to the largest entry of the weighted matrix."""
 
 GRADED = 1e-5
@@ -221,7 +222,7 @@ class StabilityTest:
     @staticmethod
     def _limit(entries: Array) -> float:
         """Largest eigenvalue that cannot be told from zero, whatever its mode."""
-        return NEUTRAL + ROUNDING * float(np.abs(entries).max())
+        return NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max())
 
     def _is_graded(self, limit: float) -> bool:
         return limit > GRADED and self._n <= FULL
@@ -261,7 +262,7 @@ class StabilityTest:
         vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))
         vectors = vectors / np.linalg.norm(vectors, axis=0)
         rounding = blurred(self._h_row, self._h_column, entries, vectors)
-        return values, vectors, NEUTRAL + rounding + ROUNDING * abs(shift)
+        return values, vectors, NEUTRAL + rounding + ENTRIES_BLUR * abs(shift)
 
     @property
     def _is_dense(self) -> bool:
@@ -280,7 +281,7 @@ class StabilityTest:
         most += alike(values[most - 1 :]) - 1 if most else 0
         shapes = self.sides.in_groups(values[:most], basis @ vectors[:, :most] / root, self._weights)
         shapes = shapes[:turning, :count].T
-        limit = NEUTRAL + ROUNDING * float(np.abs(entries).max(initial=0.0))
+        limit = NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
@@ -319,8 +320,8 @@ class StabilityTest:
         size, before = float(np.abs(values).max()), -1
         if not sharp:
             # Beside what is neutral a count by factors is worthless, and none but those found are nearer to zero.
-            apart = size >= APART and values[0] > -APART
-            before = self._below(point, entries, -APART if apart else float(values[0] - 1e-6 * size))
+            apart = size >= CLEAR_OF_ZERO and values[0] > -CLEAR_OF_ZERO
+            before = self._below(point, entries, -CLEAR_OF_ZERO if apart else float(values[0] - 1e-6 * size))
         return before, values, (vectors / root)[:turning]
 
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
@@ -359,13 +360,13 @@ class StabilityTest:
 
         At zero itself a neutral direction takes all digits from the factors of the bordered matrix.
         """
-        low, high = (self._from_factors(point, shift, (SOFT,)) for shift in (-APART, APART))
-        if low is None or high is None or limit > 0.1 * APART or high - low > NEAREST:
+        low, high = (self._from_factors(point, shift, (SOFT,)) for shift in (-CLEAR_OF_ZERO, CLEAR_OF_ZERO))
+        if low is None or high is None or limit > 0.1 * CLEAR_OF_ZERO or high - low > NEAREST:
             return None
         if low == high:
             return Inertia(low, 0)
         values = self._inverse_iterated(point, entries, sharp=False)[0]
-        values = values[np.abs(values) < APART]
+        values = values[np.abs(values) < CLEAR_OF_ZERO]
         if len(values) != high - low:
             return None
         return Inertia(low + int((values < -limit).sum()), int((np.abs(values) <= limit).sum()))
@@ -493,7 +494,7 @@ class StabilityTest:
         block = np.random.default_rng(0).standard_normal((n, width))
         loads, last = np.zeros((equations.total, width)), np.full(min(NEAREST, width), np.inf)
         shifted = point.entries.copy()
-        shifted[equations.diagonal[self._chosen]] += BESIDE * self._weights
+        shifted[equations.diagonal[self._chosen]] += SHIFT * self._weights
         shifted[equations.diagonal[equations.unknowns :]] -= 1e-14
         self._solver.factor(shifted)
         for _ in range(60):
@@ -516,10 +517,10 @@ DEEPER = 4.0
 LOWEST = 1e30
 """No eigenvalue is sought below minus this."""
 
-BESIDE = 1.3e-4
+SHIFT = 1.3e-4
 """Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
 
-APART = 1e-4
+CLEAR_OF_ZERO = 1e-4
 """This far from zero eigenvalues are counted by factors where displacements take part: these blur a hundredth of it."""
 
 NEAREST = 4
@@ -546,9 +547,6 @@ FULL = 600
 BROKEN = 1e-2
 """Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
 
-RANK = 1e-10
-"""Directions of slides whose singular values are below this, relative to the largest, are one."""
-
 
 def _left_null_space(equations: Equations) -> Array:
     """Combinations of the rows in which no displacement appears, (rows, combinations)."""
@@ -558,5 +556,5 @@ def _left_null_space(equations: Equations) -> Array:
     if not w.shape[1]:
         return np.eye(equations.rows)
     left, sizes, _ = np.linalg.svd(w)
-    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+    rank = int((sizes > tolerances.RANK * sizes.max(initial=0.0)).sum())
     return np.asarray(left[:, rank:])

@@ -18,7 +18,7 @@ from .arclength import PASSING, Curve, Standing, Tangent
 from .critical import FIRM, Event, events_between
 from .newton import relative_residual
 
-__all__ = ["Traced", "passes", "switched", "trace", "without"]
+__all__ = ["FAR", "Traced", "passes", "switched", "trace", "without"]
 
 TURNING = 0.25
 """Angle between the tangents of neighbouring points, rad, that steps aim at."""
@@ -62,7 +62,7 @@ EXPECTED = 3
 LOOP = 8
 """Points before a curve may close: fewer make no loop."""
 
-SAME = 1e-5
+ONE_POINT = 1e-5
 """Points that differ by less, rad or shares of the factor, are one: Newton's method leaves far less."""
 
 WALKS = 6
@@ -163,7 +163,7 @@ def without(traced: Traced, known: Sequence[Standing]) -> Traced:
 
 
 def _meets(a: Standing, b: Standing) -> bool:
-    level = abs(a.factor - b.factor) <= SAME * max(abs(a.factor), abs(b.factor))
+    level = abs(a.factor - b.factor) <= ONE_POINT * max(abs(a.factor), abs(b.factor))
     return level and a.prepared.distance(a.state, b.state) <= MEETING
 
 
@@ -180,7 +180,7 @@ def passes(curve: Curve, traced: Traced, point: Standing) -> bool:
         if there is None or _apart(curve, there, point) >= _apart(curve, near, point):
             break
         near = there
-    return _apart(curve, near, point) < SAME
+    return _apart(curve, near, point) < ONE_POINT
 
 
 def _apart(curve: Curve, a: Standing, b: Standing) -> float:

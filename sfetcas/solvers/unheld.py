@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import tolerances
 from ..description.supports import free_to_move
 from ..errors import SceneError
 from ..mathematics.arrays import Array
@@ -28,12 +29,6 @@ STEP = 0.1
 
 ROUNDS = 400
 """States of a round at most: six turns of the fastest link."""
-
-DRIVEN = 1e-6
-"""A load that does less than this share of its largest work per radian does not drive."""
-
-NOTHING = 1e-9
-"""Share of the work of the loads that is no strain energy, and of the loads that does no work."""
 
 CORRECTIONS, SOFT, CLOSING = 12, 1e-3, 1e-11
 """Newton steps to a state of a round at most; what keeps their matrix regular, beside stiffness and closings."""
@@ -93,19 +88,19 @@ def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) 
     equations = prepared.equations
     unloaded, turning = prepared.model.loading(0.0, 0.0), equations.turning_unknowns
     _, sizes, right = np.linalg.svd(np.linalg.qr(motions[:turning], mode="r"))
-    straight = motions @ right[np.append(sizes, np.zeros(len(right) - len(sizes))) < NOTHING].T
+    straight = motions @ right[np.append(sizes, np.zeros(len(right) - len(sizes))) < tolerances.NEGLIGIBLE].T
     motion = straight @ (straight.T @ _pull(prepared, start, loading))
-    if not np.abs(motion).max(initial=0.0) > NOTHING * _acting(loading):
+    if not np.abs(motion).max(initial=0.0) > tolerances.BALANCED * _acting(loading):
         return None
     motion /= np.abs(motion).max()
     work = float(motion @ _pull(prepared, start, loading))
     for way in FAR:
         there = _moved(prepared, start, way * motion)
         point = equations.at(there, unloaded)
-        held = np.abs(point.residual[: equations.unknowns]).max() > NOTHING * work
-        opened = np.abs(point.residual[equations.unknowns :]).max(initial=0.0) > NOTHING * way
-        driven = float(motion @ _pull(prepared, there, loading)) >= (1.0 - NOTHING) * work
-        if held or opened or point.strain > NOTHING * way * work or not driven:
+        held = np.abs(point.residual[: equations.unknowns]).max() > tolerances.BALANCED * work
+        opened = np.abs(point.residual[equations.unknowns :]).max(initial=0.0) > tolerances.CLOSED * way
+        driven = float(motion @ _pull(prepared, there, loading)) >= (1.0 - tolerances.BALANCED) * work
+        if held or opened or point.strain > tolerances.BALANCED * way * work or not driven:
             return None
     return motion
 
@@ -118,7 +113,7 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
         return None
     speed, largest, work, furthest = first, 0.0, 0.0, 0.0
     drive = float(speed @ _pull(prepared, start, loading))
-    if abs(drive) <= NOTHING * _acting(loading):
+    if abs(drive) <= tolerances.BALANCED * _acting(loading):
         return None
     speed = first = first * (1.0 if drive >= 0.0 else -1.0)
     state = start
@@ -126,7 +121,7 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
         drive = float(speed @ _pull(prepared, state, loading))
         largest = max(largest, drive)
         work += STEP * drive
-        if not drive > DRIVEN * largest:
+        if not drive > tolerances.NEGLIGIBLE * largest:
             return None
         before, state = state, _unstrained(prepared, _moved(prepared, state, STEP * speed), unloaded)
         went = _apart(prepared, state, before)
@@ -138,7 +133,7 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
         onward = _of_unit_speed(equations.turning_unknowns, free @ np.linalg.lstsq(free, speed, rcond=None)[0])
         point = equations.at(state, unloaded)
         gap = np.abs(point.residual[equations.unknowns :]).max(initial=0.0)
-        if onward is None or point.strain > NOTHING * work or gap > NOTHING:
+        if onward is None or point.strain > tolerances.BALANCED * work or gap > tolerances.CLOSED:
             return None
         speed = onward
         away = _apart(prepared, state, start)
@@ -162,7 +157,7 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
         equations.solver.factor(entries)
         step = equations.solver.solve(-point.residual)[:n]
         state = _moved(prepared, state, step)
-        if np.abs(step).max(initial=0.0) < NOTHING:
+        if np.abs(step).max(initial=0.0) < tolerances.CLOSED:
             break
     return state
 
@@ -170,7 +165,7 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
 def _of_unit_speed(turning: int, motion: Array) -> Array | None:
     """The motion with a fastest rotation of one; None of one that turns nothing."""
     fastest = float(np.abs(motion[:turning]).max(initial=0.0))
-    return motion / fastest if fastest > NOTHING * np.abs(motion).max(initial=0.0) else None
+    return motion / fastest if fastest > tolerances.NEGLIGIBLE * np.abs(motion).max(initial=0.0) else None
 
 
 def _apart(prepared: Prepared, a: State, b: State) -> float:

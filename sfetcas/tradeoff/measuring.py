@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 Assembly = Literal["auto", "closing", "nodal"]
 
-SAME = 1e-3
+OF_TWO_MESHES = 1e-3
 """Positions nearer than this share of the size are those of the same equilibrium on two meshes."""
 
 
@@ -204,7 +204,7 @@ def _again(last: Equilibrium, variant: Variant, repeats: int, longest: float) ->
         found = solve_model(prepared, last.factor, solver=variant.solver)
     except (SceneError, SolveError):
         return None
-    if prepared.distance(found.state, last.state) > SAME:
+    if prepared.distance(found.state, last.state) > OF_TWO_MESHES:
         return None
     expected = time.perf_counter() - begin
     solved = _repeated(

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..equilibria.solution import Solution
 from ..errors import SceneError
 
@@ -95,7 +96,7 @@ def _apart(step: Any, rivals: list[Mapping[str, Any]]) -> float:
             for name, entry in rival["nodes"].items()
         )
         for rival in rivals
-        if abs(float(rival.get("factor", 1.0)) - step.factor) <= 1e-9 * abs(step.factor)
+        if abs(float(rival.get("factor", 1.0)) - step.factor) <= tolerances.WRITTEN * abs(step.factor)
     ]
     return min(errors, default=np.inf)
 

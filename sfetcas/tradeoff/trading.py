@@ -42,7 +42,7 @@ FINEST = {
 }
 """Accuracies of the reference, the first that can be had."""
 
-ROUNDING = 1e-13
+NOTHING_TO_GAIN = 1e-13
 """Errors below this share are rounding: a family has nothing to gain."""
 
 ELSEWHERE = 0.02
@@ -355,7 +355,7 @@ class _Trading:
         gained = row.error < GAINED * family.best or not np.isfinite(row.error)
         family.best = min(family.best, row.error)
         family.stalled = 0 if gained else family.stalled + 1
-        return row.error > max(ROUNDING, self._floor) and family.stalled < STALLED
+        return row.error > max(NOTHING_TO_GAIN, self._floor) and family.stalled < STALLED
 
     @property
     def _floor(self) -> float:

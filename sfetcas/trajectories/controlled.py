@@ -17,6 +17,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene
 from ..dynamics.stages import StageEquations
 from ..equilibria.settings import Settings
@@ -252,7 +253,7 @@ class ControlledSystem:
         values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
         values, vectors = values[::-1], vectors[:, ::-1]
         shapes = basis @ np.linalg.solve(factor.T, vectors)
-        massive = values > 1e-12 * max(values.max(initial=0.0), TINY)
+        massive = values > tolerances.RANK * max(values.max(initial=0.0), TINY)
         squares = np.where(massive, 1.0 / np.where(massive, values, 1.0) - shift, np.inf)
         return np.sqrt(np.maximum(squares, 0.0)), mass @ shapes, stiffness[:free, :free] @ shapes
 
@@ -275,7 +276,7 @@ def _null_space(rows: Array) -> Array:
     if not len(rows):
         return np.eye(rows.shape[1])
     _, sizes, right = np.linalg.svd(rows)
-    rank = int((sizes > 1e-10 * max(sizes.max(initial=0.0), TINY)).sum())
+    rank = int((sizes > tolerances.RANK * max(sizes.max(initial=0.0), TINY)).sum())
     return np.asarray(right[rank:].T)
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
+from .. import tolerances
 from ..description.scene import Scene, check_scene
 from ..dynamics.index_one import LINEAR, IndexOne
 from ..equilibria.settings import Settings
@@ -267,7 +268,7 @@ class _Made:
         for axis in (1, 0):
             scaled = scaled / np.maximum(np.abs(scaled).max(axis=axis, keepdims=True), TINY)
         sizes = np.linalg.svd(scaled, compute_uv=False)
-        if sizes[-1] < SINGULAR * sizes[0]:
+        if sizes[-1] < tolerances.RANK * sizes[0]:
             accepted = "rhoI of sections, or inertia at nodes, in motion_functions"
             raise SceneError(
                 f"found rotations without inertia, or closings that depend on each other, accepted: {accepted}"
@@ -276,6 +277,3 @@ class _Made:
 
 KEPT = ["gaps", "rates", "norms"]
 """Results of the invariants."""
-
-SINGULAR = 1e-12
-"""Share of the largest singular value below which the matrix of accelerations and multipliers has no inverse."""

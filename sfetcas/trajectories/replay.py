@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import tolerances
 from ..description.loads import History
 from ..description.records import plain, unknown
 from ..description.scene import Scene, check_scene
@@ -91,7 +92,7 @@ class Response:
     @property
     def after(self) -> Array:
         """Which times come after the end, (times,) bool."""
-        return np.asarray(self.times >= self.end * (1.0 - 1e-12))
+        return np.asarray(self.times >= self.end * (1.0 - tolerances.DECIMAL))
 
     def residual_vibration(self, node: str | None = None) -> float:
         """Largest distance from their mean place that nodes, or one, have after the end, m."""

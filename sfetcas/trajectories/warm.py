@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import tolerances
 from ..description.records import unknown
 from ..description.scene import Scene
 from ..dynamics.methods import RADAU
@@ -231,7 +232,9 @@ def _placed(system: ControlledSystem, q: Array, near: Array, numbers: Array) -> 
     moved = ca.Function("moved", [*s, y], [own.moving(held, y, given, s[1])])
     # Closings are linear in displacements.
     # Of closings that depend on each other rounding leaves 1e-16.
-    back = -np.linalg.pinv(np.array(constant(own.model.positions.W).full()).reshape(closings, n.y), rcond=1e-10)
+    back = -np.linalg.pinv(
+        np.array(constant(own.model.positions.W).full()).reshape(closings, n.y), rcond=tolerances.RANK
+    )
     ys, xs = [], []
     for one, angles, values in zip(q, near, numbers, strict=True):
         found = back @ np.array(open_(one.T, angles, values)).ravel() if n.y else np.zeros(0)

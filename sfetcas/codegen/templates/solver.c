@@ -5,7 +5,7 @@
 
 typedef int (*@name@_function)(const double **, double **, int *, double *, int);
 
-#define SF_TINY 1e-30
+#define SF_TINY 1e-300
 #define SF_FIRMEST 1e12
 #define SF_FAILED (-1000000)
 #define SF_NOT_DEFINED (-1)
