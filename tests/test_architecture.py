@@ -10,6 +10,7 @@ import pytest
 
 import benchmarks
 import sfetcas
+from sfetcas.mechanics.terms import Term
 
 FOLDER = Path(sfetcas.__file__).parent
 
@@ -463,6 +464,41 @@ def test_public_methods_are_documented(name):
     for owner, method in methods:
         if not owner.name.startswith("_") and method.name not in asked:
             assert ast.get_docstring(method), f"{owner.name}.{method.name}"
+
+
+@functools.cache
+def kinds():
+    """Modules by the kinds of terms that they define."""
+
+    def below(kind):
+        return [kind, *(found for other in kind.__subclasses__() for found in below(other))]
+
+    for name in MODULES:
+        if name.startswith("mechanics."):
+            importlib.import_module(f"sfetcas.{name}")
+    modules = {kind.__name__: kind.__module__ for kind in below(Term)[1:] if kind.__module__.startswith("sfetcas.")}
+    assert len(modules) > 30
+    return {kind: module.removeprefix("sfetcas.") for kind, module in modules.items()}
+
+
+def asked(node):
+    """Names of the types that a call, a comparison or a pattern asks something for."""
+    types = []
+    if isinstance(node, ast.MatchClass):
+        types = [node.cls]
+    elif isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("isinstance", "issubclass"):
+        types = node.args[1:]
+    elif isinstance(node, ast.Compare) and "type(" in ast.unparse(node):
+        types = [node.left, *node.comparators]
+    every = [part for one in types for part in ast.walk(one)]
+    return {getattr(part, "id", getattr(part, "attr", getattr(part, "value", ""))) for part in every}
+
+
+@each
+def test_a_kind_of_term_is_asked_for_by_no_other_module(name):
+    for node in nodes(name):
+        foreign = {kind for kind in asked(node) if kinds().get(kind, name) != name}
+        assert not foreign, f"asks for {', '.join(foreign)} in line {node.lineno}: let terms say what differs"
 
 
 def test_package_has_the_names_that_type_checkers_see():

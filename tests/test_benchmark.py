@@ -32,7 +32,9 @@ def rows(printed):
 
 
 def test_benchmark_of_another_name_is_refused():
-    accepted = "net, path, motion, steps, code, accuracy, pieces, sweep, import, extremes, random, jitter, contact, ways"
+    accepted = (
+        "net, path, motion, steps, code, accuracy, pieces, sweep, import, extremes, random, jitter, contact, ways"
+    )
     with pytest.raises(SystemExit, match=rf"found benchmark 'nets', accepted: .*{accepted}$"):
         main(["nets"])
 

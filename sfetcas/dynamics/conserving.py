@@ -19,6 +19,7 @@ Source: Simo and Tarnow 1992; Gonzalez 1996 (discrete derivatives, doi 10.1007/B
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import final
 
 import casadi as ca
@@ -30,9 +31,6 @@ from ..mathematics.constants import picked, times
 from ..mathematics.interpolation import differentiation
 from ..mathematics.quaternion import product, turned
 from ..mechanics.elements import Element
-from ..mechanics.joints import Hinge, TurnSpring
-from ..mechanics.load_terms import Moment
-from ..mechanics.observed import Axes
 from ..mechanics.terms import Side, Term, name_of
 from .methods import Begin, Method
 from .stages import StageEquations
@@ -293,6 +291,19 @@ def _sides(q: ca.SX, u: ca.SX) -> tuple[list[Side], list[Side]]:
     return [ca.vertsplit(one) for one in ca.horzsplit(q)], [ca.vertsplit(one) for one in ca.horzsplit(u)]
 
 
+def _by_relative(values: Callable[[ca.SX], tuple[ca.SX, ca.SX]], q0: ca.SX, q1: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Gradient of the energy and derivative of the rows of what knows one relative rotation, at the mean of this."""
+    components, sides = q0.shape
+    ground = ca.SX([1.0, 0.0, 0.0, 0.0]) if components == 4 else ca.SX(0.0)
+    (a0, b0), (a1, b1) = (ca.horzsplit(ca.horzcat(ground, q)[:, -2:]) for q in (q0, q1))
+    mean = 0.5 * (b0 - a0 + b1 - a1 if components == 1 else _times(_conjugate(a0), b0) + _times(_conjugate(a1), b1))
+    p = ca.SX.sym("p", components)
+    known = ca.vertcat(*values(ca.horzcat(ground, p)[:, -sides:]))
+    across = ca.mtimes(ca.substitute(ca.jacobian(known, p), p, mean), _relative(a0, a1, b0, b1))
+    both = ca.horzcat(-across, across)[:, -sides * across.shape[1] :]
+    return both[0, :].T, both[1:, :]
+
+
 @functools.cache
 def _between(kind: Term) -> ca.Function:
     """(q0, u0, q1, u1, data, load, load_end, lam) -> gradient, its derivative, rows at the end, both spins.
@@ -310,36 +321,28 @@ def _between(kind: Term) -> ca.Function:
         sides = _sides(q, u)
         return kind.energy(*sides, data, given), ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, data, given))
 
-    def spins(q: ca.SX, u: ca.SX, given: ca.SX) -> tuple[ca.SX, ca.SX]:
-        energy, found = values(q, u, given)
+    def spins(at: ca.SX, moved: ca.SX) -> tuple[ca.SX, ca.SX]:
+        q, u = ca.SX.sym("q", *at.shape), ca.SX.sym("u", *moved.shape)
+        energy, found = values(q, u, load)
         x, basis = ca.vertcat(ca.vec(q), ca.vec(u)), ca.diagcat(_basis(q), ca.SX.eye(u.numel()))
-        gradient = ca.mtimes(basis.T, ca.gradient(energy, x))
-        forces = kind.forces(*_sides(q, u), data, given)
-        if forces:
-            # Moments that are dead do not change when what they act on turns.
-            gradient += ca.vertcat(*forces)
-        return gradient, ca.mtimes(ca.jacobian(found, x), basis)
+        results = [ca.mtimes(basis.T, ca.gradient(energy, x)), ca.mtimes(ca.jacobian(found, x), basis)]
+        gradient, spin = ca.substitute(results, [q, u], [at, moved])
+        return gradient, spin
 
-    q, u = ca.SX.sym("q", kind.components, turns), ca.SX.sym("u", kind.axes, places)
-    middle = 0.5 * (q0 + q1)
+    middle = 0.5 * (q0 + q1), 0.5 * (u0 + u1)
     if kind.space and turns:
-        middle = ca.horzcat(*[middle[:, i] / ca.norm_2(middle[:, i]) for i in range(turns)])
-    derivative, mean_spin = ca.substitute(list(spins(q, u, load)), [q, u], [middle, 0.5 * (u0 + u1)])
-    if isinstance(kind, Axes):
-        both = [ca.substitute([spins(q, u, load)[1]], [q], [at])[0] for at in (q0, q1)]
-        mean_spin = 0.5 * (both[0] + both[1])
-    if isinstance(kind, Hinge):
-        gain = _relative(q0[:, 0], q1[:, 0], q0[:, 1], q1[:, 1])[1:, :]
-        across = ca.vertcat(*[2.0 * ca.mtimes(data[3 * i : 3 * i + 3].T, gain) for i in range(rows)])
-        mean_spin = ca.horzcat(-across, across)
-    if isinstance(kind, TurnSpring) and not kind.space:
-        # Quadratic in the relative angle: its gain is exact with the derivative at the mean.
-        derivative *= _relative(q0[0], q1[0], q0[1], q1[1])
-    if isinstance(kind, Moment) and not kind.space:
-        # Linear in the angle, whose gain over that of its Rodrigues vector this is.
-        derivative *= _relative(ca.SX(0), ca.SX(0), q0, q1)
+        middle = ca.horzcat(*[side / ca.norm_2(side) for side in ca.horzsplit(middle[0])]), middle[1]
+    if kind.discrete == "ends":
+        derivative, mean_spin = (0.5 * (a + b) for a, b in zip(spins(q0, u0), spins(q1, u1), strict=True))
+    elif kind.discrete == "relative":
+        derivative, mean_spin = _by_relative(lambda q: values(q, u0, load), q0, q1)
+    else:
+        derivative, mean_spin = spins(*middle)
+    # Moments that are dead do not change when what they act on turns.
+    forces = kind.forces(*_sides(*middle), data, load)
+    derivative += ca.vertcat(*forces) if forces else 0.0
     gradient = derivative + ca.mtimes(mean_spin.T, lam)
-    end, of_end = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u.numel()))
+    end, of_end = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u1.numel()))
     changed = ca.mtimes(ca.jacobian(gradient, end), of_end)
     results = [ca.densify(part) for part in (gradient, changed, values(q1, u1, load_end)[1], mean_spin)]
     spin = ca.densify(ca.mtimes(ca.jacobian(values(q1, u1, load_end)[1], end), of_end))

@@ -11,11 +11,9 @@ from ..mathematics.constants import mapped
 from ..mathematics.linear import SparseMap
 from ..mechanics.balance import three
 from ..mechanics.batches import GroupBatch
-from ..mechanics.body_points import BodyPoints
 from ..mechanics.equations import Equations, State
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Loading
-from ..mechanics.observed import Axes
 from ..mechanics.terms import by_turning
 from .stages import StageEquations
 
@@ -107,14 +105,12 @@ class Inertia:
         first, mass = weights @ positions, float(weights.sum())
         angular = np.cross(positions, three(linear)).sum(axis=0)
         for group, value, momentum in zip(self._masses.observables, others, groups, strict=True):
-            if not isinstance(group.kind, Axes | BodyPoints):
+            if not group.kind.vectors:
                 continue
-            # Numbers beside the points of a small member have no momentum.
-            kept = self.system.axes * group.kind.points if isinstance(group.kind, BodyPoints) else None
-            parts = (part.reshape(len(group.data), -1)[:, :kept] for part in (value, momentum))
-            vectors, its = (three(part.reshape(len(group.data), -1, self.system.axes)) for part in parts)
-            if isinstance(group.kind, BodyPoints):
-                # The first point of each is a place, seen from where the first node was.
+            count, kept = len(group.data), self.system.axes * group.kind.vectors
+            parts = (part.reshape(count, -1)[:, :kept] for part in (value, momentum))
+            vectors, its = (three(part.reshape(count, -1, self.system.axes)) for part in parts)
+            if group.kind.from_place:
                 vectors = vectors.copy()
                 vectors[:, 0] += three(self._rest[group.places[:, 0]])
                 own = group.mass[:, 0]

@@ -21,7 +21,6 @@ from ..mechanics.expressions import Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.masses import Masses, Observables
 from ..mechanics.singles import arms_product, weighted_product
-from ..mechanics.spinning import vectors_of
 from ..mechanics.terms import rows_of
 
 if TYPE_CHECKING:
@@ -252,7 +251,7 @@ class System(Expressions):
     def turned_rows(self, group: Observables) -> Array:
         """``2 Omega x`` on the rows of a quantity: on the vectors that they begin with; numbers behind do not turn."""
         assert self.crossing is not None
-        found, count = np.zeros((group.kind.sizes[2],) * 2), vectors_of(group)
+        found, count = np.zeros((group.kind.sizes[2],) * 2), group.kind.vectors
         found[: self.axes * count, : self.axes * count] = np.kron(np.eye(count), self.crossing)
         return found
 

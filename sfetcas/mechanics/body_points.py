@@ -21,7 +21,7 @@ Source: ours; the points are a factor of the moments of :class:`~sfetcas.mechani
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 import numpy as np
@@ -48,9 +48,16 @@ class BodyPoints(Term):
         How many macro-nodes, points and numbers.
     """
 
+    from_place: ClassVar[bool] = True
+
     nodes: int
     points: int
     numbers: int
+
+    @property
+    def vectors(self) -> int:
+        """The points; numbers have no momentum."""
+        return self.points
 
     @property
     def _body(self) -> Body:

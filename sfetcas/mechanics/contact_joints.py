@@ -6,7 +6,7 @@ Connections as joints are, see :mod:`~sfetcas.mechanics.joints`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 
@@ -32,6 +32,8 @@ CENTRE = 1e-60
 class OnPlane(Term):
     """A place on a plane; data: its normal, the gap in the undeformed scene."""
 
+    on_face: ClassVar[bool] = True
+
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """One row."""
@@ -46,6 +48,8 @@ class OnPlane(Term):
 @dataclass(frozen=True)
 class OnRound(Term):
     """A place on a circle, cylinder or sphere; data: projection across the axis, centre to place, radius, sign."""
+
+    on_face: ClassVar[bool] = True
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:

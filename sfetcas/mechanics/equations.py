@@ -25,7 +25,6 @@ from .load_terms import present
 from .loading import Loading
 from .model import Model
 from .rotations import Turn
-from .spinning import SpunPair, SpunVectors
 from .tables import Tables
 from .terms import Group, by_turning
 
@@ -375,13 +374,12 @@ class Equations:
             return loading
         q, places = state.q, self.places(state, loading)
         u = places.reshape(len(self.model.segments.places), -1)
-        axes, pairs = self.model.element.axes, zip(self.model.connections, loading.loads, strict=True)
-        matrix = next(load[0] for group, load in pairs if isinstance(group.kind, SpunPair)).reshape(axes, axes)
+        matrix = loading.loads[spinning.pairs][0].reshape(u.shape[1], -1)
         found = loading.plus(spinning.positional(self.model, u, turned_tangents(self.model, q), matrix))
         moment, force = found.moment.copy(), np.zeros_like(found.force)
-        for group, load in zip(self._terms[1:], loading.loads, strict=True):
-            if isinstance(group.kind, SpunVectors):
-                group.add_forces(-group(state, u, load, np.zeros(0))[3], moment, force)
+        for number in spinning.bodies:
+            group = self._terms[1 + number]
+            group.add_forces(-group(state, u, loading.loads[number], np.zeros(0))[3], moment, force)
         return replace(found, moment=moment, force=found.force + force, own=found.own + force)
 
     # -- steps ----------------------------------------------------------------------------------

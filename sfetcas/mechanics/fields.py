@@ -20,7 +20,6 @@ from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
-from .contact_joints import OnPlane, OnRound
 from .equations import Equations, State, turned_tangents
 from .loading import Loading
 from .mesh import Touch
@@ -87,7 +86,7 @@ class Fields:
         force, moment = np.zeros(3), np.zeros(3)
         place = self.model.segments.place(node)
         # Where the obstacle has a row of its own for the node its share is told apart already.
-        if any(place in group.places for group in self.model.connections if isinstance(group.kind, (OnPlane, OnRound))):
+        if any(place in group.places for group in self.model.connections if group.kind.on_face):
             return force, moment
         for touch in self.model.mesh.touches:
             nodes = self.model.scene.members[touch.member].nodes

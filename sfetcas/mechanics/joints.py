@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array
-from .terms import Side, Term
+from .terms import Discrete, Side, Term
 
 __all__ = [
     "Body",
@@ -51,6 +51,11 @@ class Hinge(Term):
         """Two rows."""
         return 2, 0, 2, 6, 0
 
+    @property
+    def discrete(self) -> Discrete:
+        """Linear in the relative quaternion."""
+        return "relative"
+
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Twice the components of ``conj(qa) qb`` across the axis."""
         across = ca.vertcat(*self.relative(*q)[1:])
@@ -80,7 +85,7 @@ class Universal(Term):
 class DrivenTurn(Term):
     """The angle between two rotations about an axis is prescribed; data: axis, load: angle."""
 
-    is_driven: ClassVar[bool] = True
+    drives: ClassVar[str] = "angle"
     table: ClassVar[str] = "motions"
     answers: ClassVar[Mapping[str, str]] = {"moment": "N m"}
 
@@ -129,7 +134,7 @@ class Slide(Term):
 class DrivenSlide(Term):
     """The travel of a slide is prescribed; data: direction of the line, load: travel."""
 
-    is_driven: ClassVar[bool] = True
+    drives: ClassVar[str] = "travel"
     table: ClassVar[str] = "motions"
     answers: ClassVar[Mapping[str, str]] = {"force": "N"}
     one_sided: ClassVar[bool] = True
@@ -187,6 +192,11 @@ class Turning(Term):
         """No row."""
         return 2, 0, 0, self.first + self.own + self.space, 0
 
+    def counted(self, data: Array) -> tuple[Array, Array] | None:
+        """The axis, and at a universal joint what the other side carries; none in the plane."""
+        axis = data[:, :3]
+        return (axis, data[:, 3:6] if self.crossed else np.zeros(axis.shape)) if self.space else None
+
     def angle(self, q: list[Side], data: ca.SX) -> ca.SX:
         """The angle, rad."""
         axis = data[:3]
@@ -215,6 +225,15 @@ class TurnSpring(Turning):
     def own(self) -> int:
         """Two."""
         return 2
+
+    @property
+    def discrete(self) -> Discrete:
+        """Quadratic in the relative angle of the plane."""
+        return "middle" if self.space else "relative"
+
+    def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """The angle."""
+        return self.angle(q, data)
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
@@ -277,6 +296,11 @@ class Spring(Term):
         """No row."""
         return 0, 2, 0, self.axes + 2, 0
 
+    def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """The elongation."""
+        n = self.axes
+        return ca.norm_2(data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n + 1]
+
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Half the stiffness times the square of the elongation, less that of the undeformed scene."""
         n = self.axes
@@ -285,9 +309,8 @@ class Spring(Term):
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The elongation and the force, below zero where it pulls."""
-        n = self.axes
-        travel = ca.norm_2(data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n + 1]
-        return [travel, -data[n] * travel]
+        travel = self.travel(q, u, data)
+        return [travel, -data[self.axes] * travel]
 
     @staticmethod
     def _square(gap: ca.SX, free: ca.SX) -> ca.SX:
@@ -309,16 +332,18 @@ class LineSpring(Term):
         """No row."""
         return 0, 2, 0, self.axes + 2, 0
 
+    def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """What the second place moves along the direction against the first."""
+        return ca.dot(data[: self.axes], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
+
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Half the stiffness times the square of the travel from rest, zero in the undeformed scene."""
-        n = self.axes
-        travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
+        n, travel = self.axes, self.travel(q, u, data)
         return 0.5 * data[n] * travel * (travel - 2.0 * data[n + 1])
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
         """The travel along the direction, and the force."""
-        n = self.axes
-        travel = ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
+        n, travel = self.axes, self.travel(q, u, data)
         return [travel, -data[n] * (travel - data[n + 1])]
 
 

@@ -29,7 +29,7 @@ from .parts import Parts
 from .rotations import Rotations, Turn
 from .segments import Segments
 from .singles import turned_vector
-from .terms import GROUND, Group, One, Side, Term
+from .terms import GROUND, Discrete, Group, One, Side, Term
 
 __all__ = [
     "AxisMoment",
@@ -91,6 +91,7 @@ class FollowingSpread(Term):
 
     is_load: ClassVar[bool] = True
     follows: ClassVar[bool] = True
+    along_element: ClassVar[bool] = True
 
     nodes: int
 
@@ -154,6 +155,11 @@ class Moment(Term):
     def sizes(self) -> tuple[int, int, int, int, int]:
         """A rotation."""
         return 1, 0, 0, 0, self.turns
+
+    @property
+    def discrete(self) -> Discrete:
+        """Linear in the angle of the plane."""
+        return "middle" if self.space else "relative"
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """In the plane the angle times minus the moment."""
@@ -335,20 +341,21 @@ def present(model: Any, q: Array, loading: Any) -> Any:
         if not group.kind.follows:
             continue
         loads[i] = np.zeros_like(load)
-        width = model.element.axes if group.places.shape[1] else 3
+        on_places = group.places.shape[1]
+        width = model.element.axes if on_places else 3
         turned = quaternion.turned_by(q[group.turns], load.reshape(len(load), -1, width))
-        if isinstance(group.kind, FollowingSpread):
+        if group.kind.along_element:
             along[elements_of(group)] = turned
-        elif isinstance(group.kind, Follower):
+        elif on_places:
             for part in ("force", "own"):
                 np.add.at(found[part], group.places[:, 0], turned[:, 0])
         else:
             for part in ("moment", "further"):
                 np.add.at(found[part], group.turns[:, 0], turned[:, 0])
             _put(model, group, turned[:, 0], found)
-    pull, on_places = carried(along, model.segments, model.element)
+    pull, carried_to = carried(along, model.segments, model.element)
     found["spread"] += along
-    found["force"] += on_places
+    found["force"] += carried_to
     return replace(loading, **found, pull=loading.pull + pull, loads=tuple(loads))
 
 
@@ -379,7 +386,7 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
     spread = ca.reshape(given.spread, axes, -1)
     pull = ca.MX(*spread.shape)
     for number, group in enumerate(model.terms):
-        if not isinstance(group.kind, FollowingSpread):
+        if not group.kind.along_element:
             continue
         points = (elements_of(group)[:, None] * n + np.arange(n)).ravel()
         forces = ca.reshape(expressions.load(number, given), axes, len(points))
@@ -394,5 +401,5 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
 
 
 def elements_of(group: Group) -> Array:
-    """Elements that the terms of a group of :class:`FollowingSpread` act along."""
+    """Elements that the terms of a group of loads act along."""
     return np.array([int(name.rpartition(" ")[2]) for name in group.names], dtype=np.intp)

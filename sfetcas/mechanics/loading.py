@@ -22,8 +22,7 @@ from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
 from .connections import freedoms
 from .elements import Element
-from .joints import Body, DrivenTurn
-from .load_terms import FollowingSpread, carried, cut_of, followed_elements, inner_cut
+from .load_terms import carried, cut_of, elements_of, inner_cut
 from .mesh import Mesh
 from .parts import Parts
 from .rotations import Rotations
@@ -87,7 +86,7 @@ class Loading:
         """The motions alone; the driven joints among them."""
         zero: dict[str, Any] = {name: np.zeros_like(getattr(self, name)) for name in LOADS}
         loads = tuple(
-            load if kind.is_driven else np.zeros_like(load) for kind, load in zip(self.kinds, self.loads, strict=True)
+            load if kind.drives else np.zeros_like(load) for kind, load in zip(self.kinds, self.loads, strict=True)
         )
         return replace(self, **zero, loads=loads)
 
@@ -109,7 +108,7 @@ class Loading:
     @property
     def driven(self) -> float:
         """Largest angle or travel of a driven joint."""
-        return self.of(lambda kind: kind.is_driven)
+        return self.of(lambda kind: bool(kind.drives))
 
     @property
     def follows(self) -> bool:
@@ -301,9 +300,8 @@ class _Writer:
         forces = plus(np.zeros((*self.beams.weight.shape, self.element.axes)), part, along)
         if follows:
             for i, turned in enumerate(self.connections):
-                if isinstance(turned.kind, FollowingSpread):
-                    elements = followed_elements(self.scene, self.segments)
-                    group.load(i, slice(None), forces[elements].reshape(len(elements), -1))
+                if turned.kind.along_element:
+                    group.load(i, slice(None), forces[elements_of(turned)].reshape(len(turned.data), -1))
             return
         pull, on_places = carried(forces, self.segments, self.element)
         group.add("spread", part, forces[part])
@@ -325,12 +323,11 @@ class _Writer:
 
     def _add_lever(self, group: _Sums, member: str, lever: Lever, vector: Array) -> None:
         """A profile times a vector: force, first moment and consistent forces as the body's kernel takes them."""
-        ((i, number, kind),) = self.terms(member, lambda kind: isinstance(kind, Body))
-        axes = self.element.axes
-        assert isinstance(kind, Body)
+        ((i, number, kind),) = self.terms(member, lambda kind: kind.table == "members")
+        axes, nodes = self.element.axes, len(self.scene.members[member].nodes)
         value = vector[:axes] / self.scales.force
-        chosen = freedoms(kind.nodes, kind.space)
-        unit = np.tile([self.scales.length] * 3 + [1.0] * 3, kind.nodes)
+        chosen = freedoms(nodes, kind.space)
+        unit = np.tile([self.scales.length] * 3 + [1.0] * 3, nodes)
         ends = (lever.ends * unit / self.scales.length)[:axes, chosen]
         first = np.outer(value, lever.first[:axes] / self.scales.length)
         tensor = np.einsum("a,bj->abj", value, ends)
@@ -354,8 +351,8 @@ class _Writer:
 
     def _add_drive(self, group: _Sums, name: str, motion: Motion) -> None:
         """Angle or travel of a driven joint."""
-        for i, number, kind in self.terms(name, lambda kind: kind.is_driven):
-            if isinstance(kind, DrivenTurn):
+        for i, number, kind in self.terms(name, lambda kind: bool(kind.drives)):
+            if kind.drives == "angle":
                 group.load(i, number, motion.rotation)
             else:
                 along = unit(self.scene.nodes[motion.node].direction)

@@ -22,8 +22,7 @@ from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
-from .joints import Spring, TurnSpring
-from .observed import Axes, Gap, SpringAngle, Strains, Travel
+from .observed import Axes, SpringTravel, Strains
 from .terms import Term
 
 __all__ = ["Masses", "Observables", "masses_of"]
@@ -41,7 +40,7 @@ class Observables:
     data : ndarray (n, data)
     mass, damping : ndarray (n, rows)
     spring : int or None
-        The group of terms whose angles these are, in which the counted turns stand.
+        The group of springs whose travels these are, in which counted turns stand.
     numbers : ndarray (n,) or None
         Which of that group.
     at : ndarray (n, 2) or None
@@ -285,21 +284,16 @@ class _Weigher:
         """Dampers beside springs."""
         found = []
         for number, group in enumerate(self.model.terms):
-            kind, axes = group.kind, self.axes
-            units = self.model.scales.moment * time, self.model.scales.force / self.model.scales.length * time
+            kind = group.kind
             if kind.table != "springs":
                 continue
             damping = np.array([self.scene.springs[name].damping for name in group.names])
             chosen = np.flatnonzero(damping)
             if not len(chosen):
                 continue
-            observed: Term = Travel(self.space)
-            data, unit, spring = group.data[:, :axes], units[1], None
-            if isinstance(kind, TurnSpring):
-                observed, data, unit, spring = SpringAngle(self.space, kind), group.data, units[0], number
-            elif isinstance(kind, Spring):
-                observed = Gap(self.space)
-            weight = damping[chosen, None] / unit
-            sides = group.turns[chosen], group.places[chosen]
-            found.append(Observables(observed, *sides, data[chosen], np.zeros(weight.shape), weight, spring, chosen))
+            travel, effort = map(self.model.scales.of, kind.answers.values())
+            weight = damping[chosen, None] / (effort / travel * time)
+            sides, none = (group.turns[chosen], group.places[chosen]), np.zeros(weight.shape)
+            observed = SpringTravel(self.space, kind)
+            found.append(Observables(observed, *sides, group.data[chosen], none, weight, number, chosen))
         return found

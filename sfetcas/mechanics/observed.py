@@ -21,10 +21,9 @@ from typing import final
 
 import casadi as ca
 
-from .joints import Turning
-from .terms import Side, Term
+from .terms import Discrete, Side, Term
 
-__all__ = ["Axes", "Gap", "SpringAngle", "Strains", "Travel"]
+__all__ = ["Axes", "SpringTravel", "Strains"]
 
 
 @final
@@ -37,6 +36,16 @@ class Axes(Term):
         """Their components."""
         n = 9 if self.space else 2
         return 1, 0, n, n, 0
+
+    @property
+    def discrete(self) -> Discrete:
+        """They turn with the side."""
+        return "ends"
+
+    @property
+    def vectors(self) -> int:
+        """All directions."""
+        return self.sizes[2] // self.axes
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """The directions as they are now."""
@@ -83,16 +92,16 @@ class Strains(Term):
 
 @final
 @dataclass(frozen=True)
-class SpringAngle(Term):
-    """The angle of a rotational spring; data: as of the spring.
+class SpringTravel(Term):
+    """The angle or length whose rate the damper beside a spring resists; data: as of the spring.
 
     Attributes
     ----------
-    spring : Turning
-        Whose angle it is.
+    spring : Term
+        Whose it is.
     """
 
-    spring: Turning
+    spring: Term
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -101,35 +110,5 @@ class SpringAngle(Term):
         return turns, places, 1, data, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The angle, rad."""
-        return [self.spring.angle(q, data)]
-
-
-@final
-@dataclass(frozen=True)
-class Gap(Term):
-    """The distance of two places; data: their distance (vector) in the undeformed scene."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One."""
-        return 0, 2, 1, self.axes, 0
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The length of the distance."""
-        return [ca.norm_2(data + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))]
-
-
-@final
-@dataclass(frozen=True)
-class Travel(Term):
-    """What one place moves against another along a direction fixed in space; data: the direction."""
-
-    @property
-    def sizes(self) -> tuple[int, int, int, int, int]:
-        """One."""
-        return 0, 2, 1, self.axes, 0
-
-    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The travel."""
-        return [ca.dot(data, ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))]
+        """As the spring says it."""
+        return [self.spring.travel(q, u, data)]

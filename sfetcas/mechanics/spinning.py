@@ -18,14 +18,12 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array, Index
-from .body_points import BodyPoints
 from .load_terms import carried
 from .loading import Loading
-from .masses import Masses, Observables, masses_of
-from .observed import Axes
+from .masses import Masses, masses_of
 from .terms import Group, Side, Term
 
-__all__ = ["Spinning", "SpunInner", "SpunPair", "SpunVectors", "vectors_of", "with_spinning"]
+__all__ = ["Spinning", "SpunInner", "SpunPair", "SpunVectors", "with_spinning"]
 
 
 def _matrix(load: ca.SX, axes: int) -> ca.SX:
@@ -100,27 +98,24 @@ class SpunVectors(Term):
     ----------
     kind : Term
         The quantity.
-    vectors : int
-        How many of its rows, by the axes, are vectors.
     """
 
     is_load: ClassVar[bool] = True
 
     kind: Term
-    vectors: int
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
         """Those of the quantity, without rows."""
         turns, places, _, data, _ = self.kind.sizes
-        return turns, places, 0, data + self.vectors * (self.axes + 1), self.axes**2
+        return turns, places, 0, data + self.kind.vectors * (self.axes + 1), self.axes**2
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """The sum over the vectors."""
         axes, first = self.axes, self.kind.sizes[3]
         rows = ca.vertcat(*self.kind.residual(q, u, data[:first], ca.SX(0, 1)))
         total, p = ca.SX(0), _matrix(load, axes)
-        for k in range(self.vectors):
+        for k in range(self.kind.vectors):
             own = data[first + k * (axes + 1) : first + (k + 1) * (axes + 1)]
             r = own[:axes] + rows[k * axes : (k + 1) * axes]
             total -= 0.5 * own[axes] * ca.dot(r, ca.mtimes(p, r))
@@ -136,6 +131,10 @@ class Spinning:
     masses : Masses
     omega : ndarray (3,)
         Angular velocity by the unit of time of the masses.
+    pairs : int
+        Which connections are those of the masses at places.
+    bodies : range
+        Which are those of section axes and small members.
     rest, inner_rest : ndarray (places | elements, p + 1, axes)
         Where the places and the nodes of elements are in the undeformed scene.
     loading : Loading
@@ -144,6 +143,8 @@ class Spinning:
 
     masses: Masses
     omega: Array
+    pairs: int
+    bodies: range
     rest: Array
     inner_rest: Array
     loading: Loading
@@ -173,7 +174,9 @@ def with_spinning(model: Any) -> Any:
     omega = np.asarray(model.scene.rotating, dtype=float) * masses.time
     matrix = ((omega @ omega) * np.eye(3) - np.outer(omega, omega))[:axes, :axes]
     rest = _at_rest(model)
-    groups = tuple(_groups(model, masses, *rest))
+    before, (on_places, on_bodies) = len(model.connections), _groups(model, masses, *rest)
+    groups = (*on_places, *on_bodies)
+    bodies = range(before + len(on_places), before + len(groups))
     nothing = tuple(np.zeros((len(group.names), axes**2)) for group in groups)
     kinds = tuple(group.kind for group in groups)
     loadings = {
@@ -181,9 +184,9 @@ def with_spinning(model: Any) -> Any:
         for name, load in model.groups.items()
     }
     empty = loadings[None].scaled(0.0)
-    before = len(model.connections)
     here = tuple(np.tile(matrix.ravel(), (len(group.names), 1)) for group in groups)
-    spinning = Spinning(masses, omega, *rest, replace(empty, loads=(*empty.loads[:before], *here)))
+    loading = replace(empty, loads=(*empty.loads[:before], *here))
+    spinning = Spinning(masses, omega, before, bodies, *rest, loading)
     return replace(model, connections=(*model.connections, *groups), groups=loadings, spinning=spinning)
 
 
@@ -211,7 +214,8 @@ def _group(kind: Term, turns: Index, places: Index, data: Array, what: str) -> G
     return Group(kind, turns, places, data, (), names, ("",) * len(data))
 
 
-def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> list[Group]:
+def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple[list[Group], list[Group]]:
+    """Masses at places and, behind them, within elements; section axes and small members."""
     element, space = model.element, model.space
     n = element.order + 1
 
@@ -230,23 +234,15 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> list[
         data = joined(own, model.beams.tangent[heavy])
         turns = model.rotations.turns[heavy]
         found.append(_group(SpunInner(space, n), turns, start[heavy][:, None], data, "element"))
+    bodies = []
     for group in masses.observables:
-        vectors = vectors_of(group)
+        vectors = group.kind.vectors
         if not vectors:
             continue
         mass = group.mass[:, : vectors * element.axes : element.axes]
         added = np.zeros((len(group.data), vectors, element.axes))
-        if isinstance(group.kind, BodyPoints):
-            # The first point is told from the place of the first node, all others from there.
+        if group.kind.from_place:
             added[:, 0] = rest[group.places[:, 0]]
         data = joined(group.data, np.concatenate([added, mass[:, :, None]], axis=2))
-        found.append(_group(SpunVectors(space, group.kind, vectors), group.turns, group.places, data, "body"))
-    return found
-
-
-def vectors_of(group: Observables) -> int:
-    """How many vectors with mass the rows of a group begin with."""
-    kind = group.kind
-    if isinstance(kind, Axes):
-        return kind.sizes[2] // kind.axes
-    return kind.points if isinstance(kind, BodyPoints) else 0
+        bodies.append(_group(SpunVectors(space, group.kind), group.turns, group.places, data, "body"))
+    return found, bodies

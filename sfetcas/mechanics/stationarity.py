@@ -13,7 +13,7 @@ import numpy as np
 from ..mathematics.arrays import Index
 from ..mathematics.constants import picked, sparse, times
 from .expressions import Expressions, Given
-from .load_terms import FollowingSpread, elements_of
+from .load_terms import elements_of
 from .tables import Places
 from .terms import by_turning, forces_by_turning
 
@@ -107,7 +107,7 @@ class Stationarity:
         expressions = self._expressions
         own = ca.vec(self.shares[0][1])
         for group, (_, values) in zip(expressions.model.terms, self.shares, strict=True):
-            if isinstance(group.kind, FollowingSpread):
+            if group.kind.along_element:
                 width = self.shares[0][0].shape[1]
                 cells = (elements_of(group)[:, None] * width + np.arange(width)).ravel()
                 onto = sparse(cells, np.arange(len(cells)), np.ones(len(cells)), (own.shape[0], len(cells)))

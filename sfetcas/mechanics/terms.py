@@ -19,7 +19,7 @@ import abc
 import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -30,6 +30,7 @@ from ..mathematics.quaternion import Components, product, turned
 __all__ = [
     "ARGUMENTS",
     "GROUND",
+    "Discrete",
     "Group",
     "One",
     "Side",
@@ -47,6 +48,9 @@ __all__ = [
 
 Side = list[ca.SX]
 """Components of a rotation or of a vector."""
+
+Discrete = Literal["middle", "ends", "relative"]
+"""Where derivatives are taken between two states, see :attr:`Term.discrete`."""
 
 GROUND = -1
 """Number of a side that is the ground: it neither turns nor moves."""
@@ -85,13 +89,45 @@ class Term(Components, abc.ABC):
     is_couple: ClassVar[bool] = False
     """Whether it is a load that is a moment and does not turn."""
 
-    is_driven: ClassVar[bool] = False
-    """Whether its loads are what a motion prescribes."""
+    drives: ClassVar[str] = ""
+    """What a motion prescribes by its load, ``angle`` or ``travel``; empty of all that no motion drives."""
+
+    along_element: ClassVar[bool] = False
+    """Whether its loads are forces at the nodes of an element, of which its rotations are."""
+
+    on_face: ClassVar[bool] = False
+    """Whether its row keeps a place on a face of an obstacle."""
+
+    from_place: ClassVar[bool] = False
+    """Whether the first of its :attr:`vectors` begins where its first place is in the undeformed scene."""
+
+    @property
+    def discrete(self) -> Discrete:
+        """Where between two states its derivatives are taken whose work is what its energy and its rows gain.
+
+        ``middle`` of the states, to second order; the mean of both ``ends``, exact for vectors that turn with one side;
+        by the ``relative`` rotation, of the second side against the first or of one against the ground, exact for rows
+        that are linear in it, and for energies quadratic in the angle of the plane.
+        """
+        return "middle"
+
+    @property
+    def vectors(self) -> int:
+        """How many vectors its rows begin with that have momentum, and on which turning axes act."""
+        return 0
 
     @property
     def has_potential(self) -> bool:
         """Whether what it does is the derivative of its energy; else of :meth:`forces`."""
         return True
+
+    def counted(self, data: Array) -> tuple[Array, Array] | None:
+        """Axis of the first side and direction of the second, (n, 3) each, whose angle about it counts turns.
+
+        Without a direction, zero, it is the angle of the rotation itself.  Where there is such an angle the last number
+        of the data is the value near which it is counted.  See :class:`~sfetcas.mechanics.winding.Winding`.
+        """
+        return None
 
     @property
     @abc.abstractmethod
@@ -116,6 +152,10 @@ class Term(Components, abc.ABC):
     def stiffest(self, data: Array) -> Array | None:
         """Largest stiffness (n,) of each term, where rounding of a stiff direction has levers on the others."""
         return None
+
+    def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
+        """Of a spring the angle, rad, or length, dimensionless, whose rate a damper beside it resists."""
+        return ca.SX(0)
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Minus the present generalised forces times the displacements: told with the energy, never differentiated."""

@@ -16,7 +16,6 @@ import numpy as np
 from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, numbers
-from .joints import DrivenTurn, Turning
 from .loading import Loading
 from .rotations import Turn
 from .terms import GROUND, Group
@@ -157,15 +156,15 @@ def winding_of(terms: tuple[Group, ...], space: bool) -> Winding:
     parts: list[slice | None] = []
     names: list[str] = []
     for group in terms:
-        if not space or not isinstance(group.kind, Turning):
+        counted = group.kind.counted(group.data)
+        if counted is None:
             parts.append(None)
             continue
         parts.append(slice(len(sides), len(sides) + len(group.names)))
         names += group.names if group.kind.is_load else [f"springs.{name}" for name in group.names]
-        for pair, data in zip(group.turns.tolist(), group.data, strict=True):
-            sides.append((pair[0], pair[1]))
-            axis.append(data[:3])
-            across.append(data[3:6] if group.kind.crossed else np.zeros(3))
+        sides += [(a, b) for a, b in group.turns.tolist()]
+        axis += list(counted[0])
+        across += list(counted[1])
     pairs = np.array(sides, dtype=np.intp).reshape(-1, 2)
     lines = numbers(axis).reshape(-1, 3)
     return Winding(
@@ -182,7 +181,7 @@ def _driven(connections: tuple[Group, ...], sides: Index, axis: Array) -> list[t
     """Angles between the sides of a driven joint about its axis."""
     found = []
     for number, group in enumerate(connections):
-        if not isinstance(group.kind, DrivenTurn):
+        if group.kind.drives != "angle":
             continue
         for i, (pair, about) in enumerate(zip(group.turns, group.data, strict=True)):
             for angle, (own, line) in enumerate(zip(sides, axis, strict=False)):
