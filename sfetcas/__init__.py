@@ -6,7 +6,7 @@ The flow, in the order of the names below:
 2. :func:`solve` finds its equilibria, each with a certificate, its vibrations or its motion, to the accuracy asked for;
 3. a :class:`Solution` answers by the names of the scene; a :class:`Path` does so along a path, and :func:`switch`
    follows other branches from its bifurcations; :class:`Modes` has frequencies and shapes, a :class:`Trajectory` the
-   states of a motion, each an :class:`Instant`;
+   states of a motion, each an :class:`MotionState`;
 4. :func:`parametric` makes equilibria a function of numbers of the scene, with exact first and second derivatives;
    :func:`fit` finds such numbers from measurements, with bounds of confidence;
 5. :class:`Design` looks for numbers of a scene under several load cases at once, :func:`find` for those with wanted
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from .design.quasi_static import QuasiStatic as QuasiStatic
     from .design.quasi_static import QuasiStaticAnswer as QuasiStaticAnswer
     from .dynamics.modes import Modes as Modes
-    from .dynamics.motion import Instant as Instant
+    from .dynamics.motion import MotionState as MotionState
     from .dynamics.motion import Trajectory as Trajectory
     from .equilibria.solution import Certificate as Certificate
     from .equilibria.solution import Equilibrium as Equilibrium
@@ -141,7 +141,7 @@ _PUBLIC = {
     "design.designing": "Design DesignAnswer find",
     "design.quasi_static": "QuasiStatic QuasiStaticAnswer",
     "dynamics.modes": "Modes",
-    "dynamics.motion": "Instant Trajectory",
+    "dynamics.motion": "MotionState Trajectory",
     "equilibria.solution": "Certificate Equilibrium Solution",
     "equilibria.statics": "Settings solve_model",
     "errors": "SceneError SolveError Status",

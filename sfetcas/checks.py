@@ -13,7 +13,7 @@ from . import tolerances
 from .description.answers import answer_name
 from .description.records import say
 from .description.scene import Expect, Scene, check_scene
-from .dynamics.motion import Instant, Trajectory
+from .dynamics.motion import MotionState, Trajectory
 from .equilibria.quantities import entry_of, value_of
 from .equilibria.solution import Equilibrium, Solution
 from .errors import SceneError
@@ -103,7 +103,7 @@ def asked(solution: Answer, expect: Expect) -> Any:
     return _value(solution, _entry_of(solution, expect), expect)
 
 
-def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | Instant:
+def _entry_of(solution: Answer, expect: Expect) -> Equilibrium | MotionState:
     """The answer that an expectation speaks of."""
     if isinstance(solution, Path):
         return _entry_on_path(solution, expect)
@@ -132,7 +132,7 @@ def _numbered(entries: Sequence[Equilibrium], number: int, key: str) -> Equilibr
     return entries[number - 1]
 
 
-def _value(solution: Answer, entry: Equilibrium | Instant, expect: Expect) -> Any:
+def _value(solution: Answer, entry: Equilibrium | MotionState, expect: Expect) -> Any:
     """What the answer says; of modes as of equilibria."""
     name = answer_name(expect.quantity)
     if name.kind.table == "modes" and solution.scene.analysis.type == "modes":

@@ -10,7 +10,7 @@ import numpy as np
 from .checks import Answer, Check
 from .description.answers import answer_name
 from .description.records import counted
-from .dynamics.motion import Instant, Trajectory
+from .dynamics.motion import MotionState, Trajectory
 from .equilibria.solution import Equilibrium
 from .mathematics.arrays import first_of_largest
 from .mechanics.model import Model
@@ -90,7 +90,7 @@ def _report_motion(motion: Trajectory) -> None:
         print(f"  note: {note}")
 
 
-def _report_instant(instant: Instant) -> None:
+def _report_instant(instant: MotionState) -> None:
     print(f"at {instant.time:.9g} s")
     for name in instant.model.nodes[:MOST_NODES]:
         position, velocity = _vector(instant.position(name)), _vector(instant.velocity(name))

@@ -179,7 +179,7 @@ def test_files_hold_the_answers(tmp_path, table):
     save_vtk(answer, tmp_path)
     times, files = collected(tmp_path)
     moving = "velocities" in dir(answer)
-    steps = [answer.posture(p) for p in answer.points] if "points" in dir(answer) else answer.steps
+    steps = [answer.configuration(p) for p in answer.points] if "points" in dir(answer) else answer.steps
     np.testing.assert_allclose(times, answer.times if moving else np.arange(len(steps)))
     for step, file in zip(steps, files, strict=True):
         tree, found = read(file)

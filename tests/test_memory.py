@@ -11,7 +11,7 @@ from scenes import cantilever
 from sfetcas import Prepared, Scene, solve
 from sfetcas.mathematics import kernels
 from sfetcas.mathematics.keeping import kept
-from sfetcas.solvers.deflation import unheld
+from sfetcas.solvers.between_states import unheld
 
 
 def test_an_answer_ends_with_all_that_was_made_for_it():

@@ -20,7 +20,8 @@ from sfetcas.equilibria.several import Search, search
 from sfetcas.equilibria.single import cold
 from sfetcas.equilibria.statics import Settings
 from sfetcas.mathematics import quaternion
-from sfetcas.solvers.deflation import deflated, turned_between, unheld
+from sfetcas.solvers.between_states import turned_between, unheld
+from sfetcas.solvers.deflation import deflated
 from sfetcas.solvers.prepared import Prepared
 
 FIRST_LOAD = 0.25 * math.pi**2

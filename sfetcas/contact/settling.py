@@ -19,9 +19,9 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch, breaks_of
 from ..mechanics.model import Model
-from ..solvers.dragging import Drag
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
+from ..solvers.pseudo_transient import Drag
 from .touches import Touched
 
 __all__ = [
@@ -93,7 +93,7 @@ class Held:
 class Way:
     """A point of a way: the loading of a model there, and how far obstacles have stepped back, m.
 
-    With ``drag`` rotations since the state ``since`` are resisted, see :mod:`~sfetcas.solvers.dragging`.
+    With ``drag`` rotations since the state ``since`` are resisted, see :mod:`~sfetcas.solvers.pseudo_transient`.
     """
 
     loading: Callable[[Model], Loading]

@@ -27,7 +27,7 @@ from ..stopping import noted
 from .beginning import at_rest
 from .index_one import LINEAR, IndexOne
 from .inertialess import check_inertia
-from .integrators import Begun, Course, Integrator
+from .integrators import InitialState, Integrator, TimeGrid
 from .projecting import closed, of_unit_length, shortest
 from .sampling import Sample
 
@@ -99,7 +99,7 @@ class _Piece:
 class Idas(Integrator):
     """CasADi's interface to IDAS."""
 
-    def samples(self, begun: Begun, course: Course) -> Iterator[Sample]:
+    def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
         """States as IDAS has them, projected."""
         pieces = self._pieces(course)
         degree = max(len(terms) for piece in pieces for terms in piece.terms) - 1
@@ -133,7 +133,7 @@ class Idas(Integrator):
                     yield sample
                 self.told(t)
 
-    def _pieces(self, course: Course) -> list[_Piece]:
+    def _pieces(self, course: TimeGrid) -> list[_Piece]:
         """Pieces up to the end."""
         unit, times, same = self.system.masses.time, course.times, tolerances.DECIMAL * course.end
         inside = {t / unit for history in self.system.histories if history is not None for t in history.t}
@@ -164,7 +164,7 @@ class Idas(Integrator):
 class _Solver:
     """IDAS for any fractions of a piece at which answers are wanted."""
 
-    def __init__(self, one: IndexOne, course: Course) -> None:
+    def __init__(self, one: IndexOne, course: TimeGrid) -> None:
         self._one, self.steps = one, 0
         self._made: dict[tuple[float, ...], ca.Function] = {}
         tolerance = OF_STEP * FINER**course.rounds * course.accuracy

@@ -17,11 +17,11 @@ from .methods import Method
 from .sampling import Sample, Sampler
 from .stages import StageEquations
 
-__all__ = ["Begun", "Course", "Integrator", "Stages"]
+__all__ = ["InitialState", "Integrator", "Stages", "TimeGrid"]
 
 
 @dataclass(frozen=True, eq=False)
-class Begun:
+class InitialState:
     """Where a motion begins, dimensionless.
 
     Attributes
@@ -40,7 +40,7 @@ class Begun:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TimeGrid:
     """What is asked for; times are dimensionless.
 
     Attributes
@@ -97,7 +97,7 @@ class Integrator(abc.ABC):
         self.count, self.gap, self.norm = 0, 0.0, 0.0
 
     @abc.abstractmethod
-    def samples(self, begun: Begun, course: Course) -> Iterator[Sample]:
+    def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
         """States at the times of the answers, as soon as they are known.
 
         Raises
@@ -128,7 +128,7 @@ class Stages(Integrator):
         super().__init__(system, progress)
         self._stepper, self._sampler = Stepper(system, method), Sampler([], method.stages)
 
-    def samples(self, begun: Begun, course: Course) -> Iterator[Sample]:
+    def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
         """Polynomials through the stages."""
         stepper, method, state = self._stepper, self._stepper.method, begun.state
         rates = np.zeros((method.kept, len(begun.x)))
@@ -164,7 +164,7 @@ class Stages(Integrator):
         if q.shape[1] == 4:
             self.norm = max(self.norm, float(np.abs(np.einsum("ij,ij->i", q, q) - 1.0).max()))
 
-    def _tolerance(self, course: Course) -> float:
+    def _tolerance(self, course: TimeGrid) -> float:
         """Tolerance of steps, in the unit of length; each round has steps of about half the length."""
         order, stages = self._stepper.method.order, self._stepper.method.stages
         of_step = stages + 1 if stages > 1 else 3

@@ -197,11 +197,11 @@ def find_modes(scene: Scene, settings: Settings) -> Modes:
     SolveError
         Its equilibrium, or the frequencies, could not be found.
     """
-    return _Run(scene, settings).modes()
+    return ModalAnalysis(scene, settings).modes()
 
 
-class _Run:
-    """One run: the equilibrium, then finer and finer meshes."""
+class ModalAnalysis:
+    """A modal analysis: the equilibrium, then finer and finer meshes."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
         if settings.gauss:

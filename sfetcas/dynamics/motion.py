@@ -11,7 +11,7 @@ import numpy as np
 
 from ..description.answers import MOTION
 from ..description.records import plain
-from ..equilibria.solution import Posture, heading
+from ..equilibria.solution import Configuration, heading
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.balance import three
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .inertia import Inertia
     from .sampling import Sample
 
-__all__ = ["Instant", "Mover", "Trajectory"]
+__all__ = ["MotionState", "Mover", "Trajectory"]
 
 
 class Mover:
@@ -34,7 +34,7 @@ class Mover:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
 
-    def instant(self, sample: Sample) -> Instant:
+    def instant(self, sample: Sample) -> MotionState:
         """A sample by name."""
         model, equations = self.model, self.equations
         loading = self.inertia.system.loading(self.factors(sample.t))
@@ -44,7 +44,7 @@ class Mover:
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
         state = State(sample.q, sample.y, self._multipliers(free, balanced), sample.near)
         kinetic = self.inertia.kinetic(sample.v)
-        return Instant(
+        return MotionState(
             factor=sample.t * self.time,
             model=model,
             state=state,
@@ -69,7 +69,7 @@ class Mover:
 
 
 @dataclass(frozen=True, eq=False)
-class Instant(Posture):
+class MotionState(Configuration):
     """The state of a motion at a time; section forces and reactions are those with inertia and damping.
 
     Attributes
@@ -104,7 +104,7 @@ class Instant(Posture):
         return found
 
     def along(self, member: str, at: Any) -> dict[str, Array]:
-        """As of :meth:`Posture.along`; also ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
+        """As of :meth:`Configuration.along`; also ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
 
         Not of small members, whose inside is not followed in time.
         """
@@ -134,7 +134,7 @@ class Instant(Posture):
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As of :meth:`Posture.table`; also energies and momenta."""
+        """As of :meth:`Configuration.table`; also energies and momenta."""
         if kind == "momentum":
             return dict(self.momentum)
         return self.energy if kind == "energy" else super().table(kind, name)
@@ -157,7 +157,7 @@ class Trajectory:
     Attributes
     ----------
     status : Status
-    steps : tuple of Instant
+    steps : tuple of MotionState
         One for each time of the answer.
     seconds : mapping
         Time spent on the model, on building and on compiling the step, and on solving.
@@ -176,7 +176,7 @@ class Trajectory:
 
     scene: Any = field(repr=False)
     status: Status
-    steps: tuple[Instant, ...] = field(repr=False)
+    steps: tuple[MotionState, ...] = field(repr=False)
     seconds: Mapping[str, float]
     integrator: str
     count: int
@@ -187,7 +187,7 @@ class Trajectory:
     failure: str = ""
 
     @property
-    def last(self) -> Instant:
+    def last(self) -> MotionState:
         """The state at the last time."""
         return self.steps[-1]
 
@@ -196,7 +196,7 @@ class Trajectory:
         """Times of the answer, s."""
         return np.array([step.time for step in self.steps])
 
-    def at(self, time: float) -> Instant:
+    def at(self, time: float) -> MotionState:
         """The instant of the answer nearest to a time."""
         return self.steps[int(np.abs(self.times - time).argmin())]
 

@@ -30,9 +30,9 @@ from .conserving import Conserving
 from .idas import Idas
 from .inertia import Inertia
 from .inertialess import check_resisted
-from .integrators import Begun, Course, Integrator, Stages
+from .integrators import InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
-from .motion import Instant, Mover, Trajectory
+from .motion import MotionState, Mover, Trajectory
 from .stages import StageEquations
 from .watching import Watch, finer
 
@@ -91,10 +91,10 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 
 
 @dataclass
-class _Run:
+class MeshRun:
     """What one run on one mesh gave."""
 
-    instants: list[Instant]
+    instants: list[MotionState]
     count: int
     gap: float
     norm: float
@@ -150,7 +150,7 @@ class Simulation:
 
     # -- one run ----------------------------------------------------------------------------------------
 
-    def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> _Run:
+    def run(self, mesh: Mesh, rounds: int, before: int | None = None) -> MeshRun:
         """The motion on a mesh, after so many coarser runs, the last of which took so many steps."""
         begin = time.perf_counter()
         model = assemble(self.scene, mesh, assembly="nodal")
@@ -169,7 +169,7 @@ class Simulation:
         beyond = min((t for t in self._kinks if t >= analysis.duration), default=np.inf)
         watch = None if analysis.until is None else Watch(analysis.until, mover)
         times = self.times if watch is None else finer(self.times)
-        course = Course(
+        course = TimeGrid(
             times=times / masses.time,
             breaks=self._breaks(masses.time),
             beyond=beyond / masses.time,
@@ -178,7 +178,7 @@ class Simulation:
             size=self.scene.size / model.scales.length,
             step=None if analysis.step is None else max(analysis.step / masses.time, SHORTEST),
         )
-        run = _Run([], 0, 0.0, 0.0, notes, {})
+        run = MeshRun([], 0, 0.0, 0.0, notes, {})
         solving = time.perf_counter()
         try:
             for sample in integrator.samples(begun, course):
@@ -202,12 +202,12 @@ class Simulation:
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
-    def _refuse_large(self, instant: Instant) -> None:
+    def _refuse_large(self, instant: MotionState) -> None:
         told = instant.fields.too_large() if self.small else ""
         if told:
             raise SolveError(Status.BENT, f"at {instant.time:.6g} s: {told}")
 
-    def begun(self, system: StageEquations) -> tuple[Begun, tuple[str, ...]]:
+    def begun(self, system: StageEquations) -> tuple[InitialState, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it."""
         model = system.model
         state = at_rest(model)
@@ -219,7 +219,7 @@ class Simulation:
         loading = system.loading(factors)
         state = equations.holding(state, loading)
         rates, told = velocities(system, equations, state)
-        return Begun(state, rates, *system.rates(state, factors, rates)), (*notes, *told)
+        return InitialState(state, rates, *system.rates(state, factors, rates)), (*notes, *told)
 
     @property
     def before(self) -> Equilibrium:
@@ -265,7 +265,7 @@ class Simulation:
             run.notes = (*run.notes, SENSITIVE)
         return self._answer(run, error)
 
-    def _difference(self, coarse: _Run, fine: _Run) -> float:
+    def _difference(self, coarse: MeshRun, fine: MeshRun) -> float:
         """How far runs are apart: distances of nodes and middles of members, over the size of the scene."""
         if self.quantity is not None:
             return self._difference_of(self.quantity, coarse, fine)
@@ -291,7 +291,7 @@ class Simulation:
                 apart = max(apart, float(np.abs(moved).max()))
         return apart / scene.size
 
-    def _difference_of(self, quantity: Quantity, coarse: _Run, fine: _Run) -> float:
+    def _difference_of(self, quantity: Quantity, coarse: MeshRun, fine: MeshRun) -> float:
         """How far runs are apart in a quantity, over its largest value."""
         own: list[Array] = []
         apart = 0.0
@@ -305,14 +305,14 @@ class Simulation:
         return apart / quantity.unit(fine.instants[0], own)
 
     @staticmethod
-    def _arm(run: _Run, name: str) -> float:
+    def _arm(run: MeshRun, name: str) -> float:
         """Arm, m, on which all mass would have the rotary inertia of what turns like a node: what its angle counts."""
         mover = run.instants[0].mover
         system, turn = mover.inertia.system, mover.model.rotations.node_turn[name]
         shares = [np.abs(group.mass).sum() for group in system.masses.observables if turn in group.turns]
         return float(np.sqrt(sum(shares) / system.axes)) * mover.model.scales.length
 
-    def _answer(self, run: _Run, error: float | None) -> Trajectory:
+    def _answer(self, run: MeshRun, error: float | None) -> Trajectory:
         short = error is not None and not error <= self.accuracy and self.asked
         status = Status.SHORT if short else Status.SOLVED
         if run.failure is not None:
@@ -338,14 +338,14 @@ class Simulation:
             raise run.failure
         return motion
 
-    def _not_small(self, run: _Run) -> tuple[str, ...]:
+    def _not_small(self, run: MeshRun) -> tuple[str, ...]:
         """Notes of small members where they bend most beyond linear elasticity."""
         if not self.small:
             return ()
         worst = max(run.instants, key=lambda instant: max(map(instant.fields.bent, self.small)), default=None)
         return () if worst is None else tuple(f"at {worst.time:.6g} s {note}" for note in not_small(worst.fields))
 
-    def _unlikely(self, run: _Run) -> tuple[str, ...]:
+    def _unlikely(self, run: MeshRun) -> tuple[str, ...]:
         """Notes where a prescribed step, of which nothing estimates the error, is far too short or too long."""
         if self.scene.analysis.step is None or not run.instants:
             return ()
@@ -418,7 +418,7 @@ LOST = 0.05
 """Share of what moves that a total energy may change by without a note: Radau's methods damp waves by some percent."""
 
 
-def _resistance(system: StageEquations, begun: Begun) -> Array:
+def _resistance(system: StageEquations, begun: InitialState) -> Array:
     """Stiffness, masses and closings at the begin."""
     n, state = system.layout, begun.state
     q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)

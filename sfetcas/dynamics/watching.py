@@ -11,7 +11,7 @@ from ..description.task import Until
 from ..equilibria.quantities import value_of
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from .motion import Instant, Mover
+from .motion import MotionState, Mover
 from .sampling import between
 
 __all__ = ["Watch", "finer"]
@@ -26,7 +26,7 @@ class Watch:
         self._last: int | None = None
         self.ended = False
 
-    def passed(self, instants: Sequence[Instant]) -> bool:
+    def passed(self, instants: Sequence[MotionState]) -> bool:
         """Whether the quantity has passed its value, and enough is known beyond it to say when."""
         while len(self._values) < len(instants):
             self._values.append(self._excess(instants[len(self._values)]))
@@ -35,7 +35,7 @@ class Watch:
         self.ended = self._last is not None
         return self._last is not None and (self._last == 0 or len(self._values) > self._last + AROUND // 2)
 
-    def _excess(self, instant: Instant) -> float:
+    def _excess(self, instant: MotionState) -> float:
         """How far the quantity is beyond its value."""
         until = self._until
         try:
@@ -47,7 +47,7 @@ class Watch:
             raise error.within("analysis", "until", "quantity") from None
         return number - until.above if until.above is not None else float(until.below or 0.0) - number
 
-    def up_to_end(self, instants: list[Instant], times: Array) -> list[Instant]:
+    def up_to_end(self, instants: list[MotionState], times: Array) -> list[MotionState]:
         """The instants at the times of the answer, and that of the end where it was met."""
         wanted = [
             instant for instant in instants if np.isclose(instant.time, times, rtol=tolerances.DECIMAL, atol=0.0).any()
@@ -57,7 +57,7 @@ class Watch:
         end = self._end(instants)
         return [*(instant for instant in wanted if instant.time < end.time), end]
 
-    def told(self, instants: Sequence[Instant]) -> str:
+    def told(self, instants: Sequence[MotionState]) -> str:
         """How it ended, in words."""
         until = self._until
         beyond = f"above {until.above:g}" if until.above is not None else f"below {until.below:g}"
@@ -66,7 +66,7 @@ class Watch:
         when = "at its begin already" if self._last == 0 else f"at {instants[-1].time:.9g} s"
         return f"the motion ended {when}, as {until.quantity} was {beyond}"
 
-    def _end(self, instants: list[Instant]) -> Instant:
+    def _end(self, instants: list[MotionState]) -> MotionState:
         last = self._last
         assert last is not None
         if last == 0:

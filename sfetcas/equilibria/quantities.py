@@ -17,7 +17,7 @@ from ..description.records import nearest
 from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from .solution import Posture
+from .solution import Configuration
 
 __all__ = ["WHERE", "Quantity", "component_in", "entry_of", "value_of"]
 
@@ -25,7 +25,7 @@ WHERE = ("analysis", "accuracy_of")
 """Where a scene names what the accuracy is of."""
 
 
-def value_of(step: Posture, name: str | AnswerName, at: float | None = None) -> Any:
+def value_of(step: Configuration, name: str | AnswerName, at: float | None = None) -> Any:
     """A quantity by its name in the answer, as ``nodes.B.position`` or ``members.beam.moment at 0.5``.
 
     Parameters
@@ -116,7 +116,7 @@ class Quantity:
         """The name with its place."""
         return self.name.text
 
-    def value(self, step: Posture) -> Array:
+    def value(self, step: Configuration) -> Array:
         """What an answer says, as numbers, (n,).
 
         Raises
@@ -138,7 +138,7 @@ class Quantity:
         """Whether it is of the order of positions."""
         return self.name.kind.key == "position"
 
-    def unit(self, step: Posture, values: Iterable[Array]) -> float:
+    def unit(self, step: Configuration, values: Iterable[Array]) -> float:
         """What differences are relative to.
 
         Lengths count over the size of the scene, rotations in rad, all else over itself, along members over the
@@ -165,7 +165,7 @@ class Quantity:
             largest.append(float(np.linalg.norm(along.reshape(len(along), -1), axis=1).max()))
         return max(largest)
 
-    def difference(self, one: Posture, other: Posture) -> float:
+    def difference(self, one: Configuration, other: Configuration) -> float:
         """How far it is apart in two answers, see :meth:`unit`; infinite where one has more numbers than the other."""
         a, b = self.value(one), self.value(other)
         if a.shape != b.shape:

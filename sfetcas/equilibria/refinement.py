@@ -17,8 +17,8 @@ from ..mechanics.equations import State
 from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
+from ..solvers.constraints import in_words, moves_nodes
 from ..solvers.deflation import deflated
-from ..solvers.doctor import in_words, moves_nodes
 from ..solvers.newton import LEAST_SCALE, Corrected, loose_rows, named_in, relative_residual, stretched
 from ..solvers.prepared import BEYOND, Prepared
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches

@@ -23,8 +23,9 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
+from ..solvers.between_states import turned_between, unheld
 from ..solvers.continuation import follow
-from ..solvers.deflation import deflated, turned_between, unheld
+from ..solvers.deflation import deflated
 from ..solvers.guess import restore
 from ..solvers.newton import Corrected, descend
 from ..solvers.prepared import Prepared

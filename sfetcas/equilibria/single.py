@@ -9,8 +9,8 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.loading import Loading
+from ..solvers.constraints import contradiction
 from ..solvers.continuation import follow
-from ..solvers.doctor import contradiction
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.stability import Stability

@@ -24,8 +24,8 @@ from ..solvers.stability import Stability
 
 __all__ = [
     "Certificate",
+    "Configuration",
     "Equilibrium",
-    "Posture",
     "Solution",
     "at_factor",
     "equilibrium",
@@ -81,7 +81,7 @@ class Certificate:
 
 
 @dataclass(frozen=True, eq=False)
-class Posture:
+class Configuration:
     """A state of a model by name: positions, section forces, reactions.
 
     Attributes
@@ -234,7 +234,7 @@ class Posture:
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium(Posture):
+class Equilibrium(Configuration):
     """One equilibrium, made by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
 
     Attributes
@@ -263,7 +263,7 @@ class Equilibrium(Posture):
         return {"elastic": elastic, "loads": total - elastic, "total": total}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As of :meth:`Posture.table`; also energies and the certificate."""
+        """As of :meth:`Configuration.table`; also energies and the certificate."""
         if kind == "certificate":
             return self.certificate.to_dict()
         if kind == "energy":

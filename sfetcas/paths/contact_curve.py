@@ -20,8 +20,8 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.arclength import Curve, Standing, Tangent
+from ..solvers.between_states import turned_between
 from ..solvers.critical import root
-from ..solvers.deflation import turned_between
 from ..solvers.newton import Corrected, relative_residual
 from ..solvers.prepared import Prepared
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibria.solution import Equilibrium, Posture, heading
+from ..equilibria.solution import Configuration, Equilibrium, heading
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
@@ -208,10 +208,10 @@ class Path:
         """Everything by name at a point."""
         return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
 
-    def posture(self, point: PathPoint) -> Posture:
+    def configuration(self, point: PathPoint) -> Configuration:
         """The same as of an equilibrium, but for what certifies it."""
         fields = self.fields(point)
-        return Posture(point.factor, fields.model, point.state, point.loading, fields)
+        return Configuration(point.factor, fields.model, point.state, point.loading, fields)
 
     def positions(self, node: str, branch: int = 0) -> Array:
         """Positions of a node along the path or a branch, (points, 3) m."""

@@ -86,7 +86,7 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     if scene.contacts:
         return follow_in_contact(scene, replace(settings or Settings(), **changes))
     settings = replace(settings or Settings(), **changes)
-    path = _Run(scene, settings).path()
+    path = PathTracing(scene, settings).path()
     return with_modes(path, settings) if scene.analysis.count_of_modes else path
 
 
@@ -122,7 +122,7 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         raise SceneError(f"bifurcation: found {bifurcation}, accepted: 1 to {count}, those of the path")
     if side not in (1, -1):
         raise SceneError(f"side: found {side}, accepted: 1 or -1")
-    run = _Run(path.scene, Settings())
+    run = PathTracing(path.scene, Settings())
     curve = Curve(path.prepared, path.unit)
     number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
     event = _event_at(curve, path, number)
@@ -172,7 +172,7 @@ class _Level:
         return sum(len(part.traced.points) for part in self.stretches) * self.curve.equations.unknowns
 
 
-class _Run:
+class PathTracing:
     """One path with its branches, on finer and finer meshes."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:

@@ -31,8 +31,8 @@ from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh, breaks_of
 from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
+from ..solvers.between_states import turned_between
 from ..solvers.critical import ONE_EVENT, sought
-from ..solvers.deflation import turned_between
 from ..solvers.newton import Corrected, relative_residual
 from ..solvers.prepared import Prepared
 from .path import FLUTTER, NO_POTENTIAL, Branch, FlutterPoint, Path, PathPoint

@@ -16,7 +16,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from ..description.scene import Scene
 from ..dynamics.motion import Trajectory
-from ..equilibria.solution import Posture, Solution
+from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
 from ..mathematics.arrays import Array, Index
 from ..paths.path import Path
@@ -73,10 +73,10 @@ def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike
     check_animation(answer.scene, file)
     if isinstance(answer, Trajectory):
         chosen, rate, pace = _paced(answer.times)
-        steps: list[Posture] = [answer.steps[i] for i in chosen]
+        steps: list[Configuration] = [answer.steps[i] for i in chosen]
         texts = [f"{text}{pace}" for text in _times(answer, chosen)]
     else:
-        every = [answer.posture(p) for p in answer.points] if isinstance(answer, Path) else list(answer.steps)
+        every = [answer.configuration(p) for p in answer.points] if isinstance(answer, Path) else list(answer.steps)
         numbers = np.unique(np.linspace(0, len(every) - 1, min(MOST_FRAMES, len(every))).round().astype(int))
         steps, rate = [every[i] for i in numbers], round(float(np.clip(len(numbers) / LASTS, 2.0, FASTEST)))
         texts = [f"factor {in_short(step.factor)}" for step in steps]
@@ -132,7 +132,7 @@ def _times(motion: Trajectory, chosen: Index) -> list[str]:
 class _Film:
     """A figure whose structure is put where it is at one of the steps; ``gravity``: so many times it is drawn."""
 
-    def __init__(self, steps: Sequence[Posture], title: str, *, gravity: float) -> None:
+    def __init__(self, steps: Sequence[Configuration], title: str, *, gravity: float) -> None:
         self._steps, self._scene = steps, steps[-1].model.scene
         course = course_of(self._scene, steps, "none")
         self._course, self._lines = course, [*course.earlier, course.last]

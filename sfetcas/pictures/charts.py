@@ -226,9 +226,9 @@ def _draw_dot(axes: Axes, shape: _Shape, quantity: _Quantity, path: Path) -> Non
 def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     """The shapes over the undeformed one, with what holds them as at the end of the path."""
     points = [*(path.branches[shape.branch].points[shape.index] for shape in shapes), path.points[-1]]
-    course = course_of(path.scene, [path.posture(point) for point in points], "none")
+    course = course_of(path.scene, [path.configuration(point) for point in points], "none")
     view = view_of(path.model.space, [course.everything])
-    sketch = Sketch(path.scene, path.posture(path.points[-1]), course, view)
+    sketch = Sketch(path.scene, path.configuration(path.points[-1]), course, view)
     sketch_holds(sketch)
     assert isinstance(paper.figure, Figure)
     axes = axes_on(paper.figure, paper, sketch)

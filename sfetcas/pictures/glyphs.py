@@ -19,7 +19,7 @@ from ..description.sections import evaluate
 from ..description.springs import Spring
 from ..description.structure import SLIDING, Node, unit
 from ..description.supports import turned_about
-from ..equilibria.solution import Posture
+from ..equilibria.solution import Configuration
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
@@ -87,7 +87,7 @@ def sketch_holds(sketch: Sketch) -> None:
         sketch_stops(sketch, name, spring)
 
 
-def _factor(step: Posture, history: str | None) -> float:
+def _factor(step: Configuration, history: str | None) -> float:
     return step.factor if history is None else step.model.scene.histories[history].factor(step.factor)
 
 

@@ -19,7 +19,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
 from ..description.records import nearest
-from ..dynamics.motion import Instant, Trajectory
+from ..dynamics.motion import MotionState, Trajectory
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .files import DPI, check_ending, save_figure
@@ -205,7 +205,7 @@ def _legend(sketch: Sketch, *, undeformed: bool) -> Iterator[Line2D]:
         yield Line2D([], [], color=WAY, linewidth=0.9, label="way of a node")
 
 
-def _chosen(motion: Trajectory) -> list[Instant]:
+def _chosen(motion: Trajectory) -> list[MotionState]:
     """Answers evenly over the time."""
     wanted = np.linspace(motion.times[0], motion.times[-1], STROBES)
     return [motion.steps[i] for i in np.unique(np.abs(motion.times - wanted[:, None]).argmin(axis=1))]

@@ -12,8 +12,8 @@ from pathlib import Path as File
 import numpy as np
 from pyevtk.vtk import VtkFile, VtkGroup, VtkPolyLine, VtkUnstructuredGrid
 
-from ..dynamics.motion import Instant, Trajectory
-from ..equilibria.solution import Posture, Solution
+from ..dynamics.motion import MotionState, Trajectory
+from ..equilibria.solution import Configuration, Solution
 from ..mathematics.arrays import Array
 from ..paths.path import Path
 
@@ -41,16 +41,16 @@ def save_vtk(answer: Solution | Path | Trajectory, folder: str | os.PathLike[str
     group.save()
 
 
-def _timed(answer: Solution | Path | Trajectory) -> Iterator[tuple[float, Posture]]:
+def _timed(answer: Solution | Path | Trajectory) -> Iterator[tuple[float, Configuration]]:
     if isinstance(answer, Trajectory):
         yield from ((step.time, step) for step in answer.steps)
     elif isinstance(answer, Path):
-        yield from ((float(i), answer.posture(point)) for i, point in enumerate(answer.points))
+        yield from ((float(i), answer.configuration(point)) for i, point in enumerate(answer.points))
     else:
         yield from ((float(i), step) for i, step in enumerate(answer.steps))
 
 
-def _write(name: str, step: Posture) -> None:
+def _write(name: str, step: Configuration) -> None:
     lines = [_line(step, member) for member in step.model.scene.members]
     points = {key: np.concatenate([line[key] for line in lines]) for key in lines[0]}
     places = points.pop("position")
@@ -61,7 +61,7 @@ def _write(name: str, step: Posture) -> None:
         "types": np.full(len(lines), VtkPolyLine.tid, dtype="uint8"),
     }
     of_cells = {"member": np.arange(len(lines), dtype="int32")}
-    of_all = {} if isinstance(step, Instant) else {"factor": np.array([step.factor])}
+    of_all = {} if isinstance(step, MotionState) else {"factor": np.array([step.factor])}
     file = VtkFile(name, VtkUnstructuredGrid)
     file.openGrid()
     # Of the whole grid: it stands before its piece.
@@ -90,17 +90,17 @@ def _declare(file: VtkFile, table: dict[str, Array]) -> None:
         file.addHeader(name, values.dtype.name, len(values), 1 if values.ndim == 1 else values.shape[1])
 
 
-def _line(step: Posture, member: str) -> dict[str, Array]:
+def _line(step: Configuration, member: str) -> dict[str, Array]:
     """What is told along a member, each (n,) or (n, components)."""
     s = np.unique(np.concatenate([PLACES, step.model.along(member)]))
     found = step.along(member, s)
     table = {"s": s, **{key: found[key] for key in ("position", "quaternion", "force", "moment", "curvature")}}
-    if isinstance(step, Instant):
+    if isinstance(step, MotionState):
         table["velocity"] = found["velocity"] if "velocity" in found else _velocities(step, member, s)
     return {key: np.ascontiguousarray(values, dtype=float) for key, values in table.items()}
 
 
-def _velocities(step: Instant, member: str, s: Array) -> Array:
+def _velocities(step: MotionState, member: str, s: Array) -> Array:
     """Velocities (n, 3) along a small member, linear between its ends."""
     nodes = step.model.scene.members[member].nodes
     ends = np.array([step.velocity(nodes[0]), step.velocity(nodes[-1])])

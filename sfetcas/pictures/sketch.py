@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..description.scene import Scene
-from ..equilibria.solution import Posture
+from ..equilibria.solution import Configuration
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 
@@ -110,7 +110,7 @@ class Course:
         return np.vstack([*self.rest, *self.last, *(line for lines in self.earlier for line in lines)])
 
 
-def course_of(scene: Scene, steps: Sequence[Posture], colour: str) -> Course:
+def course_of(scene: Scene, steps: Sequence[Configuration], colour: str) -> Course:
     """Sampled centre lines of the undeformed scene and of equilibria, the last with values to colour by."""
     names = tuple(scene.members)
     last = {name: steps[-1].along(name, _samples(steps[-1], name)) for name in names}
@@ -126,7 +126,7 @@ def course_of(scene: Scene, steps: Sequence[Posture], colour: str) -> Course:
     return Course(unit, letter, names, scaled[0], scaled[1], scaled[2:], values)
 
 
-def _samples(step: Posture, member: str) -> Array:
+def _samples(step: Configuration, member: str) -> Array:
     """Fractions of the length where a member is drawn: at least 101, a step turning by 0.05 rad at most."""
     line = step.model.scene.center_lines[member]
     tangents = tangents_of(step, member, step.model.along(member))
@@ -135,13 +135,13 @@ def _samples(step: Posture, member: str) -> Array:
     return np.linspace(0.0, 1.0, 1 + min(20_000, max(100, math.ceil(max(turning, line.turning) / 0.05))))
 
 
-def tangents_of(step: Posture, member: str, x: Array) -> Array:
+def tangents_of(step: Configuration, member: str, x: Array) -> Array:
     """Unit tangents (n, 3) at fractions (n,) of the length of a deformed member, fixed axes."""
     rest = step.model.scene.center_lines[member].tangents(x)
     return quaternion.rotate(step.along(member, x)["quaternion"], rest)
 
 
-def _bending(step: Posture, member: str, fields: dict[str, Array], colour: str) -> Array:
+def _bending(step: Configuration, member: str, fields: dict[str, Array], colour: str) -> Array:
     """Bending moment (n,) in N m: about z with its sign, or the magnitude of what is across the tangent."""
     moment = fields["moment"]
     if not step.model.space:
@@ -151,7 +151,7 @@ def _bending(step: Posture, member: str, fields: dict[str, Array], colour: str) 
     return np.asarray(np.linalg.norm(moment - twist[:, None] * tangents, axis=1))
 
 
-def _noise(step: Posture, fields: Iterable[dict[str, Array]]) -> float:
+def _noise(step: Configuration, fields: Iterable[dict[str, Array]]) -> float:
     """Moments up to this many N m are rounding."""
     scales = step.model.scales
     largest = max(float(np.linalg.norm(field["force"], axis=1).max()) for field in fields)
@@ -258,7 +258,7 @@ class Sketch:
     """Marks and labels of one equilibrium, and what they must not hide."""
 
     scene: Scene
-    step: Posture
+    step: Configuration
     course: Course
     view: View
     marks: list[Mark] = field(default_factory=list)

@@ -1,1 +1,1 @@
-"""Solving the equations of one mesh: start, Newton, inertia, doctor, the program for IPOPT, curves of equilibria."""
+"""Solving the equations of one mesh: start, Newton, inertia, constraints, the program for IPOPT, curves."""

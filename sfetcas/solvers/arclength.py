@@ -22,7 +22,7 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Point, State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
-from .deflation import turned_between
+from .between_states import turned_between
 from .neutral import Neutral
 from .newton import loose_rows, met, redundant, relative_residual, rounded, with_sharing
 from .prepared import Prepared

@@ -114,8 +114,8 @@ def correct(
     flat : ndarray, optional
         Shapes of a flat energy, columns (turning unknowns, shapes): no step goes along them.
     drag : callable, optional
-        Adds couples that resist to the equations, see :mod:`~sfetcas.solvers.dragging`; the point that is returned
-        has none.
+        Adds couples that resist to the equations, see :class:`~sfetcas.solvers.pseudo_transient.Drag`; the point that
+        is returned has none.
     """
 
     def dragged(state: State) -> Point:

@@ -21,14 +21,14 @@ from ..mechanics.equations import Equations, Point, State
 from ..mechanics.expressions import Expressions
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
+from .constraints import Diagnosis, contradiction, diagnose, free_motions
 from .divergence import TangentTest
-from .doctor import Diagnosis, contradiction, diagnose, free_motions
-from .downhill import flow
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
 from .newton import Corrected, correct, loose_rows, stretched
 from .problem import EquilibriumProblem
 from .program import Program
+from .pseudo_transient import flow
 from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
 
@@ -84,7 +84,7 @@ class Prepared:
 
     @functools.cached_property
     def motions(self) -> Array:
-        """What the undeformed structure is free to do, see :func:`~sfetcas.solvers.doctor.free_motions`."""
+        """What the undeformed structure is free to do, see :func:`~sfetcas.solvers.constraints.free_motions`."""
         undeformed = self.equations.start(self.model.loading(0.0, 0.0))
         return free_motions(self.equations, self._test.weight, undeformed)
 

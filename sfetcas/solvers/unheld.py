@@ -19,7 +19,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
-from .doctor import free_motions, in_words
+from .constraints import free_motions, in_words
 from .prepared import Prepared
 
 __all__ = ["refuse_unheld"]

@@ -13,7 +13,7 @@ from ..description.scene import Scene
 from ..dynamics.modes import Modes
 from ..dynamics.motion import Trajectory
 from ..equilibria.quantities import Quantity
-from ..equilibria.solution import Equilibrium, Posture, Solution
+from ..equilibria.solution import Configuration, Equilibrium, Solution
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..paths.path import Path
@@ -108,13 +108,13 @@ def observe(scene: Scene, answer: Answer, quantity: Quantity | None = None) -> O
     return Observation(kind, rows, tuple(units), tuple(step.factor for step in answer.steps), energies)
 
 
-def _numbers(step: Posture, quantity: Quantity | None) -> Array:
+def _numbers(step: Configuration, quantity: Quantity | None) -> Array:
     if quantity is not None:
         return quantity.value(step)
     return np.concatenate(list(_positions(step)))
 
 
-def _positions(step: Posture) -> Iterator[Array]:
+def _positions(step: Configuration) -> Iterator[Array]:
     """Positions of nodes and along members, m, flat."""
     for node in step.model.nodes:
         yield step.position(node)

@@ -57,7 +57,7 @@ class ControlledSystem:
         Those whose rates make inertia and damping.
     time : float
         Unit of time, s.
-    begin : Begun
+    begin : InitialState
         Where the motion begins.
     """
 

@@ -18,7 +18,7 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..parametric.changing import changed
 from .replay import HALVINGS, Response, respond
-from .transcription import Course, Transcription
+from .transcription import GridMotion, Transcription
 
 if TYPE_CHECKING:
     from ..description.scene import Scene
@@ -128,7 +128,7 @@ class ControlledMotion:
         return self.transcription.value(expression, self.x)
 
     @functools.cached_property
-    def course(self) -> Course:
+    def course(self) -> GridMotion:
         """The motion on the grid, dimensionless: also where another search may begin."""
         return self.transcription.course(self.x)
 

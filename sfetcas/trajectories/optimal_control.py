@@ -25,7 +25,7 @@ from ..parametric.equilibrium import Place
 from .controlled import ControlledSystem
 from .controlled_motion import Check, ControlledMotion
 from .statement import MotionStatement, controls_of, variable_of
-from .transcription import Course, Transcription
+from .transcription import GridMotion, Transcription
 from .warm import at_rest, carried_over, restaged, rigid, straight
 
 __all__ = ["OptimalControl", "moving"]
@@ -214,7 +214,7 @@ class OptimalControl(Problem):
         solver = ipopt or Ipopt(1e-8, 150)
         solver = replace(solver, extra={**EXTRA, **solver.extra})
         names = [signal.name for signal in self.statement.signals.values() if signal.kind == "answer"]
-        run = _Run(self, solver, names)
+        run = Search(self, solver, names)
         course = run.begun(guess, time, values or {})
         found = run.solved(self.scene, course)
         if replay:
@@ -260,7 +260,7 @@ MOVED = 0.2
 
 
 @dataclass
-class _Run:
+class Search:
     """One search."""
 
     problem: OptimalControl
@@ -274,7 +274,7 @@ class _Run:
 
     # -- where it begins ----------------------------------------------------------------------------------
 
-    def begun(self, guess: Any, end: float | None, values: Mapping[str, ArrayLike]) -> Course:
+    def begun(self, guess: Any, end: float | None, values: Mapping[str, ArrayLike]) -> GridMotion:
         """A course on the mesh of the scene."""
         begin, problem = clock.perf_counter(), self.problem
         statement = problem.statement
@@ -296,7 +296,7 @@ class _Run:
             return rest
         return straight(statement, problem._system(problem.scene, self.names, problem._mesh), rest)
 
-    def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> Course | None:
+    def _rigid(self, end: float, values: Mapping[str, ArrayLike]) -> GridMotion | None:
         """The motion of the rigid scene, if it has one; where all is rigid, where its search would begin."""
         problem, statement = self.problem, self.problem.statement
         try:
@@ -319,7 +319,7 @@ class _Run:
 
     # -- rounds -------------------------------------------------------------------------------------------
 
-    def solved(self, scene: Scene, course: Course) -> ControlledMotion:
+    def solved(self, scene: Scene, course: GridMotion) -> ControlledMotion:
         """The answer, made again about itself until it stands."""
         problem = self.problem
         system = problem._system(scene, self.names, problem._mesh)
@@ -338,7 +338,7 @@ class _Run:
         return found
 
     def _searched(
-        self, statement: MotionStatement, system: ControlledSystem, course: Course
+        self, statement: MotionStatement, system: ControlledSystem, course: GridMotion
     ) -> tuple[Transcription, NLP, NLPResult]:
         """One program about a course, solved."""
         begin = clock.perf_counter()
@@ -357,7 +357,7 @@ class _Run:
         self.seconds["solve"] += clock.perf_counter() - built
         return transcription, nlp, result
 
-    def _by_fewer_stages(self, system: ControlledSystem, course: Course) -> Course | None:
+    def _by_fewer_stages(self, system: ControlledSystem, course: GridMotion) -> GridMotion | None:
         """The motion of two stages in an interval, which is found more easily, at the stages that are asked for."""
         statement = self.problem.statement
         coarse = copy.copy(statement)
@@ -368,7 +368,7 @@ class _Run:
         self.notes.append("the search began again with the motion of two stages in an interval")
         return restaged(statement, system, transcription.course(result.x), 2)
 
-    def _stands(self, transcription: Transcription, after: Course) -> bool:
+    def _stands(self, transcription: Transcription, after: GridMotion) -> bool:
         """Whether rotations are near what they are counted from, and the end is where its shapes are known."""
         turning = transcription.system.system.equations.turning_unknowns
         turned = float(np.abs(after.d[:, :turning]).max(initial=0.0))

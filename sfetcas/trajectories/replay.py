@@ -17,7 +17,7 @@ from .. import tolerances
 from ..description.loads import History
 from ..description.records import plain, unknown
 from ..description.scene import Scene, check_scene
-from ..dynamics.motion import Instant, Trajectory
+from ..dynamics.motion import MotionState, Trajectory
 from ..dynamics.simulation import Simulation
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
@@ -46,7 +46,7 @@ class Response:
         s
     places : mapping of str to ndarray (times, 3)
         Positions of the nodes, m, extrapolated from two lengths of the steps.
-    instants : tuple of Instant
+    instants : tuple of MotionState
         The states at these times, of the shorter steps.
     end : float
         When the command ends, s.
@@ -58,7 +58,7 @@ class Response:
 
     times: Array
     places: Mapping[str, Array] = field(repr=False)
-    instants: tuple[Instant, ...] = field(repr=False)
+    instants: tuple[MotionState, ...] = field(repr=False)
     end: float
     error_estimate: float
     count: int

@@ -27,11 +27,11 @@ from ..mathematics.relations import Relation
 from .controlled import ControlledSystem
 from .statement import MotionStatement, Signal
 
-__all__ = ["Course", "Transcription"]
+__all__ = ["GridMotion", "Transcription"]
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class GridMotion:
     """A motion on the grid of a transcription: a guess, or what became of one.
 
     Attributes
@@ -66,10 +66,10 @@ class Transcription:
     ----------
     statement : MotionStatement
     system : ControlledSystem
-    guess : Course
+    guess : GridMotion
     """
 
-    def __init__(self, statement: MotionStatement, system: ControlledSystem, guess: Course) -> None:
+    def __init__(self, statement: MotionStatement, system: ControlledSystem, guess: GridMotion) -> None:
         self.statement, self.system, self.guess = statement, system, guess
         self.places = RADAU[statement.stages]
         self.intervals, self.stages = len(statement.shares), statement.stages
@@ -449,13 +449,13 @@ class Transcription:
 
     # -- answers ------------------------------------------------------------------------------------------
 
-    def course(self, x: Array) -> Course:
+    def course(self, x: Array) -> GridMotion:
         """The motion of an answer ``x`` of the program."""
         value, n = self.pieces.value, self.intervals * self.stages
         d = value(self.d, x).reshape(n, -1)
         q, near = self.rotations(d, x)
         controls = [value(block, x) for block in self.controls]
-        return Course(
+        return GridMotion(
             end=float(value(self.end, x)[0]),
             q=q,
             d=d,

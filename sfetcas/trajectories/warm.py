@@ -21,7 +21,7 @@ from ..mathematics.pieces import Pieces
 from ..mechanics.expressions import moved_by
 from .controlled import ControlledSystem
 from .statement import MotionStatement
-from .transcription import Course
+from .transcription import GridMotion
 
 __all__ = ["at_rest", "carried_over", "restaged", "rigid", "straight"]
 
@@ -44,7 +44,7 @@ def rigid(scene: Scene) -> Scene | None:
 
 def at_rest(
     statement: MotionStatement, system: ControlledSystem, end: float, controls: Mapping[str, ArrayLike]
-) -> Course:
+) -> GridMotion:
     """The scene as it begins, at all times.
 
     Parameters
@@ -73,7 +73,7 @@ def at_rest(
     rest = defaults[len(statement.controls) :]
     variables = [float(np.ravel(controls.get(v.name, x))[0]) for v, x in zip(statement.variables, rest, strict=True)]
     still = np.zeros((n, system.quantities))
-    return Course(
+    return GridMotion(
         end=end,
         q=np.tile(begin.state.q, (n, 1, 1)),
         d=np.tile(system.start, (n, 1)),
@@ -86,7 +86,7 @@ def at_rest(
     )
 
 
-def straight(statement: MotionStatement, system: ControlledSystem, start: Course) -> Course:
+def straight(statement: MotionStatement, system: ControlledSystem, start: GridMotion) -> GridMotion:
     """A motion that turns evenly from the begin to a shape that meets what is asked of answers at the end.
 
     It is the shape nearest to the begin, and obeys joints and closings only; without one, or where nothing is asked,
@@ -138,7 +138,7 @@ def _end_shape(statement: MotionStatement, system: ControlledSystem) -> Array | 
     return pieces.value(d, result.x)[:turning] if result.status is Status.SOLVED else None
 
 
-def _still(statement: MotionStatement, system: ControlledSystem, start: Course, q: Array) -> Course:
+def _still(statement: MotionStatement, system: ControlledSystem, start: GridMotion, q: Array) -> GridMotion:
     """A motion through rotations (stages, rotations, components), with controls and variables of a start."""
     near = np.tile(system.begin.state.wound, (len(q), 1))
     y, x = _placed(system, q, near, _numbers(statement, start))
@@ -147,12 +147,12 @@ def _still(statement: MotionStatement, system: ControlledSystem, start: Course, 
     d[:, equations.turning_unknowns : equations.unknowns] = y
     v = _rates(statement, start.end / system.time, x, system.begin.x)
     a = _rates(statement, start.end / system.time, v, system.begin.v)
-    return Course(start.end, q, d, x, v, a, near, start.controls, start.variables)
+    return GridMotion(start.end, q, d, x, v, a, near, start.controls, start.variables)
 
 
 def carried_over(
-    statement: MotionStatement, stiff: ControlledSystem, course: Course, system: ControlledSystem
-) -> Course:
+    statement: MotionStatement, stiff: ControlledSystem, course: GridMotion, system: ControlledSystem
+) -> GridMotion:
     """The motion of the rigid scene as one of the flexible scene, whose members stay as they were made."""
     source = _sources(stiff, system)
     q = np.stack(
@@ -165,7 +165,7 @@ def carried_over(
     return _still(statement, system, course, q)
 
 
-def restaged(statement: MotionStatement, system: ControlledSystem, course: Course, stages: int) -> Course:
+def restaged(statement: MotionStatement, system: ControlledSystem, course: GridMotion, stages: int) -> GridMotion:
     """A motion told at so many stages of each interval, at the stages of the statement instead."""
     n, begin = len(statement.shares), system.begin
     old, new = np.append(0.0, RADAU[stages]), RADAU[statement.stages]
@@ -187,7 +187,7 @@ def restaged(statement: MotionStatement, system: ControlledSystem, course: Cours
     v = _rates(statement, course.end / system.time, x, begin.x)
     a = _rates(statement, course.end / system.time, v, begin.v)
     near = moved(course.near, begin.state.wound)
-    return Course(course.end, q, d, x, v, a, near, course.controls, course.variables)
+    return GridMotion(course.end, q, d, x, v, a, near, course.controls, course.variables)
 
 
 def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
@@ -208,7 +208,7 @@ def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
     return source
 
 
-def _numbers(statement: MotionStatement, course: Course) -> Array:
+def _numbers(statement: MotionStatement, course: GridMotion) -> Array:
     """Controls and variables at all stages, (stages, numbers)."""
     places, n = RADAU[statement.stages], len(statement.shares)
     if statement.order:

@@ -1,22 +1,28 @@
-"""Downhill where there is an energy whose value is not at hand: under even pressure, and under moments about hinges.
+"""Pseudo-transient continuation: downhill along the gradient flow of the energy, in steps or towards a state.
 
+:func:`flow` goes downhill where there is an energy whose value is not at hand: under even pressure, and under moments
+about hinges.
 Gradient flow ``M dx/dt = -F(x)`` leads from beside an unstable equilibrium to a stable one, whatever lies between.
 Its implicit steps ``(K + s M) dx = -F`` need the equations and their derivative only; with ``s`` beyond the lowest
 eigenvalue below zero every step points to where the energy falls, and where there is none they are Newton's.
+
+With :class:`Drag` a step minimises the energy plus half of ``drag * M`` times the square of the rotations since the
+state before, so that a structure which falls goes down the way that drag lets it, whatever stops it there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
+from .between_states import turned_between
 from .newton import newton_step
 
-__all__ = ["flow"]
+__all__ = ["Drag", "flow"]
 
 LONGEST = 0.3
 """No node turns by more than this in a step, rad: the flow is not to jump over what lies in its way."""
@@ -75,3 +81,30 @@ def flow(
         if deep == 0.0 and length < ARRIVED and (age == 1 or depth(point, deep) == 0.0):
             return state, count
     return None, MOST
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Couples that resist rotations since a state.
+
+    Attributes
+    ----------
+    equations : Equations
+    since : State
+    size : float
+        Couple by rotation and by the weight of :attr:`Equations.mass`, in units of the model.
+    """
+
+    equations: Equations
+    since: State
+    size: float
+
+    def __call__(self, state: State, point: Point) -> Point:
+        """The point of the equations with drag."""
+        equations, n = self.equations, self.equations.turning_unknowns
+        couples = self.size * equations.mass * turned_between(equations, state, self.since)
+        residual, entries, scale = point.residual.copy(), point.entries.copy(), point.scale.copy()
+        residual[:n] += couples
+        scale[:n] += abs(couples)
+        entries[equations.diagonal[:n]] += self.size * equations.mass
+        return replace(point, residual=residual, entries=entries, scale=scale)
