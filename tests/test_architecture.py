@@ -85,6 +85,7 @@ ORDER = [
     "mechanics.model",
     "mechanics.tables",
     "mechanics.batches",
+    "mechanics.reactions",
     "mechanics.equations",
     "mechanics.expressions",
     "mechanics.stationarity",
