@@ -87,6 +87,7 @@ ORDER = [
     "mechanics.model",
     "mechanics.tables",
     "mechanics.batches",
+    "mechanics.reactions",
     "mechanics.equations",
     "mechanics.expressions",
     "mechanics.stationarity",

@@ -374,3 +374,58 @@ def test_where_there_is_no_equilibrium_there_are_no_numbers():
     with pytest.raises(SolveError, match=r"at motions\.d\.displacement\.0 = 0\.5") as error:
         equilibrium.solve({"motions.d.displacement.0": 0.5}, equilibrium.solve())
     assert error.value.last.residual > 1e-6
+
+
+# -- supports that share a rigid body --------------------------------------------------------------------------------
+
+
+def held_twice(space, value=0.7):
+    """A rigid body on two guides that hold moments together, loaded at a node, within a member, and by an arm."""
+    turns = {"rotation": "hinge", "axis": [0, 1, 0]} if space else {}
+
+    def vector(x, y, z):
+        return [x, y, z] if space else [x, y]
+
+    def moment(x, y, z):
+        return [x, y, z] if space else z
+
+    table = {
+        "dimension": "space" if space else "plane",
+        "sections": {"s": {"EI3": 2.0, "EI2": 3.0, "GJ": 1.5}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "slider", "direction": [1, 0, 0], **turns},
+            "B": {"position": [2, 0], "support": "slider", "direction": [0, 1, 0], **turns},
+            "C": {"position": [1, 0]},
+            "E": {"position": [1, 0.5]},
+        },
+        "members": {
+            "r1": {"nodes": ["A", "C"], "type": "rigid"},
+            "r2": {"nodes": ["C", "B"], "type": "rigid"},
+            "arm": {"nodes": ["C", "E"], "section": "s"},
+        },
+        "loads": {
+            "f": {"type": "force", "node": "E", "value": vector(0.3, value, -0.2)},
+            "g": {"type": "force", "member": "r1", "at": 0.5, "value": vector(0.1, 0.3, 0.2)},
+            "m": {"type": "moment", "node": "C", "value": moment(0.2, 0.4, 0.1)},
+            "n": {"type": "moment", "member": "r2", "at": 0.5, "value": moment(0.1, -0.05, 0.25)},
+        },
+        "analysis": {"accuracy": 1e-9},
+    }
+    if space:
+        table["springs"] = {"k": {"type": "rotational", "node": "A", "stiffness": 3.0}}
+    return Scene.from_dict(table)
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_supports_of_one_rigid_body_share_its_moment(space):
+    """As of the answer, where the smallest of all that balance are looked for state by state; and by differences."""
+    names = [f"reactions.{node}.{key}" for node in "AB" for key in ("force", "moment")]
+    found = parametric(held_twice(space), ["loads.f.value.1"], names).solve({"loads.f.value.1": 0.7})
+    h = 1e-3
+    before, here, after = (solve(held_twice(space, x)).last for x in (0.7 - h, 0.7, 0.7 + h))
+    for name in names:
+        _, node, key = name.split(".")
+        one, value, other = (step.reaction(node)[key == "moment"] for step in (before, here, after))
+        np.testing.assert_allclose(found[name], value, atol=1e-8)
+        np.testing.assert_allclose(found.jacobian[name]["loads.f.value.1"], (other - one) / (2 * h), atol=1e-6)
+    assert np.abs(found["reactions.B.moment"][2]) > 0.1

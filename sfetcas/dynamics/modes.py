@@ -352,7 +352,7 @@ def carried(equations: Equations, state: State, loading: Loading) -> State:
     state = equations.holding(state, loading)
     if len(positions.rows):
         gaps = equations.at(state, loading).residual[unknowns : unknowns + len(positions.rows)]
-        state = replace(state, y=state.y + smallest(positions.W, -gaps, np.ones(len(state.y))))
+        state = replace(state, y=state.y + smallest(positions.W, -gaps, np.ones(len(state.y)))[0])
     state = replace(state, lam=np.zeros(equations.rows))
     point = equations.at(state, loading)
     entries = point.entries.copy()

@@ -287,11 +287,11 @@ ENTRY = 5e-16
 """Rounding of an entry, relative to itself."""
 
 
-def smallest(rows: SparseMap, right: Array, weights: Array) -> Array:
-    """Solution x (columns,) of ``rows @ x = right`` with the smallest sum of ``weights * x**2``.
+def smallest(rows: SparseMap, right: Array, weights: Array) -> tuple[Array, Array]:
+    """Solution x (columns,) of ``rows @ x = right`` with the smallest sum of ``weights * x**2``, and its multipliers.
 
     Rows may depend on each other if their right sides do so too.  They are taken as slightly soft, which a few rounds
-    of multipliers take back (augmented Lagrangian).
+    of multipliers (rows,) take back (augmented Lagrangian): ``weights * x + rows.T @ multipliers`` is zero.
     """
     m, n = rows.shape
     places = np.concatenate([np.arange(n + m), rows.column, n + rows.row])
@@ -307,7 +307,7 @@ def smallest(rows: SparseMap, right: Array, weights: Array) -> Array:
         x, multipliers = x + step[:n], multipliers + step[n:]
         if np.abs(missing).max(initial=0.0) <= SOLVED * np.abs(right).max(initial=0.0):
             break
-    return x
+    return x, multipliers
 
 
 YIELDING = 1e-3

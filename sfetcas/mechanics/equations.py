@@ -24,6 +24,7 @@ from .batches import GroupBatch, at_rest
 from .load_terms import present
 from .loading import Loading
 from .model import Model
+from .reactions import Reactions
 from .rotations import Turn
 from .tables import Tables
 from .terms import Group, by_turning
@@ -321,22 +322,19 @@ class Equations:
         gained = (turned_tangents(self.model, state.q) - self.model.beams.tangent).sum(axis=1)
         return self.displacements(state, loading, gained)[0]
 
-    def shares(self, state: State, loading: Loading) -> tuple[Array, list[Array]]:
-        """What elements and connections take from their surroundings at a state, dimensionless.
+    def shares(self, state: State, loading: Loading) -> list[Array]:
+        """What terms take from their surroundings at a state, dimensionless.
 
-        Returns
-        -------
-        moments : ndarray (elements, p + 1, 3)
-            Moments about the fixed axes on the nodes of the elements.
-        links : list of ndarray (n, width)
-            For each group of connections moments on its rotations, then forces on its places; none of loads.
+        Of each group moments on its rotations, then forces on its places, (n, width); none of loads.
         """
-        moments, *links = (part[3].copy() for part in self._evaluated(state, self.acting(state, loading)).groups)
-        turns = self.model.element.turns
-        three = np.zeros((len(moments), len(self.model.element.nodes), 3))
-        three[:, :, 3 - turns :] = moments.reshape(*three.shape[:2], turns)
-        loads = [group.kind.is_load for group in self.model.connections]
-        return three, [np.zeros_like(part) if load else part for part, load in zip(links, loads, strict=True)]
+        found = self._evaluated(state, self.acting(state, loading)).groups
+        pairs = zip(found, self.model.terms, strict=True)
+        return [np.zeros_like(part[3]) if group.kind.is_load else part[3].copy() for part, group in pairs]
+
+    @functools.cached_property
+    def reactions(self) -> Reactions:
+        """What the ground exerts, by what terms take."""
+        return Reactions(self.tables)
 
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
         """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""

@@ -55,12 +55,7 @@ class Fields:
     @functools.cached_property
     def balance(self) -> Balance:
         """The balance of the nodes."""
-        parts, loading = self.model.segments.parts, self._loading
-        starts = [self._start_forces(part.elements) for part in parts]
-        last = [loading.spread[part.elements][-1].sum(axis=0) for part in parts]
-        ends = [force[-1] - spread for force, spread in zip(starts, last, strict=True)]
-        starts = [force[0] for force in starts]
-        return Balance(self._equations, self.state, self._applied, starts, ends, self._nodal)
+        return Balance(self._equations, self.state, self._applied, self._nodal)
 
     # -- nodes ----------------------------------------------------------------------------------
 

@@ -19,15 +19,14 @@ from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import constant, times
-from ..mechanics.balance import guide, pinned_turns
 from ..mechanics.connections import connections_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.model import Model
-from ..mechanics.rotations import Turn
+from ..mechanics.reactions import Reactions
 from ..mechanics.singles import fibre_strain, turned_vector
 from ..mechanics.stationarity import Stationarity
 from ..mechanics.stations import Stations
-from ..mechanics.terms import GROUND, answers_of
+from ..mechanics.terms import answers_of
 from ..solvers.program import Program
 
 __all__ = ["Result", "Results", "default_motion_results", "default_results"]
@@ -75,9 +74,7 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
             names.append(f"nodes.{name}.{rotation}")
     for name, node in model.scene.nodes.items():
         if node.support != "free" and unique:
-            names.append(f"reactions.{name}.force")
-            if _moment_known(model, name):
-                names.append(f"reactions.{name}.moment")
+            names += [f"reactions.{name}.force", f"reactions.{name}.moment"]
     for name, member in model.scene.members.items():
         if member.type == "flexible":
             fields = ("position", rotation, "force", "moment") if unique else ("position", rotation)
@@ -100,16 +97,6 @@ TRAVELS = ("angle", "travel")
 """How springs are told of in motions."""
 
 
-def _moment_known(model: Model, node: str) -> bool:
-    """Whether what the ground does to turn a node is told by one rotation: no other held node shares it."""
-    number = model.rotations.node_turn[node]
-    if number is None:
-        return True
-    nodes = model.scene.nodes
-    held = [n for n, turn in model.rotations.node_turn.items() if turn == number and nodes[n].turn not in FREE]
-    return held in ([], [node])
-
-
 WHOSE = {
     "nodes": "of the node",
     "reactions": "that the ground exerts at the node",
@@ -122,9 +109,6 @@ WHOSE = {
 
 BY_FORCES = ("force", "moment", "curvature", "bending_strain", "bending_stress")
 """Keys of what section forces say along a member."""
-
-FREE = ("free", "ball")
-"""How a support may leave a node to turn."""
 
 
 class Results:
@@ -213,10 +197,6 @@ class Results:
             motion = scene.motions[node]
             if name.component is not None and single_number(motion, kind.key):
                 raise SceneError(f"found {name.bare!r}, which is one number here, accepted: {name.quantity}")
-            node = motion.node if motion.between is None else ""
-        held = kind.table in ("reactions", "motions") and kind.key == "moment" and node in scene.nodes
-        if held and not _moment_known(self.model, node):
-            raise SceneError("other supports of the same rigid body share it, accepted: reactions alone in it")
 
     # -- what they are ------------------------------------------------------------------------------
 
@@ -348,6 +328,10 @@ class _Told:
     def _three(self, vectors: ca.MX) -> ca.MX:
         return vectors if self._model.space else ca.vertcat(vectors, ca.MX.zeros(1, vectors.shape[1]))
 
+    def _about(self, moments: ca.MX) -> ca.MX:
+        """Moments about the axes that turn with three components."""
+        return ca.vertcat(ca.MX.zeros(3 - moments.shape[0], moments.shape[1]), moments)
+
     def _node(self, node: str, key: str) -> ca.MX:
         number = self._model.nodes.index(node)
         if key == "velocity":
@@ -369,46 +353,31 @@ class _Told:
 
     # -- reactions ----------------------------------------------------------------------------------
 
-    def _shares(self, *, moments: bool) -> ca.MX:
-        """What is not in balance in full coordinates, on what the ground holds; universal supports are ground."""
-        expressions, found = self._expressions, self._found
-        total = ca.densify(ca.vertcat(ca.MX(expressions.of_places, 1), found.on_places))
-        for group, (sides, values) in zip(self._model.terms, found.shares, strict=True):
-            ground = group.kind.supports & (group.turns == GROUND).any(axis=1) & moments
-            cells = np.where(ground[:, None], -1, sides).ravel()
-            used = np.flatnonzero(cells >= 0)
-            onto = ca.DM(ca.Sparsity.triplet(expressions.of_rows, len(cells), cells[used].tolist(), used.tolist()), 1.0)
-            total += times(onto, ca.vec(values))
-        return total
+    @functools.cached_property
+    def _reactions(self) -> Reactions:
+        return Reactions(self._expressions.tables)
+
+    @functools.cached_property
+    def _cells(self) -> ca.MX:
+        """What all terms take, loads among them."""
+        return ca.vertcat(*(ca.vec(values) for _, values in self._found.shares))
 
     def _reaction(self, node: str, key: str) -> ca.MX:
-        model, expressions = self._model, self._expressions
-        positions = model.positions
+        model, reactions, closings = self._model, self._reactions, len(self._model.positions.rows)
+        left, first = times(constant(reactions.left), self._cells), self._expressions.of_places
         if key == "force":
-            on_places = self._shares(moments=False)[expressions.of_places :]
-            lam = self._lam[: len(positions.rows), :]
-            # By displacements of what the ground holds; what hangs on it by its members follows.
-            force = times(constant(positions.B).T, on_places) + times(constant(positions.BZ).T, lam)
-            place = model.segments.place(node)
-            found = self._three(ca.reshape(force, expressions.axes, expressions.places)[:, place])
-            along = guide(model.scene, node)
-            # A guide does nothing along itself.
-            found -= 0.0 if along is None else ca.dot(ca.DM(along), found) * ca.DM(along)
-            return found.T * model.scales.force
-        turns = expressions.turns
-        moments = ca.reshape(self._shares(moments=True)[: expressions.of_places], turns, -1)
-        moments = moments if model.space else ca.vertcat(ca.MX.zeros(2, moments.shape[1]), moments)
-        number = model.rotations.node_turn[node]
-        if number is None:
-            return sum((moments[:, turn] for turn in pinned_turns(model, node)), ca.MX.zeros(3)).T * model.scales.moment
-        found = moments[:, number]
-        kind = model.rotations.kind[number]
-        if kind == Turn.AXIS:
-            axis = ca.DM(model.rotations.axis[number])
-            found -= ca.dot(axis, found) * axis
-        if kind == Turn.FREE and model.scene.nodes[node].support != "universal":
-            found = ca.MX.zeros(3)
-        return found.T * model.scales.moment
+            on_places = left[first:] + self._found.on_places
+            forces = times(constant(reactions.forces), ca.vertcat(on_places, self._lam[:closings, :]))
+            force = ca.reshape(forces, self._expressions.axes, -1)[:, model.segments.place(node)]
+            return ca.mtimes(ca.DM(reactions.pushed(node)), self._three(force)).T * model.scales.force
+        if reactions.shared(node):
+            cells = ca.vertcat(self._cells, ca.MX(reactions.rigid.known.shape[1] - reactions.cells, 1))
+            known = ("node", node) in reactions.rigid.unknowns
+            found = times(constant(reactions.rigid.share(node)), cells) if known else ca.MX.zeros(3)
+            return self._about(found).T * model.scales.moment
+        moments = self._about(ca.reshape(left[:first], self._expressions.turns, -1))
+        parts = (ca.mtimes(ca.DM(held), moments[:, turn]) for turn, held in reactions.turned(node))
+        return sum(parts, ca.MX.zeros(3)).T * model.scales.moment
 
     def _motion(self, name: str, key: str) -> ca.MX:
         """What makes a motion: the multiplier of a driven joint, or what the ground does, also about an axis alone."""
@@ -519,7 +488,7 @@ class _Told:
         else:
             crossed = self._tangents[0, :] * pull[1, :] - self._tangents[1, :] * pull[0, :]
         gained = self._points(crossed, member, self._within(member, at.gained)) - own
-        return gained if model.space else ca.vertcat(ca.MX.zeros(2, gained.shape[1]), gained)
+        return self._about(gained)
 
     # -- springs ------------------------------------------------------------------------------------
 
