@@ -57,18 +57,15 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     if not len(change.value):
         return np.zeros(0)
     equations = prepared.equations
-    entries = start.point.entries.copy()
-    turning = equations.turning_unknowns
-    entries[equations.diagonal[:turning]] += tolerances.PROXIMAL * prepared.weight
-    entries[equations.diagonal[equations.unknowns : equations.total]] -= tolerances.DUAL
-    equations.solver.factor(entries)
+    primal = tolerances.PROXIMAL * prepared.weight
+    equations.solver.factor(equations.regularised(start.point.entries, primal, tolerances.DUAL))
 
     def apply(block: Array) -> Array:
         return np.asarray(equations.solver.solve(-(change @ block)))
 
     inverse, _ = largest(apply, equations.total, BOTH_SIDES * count)
     sizes = np.abs(inverse)
-    turned = float(np.abs(start.tangent.z[:turning]).max(initial=0.0)) / abs(start.tangent.factor)
+    turned = float(np.abs(start.tangent.z[: equations.turning_unknowns]).max(initial=0.0)) / abs(start.tangent.factor)
     told = sizes > FAR * max(turned, sizes.max(initial=0.0))
     real = inverse[(np.abs(inverse.imag) <= REAL * sizes) & told].real
     factors = 1.0 / real

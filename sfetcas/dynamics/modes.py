@@ -355,10 +355,7 @@ def carried(equations: Equations, state: State, loading: Loading) -> State:
         state = replace(state, y=state.y + smallest(positions.W, -gaps, np.ones(len(state.y)))[0])
     state = replace(state, lam=np.zeros(equations.rows))
     point = equations.at(state, loading)
-    entries = point.entries.copy()
-    entries[(equations.row < unknowns) & (equations.column < unknowns)] = 0.0
-    entries[equations.diagonal[:unknowns]] = 1.0
-    entries[equations.diagonal[unknowns:]] = -tolerances.DUAL
+    entries = equations.regularised(equations.of_rows(point.entries), np.ones(unknowns), tolerances.DUAL)
     symmetric = equations.model.has_potential
     solver = SparseSolver(equations.total, equations.row, equations.column, equations.rows, symmetric=symmetric)
     solver.factor(entries)

@@ -17,12 +17,8 @@ ROUNDS = 8
 
 def factor_closings(equations: Equations, point: Point) -> None:
     """Factor ``[1 G^T; G 0]`` with the derivative G of the closings at a point."""
-    n = equations.unknowns
-    mixed = (equations.row >= n) != (equations.column >= n)
-    entries = np.where(mixed, point.entries, 0.0)
-    entries[equations.diagonal[:n]] = 1.0
-    entries[equations.diagonal[n:]] = -tolerances.DUAL
-    equations.solver.factor(entries)
+    entries = equations.of_rows(point.entries)
+    equations.solver.factor(equations.regularised(entries, np.ones(equations.unknowns), tolerances.DUAL))
 
 
 def shortest(equations: Equations, gaps: Array) -> Array:

@@ -388,6 +388,26 @@ class Equations:
         symmetric = self.model.has_potential
         return SparseSolver(self.total, self.row, self.column, self.rows, symmetric=symmetric)
 
+    def regularised(self, entries: Array, primal: Array, dual: float) -> Array:
+        """Entries of a matrix with a primal and a dual regularisation on its diagonal.
+
+        Parameters
+        ----------
+        entries : ndarray
+        primal : ndarray (n,)
+            Added for the first n unknowns, the turning ones or all.
+        dual : float
+            Subtracted for all rows.
+        """
+        found = entries.copy()
+        found[self.diagonal[: len(primal)]] += primal
+        found[self.diagonal[self.unknowns :]] -= dual
+        return found
+
+    def of_rows(self, entries: Array) -> Array:
+        """Of the entries of a matrix the derivatives of the rows, and zero in the place of all others."""
+        return np.where((self.row >= self.unknowns) != (self.column >= self.unknowns), entries, 0.0)
+
     def spins(self, step: Array) -> Array:
         """Rotation vectors (rotations, turns) about the fixed axes of a change of the unknowns."""
         tables = self.tables

@@ -130,7 +130,6 @@ class Curve:
         self.weight[:turning] = equations.mass * prepared.model.scales.length / lengths
         self.weight[equations.elastic_displacements] = LIGHT
         self._turning, self._proximal = turning, tolerances.PROXIMAL * prepared.weight
-        self._diagonal = equations.diagonal[:turning], equations.diagonal[equations.unknowns : equations.total]
         self._driven = any(np.any(group.turn) for group in self.model.groups.values())
         self._linear = set(self.model.groups) == {None}
         self._small = any(member.type == "small" for member in prepared.model.scene.members.values())
@@ -229,9 +228,7 @@ class Curve:
 
     def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
         """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
-        entries = point.entries.copy()
-        entries[self._diagonal[0]] += firm * self._proximal
-        entries[self._diagonal[1]] -= tolerances.DUAL
+        entries = self.equations.regularised(point.entries, firm * self._proximal, tolerances.DUAL)
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 

@@ -106,10 +106,7 @@ def free_motions(equations: Equations, weight: Array, state: State) -> Array:
     point = equations.at(state, equations.model.loading(0.0, 0.0))
     stiffness = point.entries
     metric = np.concatenate([weight, np.full(n - turning, float(weight.mean()) if turning else 1.0)])
-    shifted = stiffness.copy()
-    shifted[equations.diagonal[:n]] += 0.01 * SOFT * metric
-    shifted[equations.diagonal[n:]] -= 1e-11
-    equations.solver.factor(shifted)
+    equations.solver.factor(equations.regularised(stiffness, 0.01 * SOFT * metric, 1e-11))
     chosen = (equations.row < n) & (equations.column < n)
     row, column = equations.row[chosen], equations.column[chosen]
     count = min(4, n)
@@ -258,15 +255,11 @@ def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[Stat
     """A state with the smallest gaps near one, by Levenberg and Marquardt, and the largest slope of their square."""
     n, soft = equations.unknowns, 1e-2
     rows = (equations.row >= n) & (equations.column < n)
-    coupling = rows | ((equations.row < n) & (equations.column >= n))
     state = equations.holding(state, loading)
     point = equations.at(state, loading)
     for _ in range(DAMPED):
         gaps = point.residual[n:]
-        entries = np.where(coupling, point.entries, 0.0)
-        entries[equations.diagonal[:n]] = soft
-        entries[equations.diagonal[n:]] = -1.0
-        equations.solver.factor(entries)
+        equations.solver.factor(equations.regularised(equations.of_rows(point.entries), np.full(n, soft), 1.0))
         step = equations.solver.solve(np.concatenate([np.zeros(n), -gaps]))
         step[n:] = 0.0
         trial = equations.moved(state, step)

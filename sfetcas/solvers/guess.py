@@ -54,18 +54,15 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     n, rows = equations.unknowns, equations.rows
     if rows == 0:
         return state, 0.0
-    metric = equations.elastic_entries()
-    metric[equations.diagonal[: equations.turning_unknowns]] += 0.1 * weight
-    metric[equations.diagonal[equations.turning_unknowns : n]] += 1e-6
-    metric[equations.diagonal[n:]] -= 1e-9
-    coupling = (equations.row >= n) != (equations.column >= n)
+    primal = np.concatenate([0.1 * weight, np.full(n - equations.turning_unknowns, 1e-6)])
+    metric = equations.regularised(equations.elastic_entries(), primal, 1e-9)
     gap = np.inf
     for _ in range(60):
         point = equations.at(state, loading)
         gap = float(np.abs(point.residual[n:]).max())
         if gap < tolerances.CLOSED:
             break
-        equations.solver.factor(np.where(coupling, point.entries, metric))
+        equations.solver.factor(metric + equations.of_rows(point.entries))
         step = equations.solver.solve(np.concatenate([np.zeros(n), -point.residual[n:]]))
         step[n:] = 0.0
         length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
@@ -88,12 +85,9 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
         begun = nodal if begun is None else begun
         missing = targets[chosen] - nodal
         wanted = begun + min(1.0, (count + 1) / LEADING) * (targets[chosen] - begun) - nodal
-        entries = point.entries.copy()
-        entries[equations.diagonal[: equations.turning_unknowns]] += 1e-3 * weight
-        entries[equations.diagonal[equations.unknowns :]] -= 1e-9
         border = np.zeros((equations.total, len(chosen)))
         border[: equations.unknowns] = jacobian.T
-        equations.solver.factor(entries)
+        equations.solver.factor(equations.regularised(point.entries, 1e-3 * weight, 1e-9))
         base = equations.solver.solve(np.column_stack([-point.residual, border]))
         pull = np.linalg.solve(border.T @ base[:, 1:] + np.eye(len(chosen)) / SPRING, wanted - border.T @ base[:, 0])
         step = base[:, 0] + base[:, 1:] @ pull

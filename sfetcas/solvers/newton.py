@@ -68,12 +68,7 @@ LEAST_SCALE = 1e-14
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
     """The step of all unknowns and multipliers."""
-    entries = point.entries.copy()
-    n, total = equations.turning_unknowns, equations.total
-    diagonal = equations.diagonal
-    entries[diagonal[:n]] += tolerances.PROXIMAL * weight
-    entries[diagonal[equations.unknowns : total]] -= tolerances.DUAL
-    equations.solver.factor(entries)
+    equations.solver.factor(equations.regularised(point.entries, tolerances.PROXIMAL * weight, tolerances.DUAL))
     step = equations.solver.solve(-point.residual)
     if redundant(equations, point):
         # Of redundant closings only the softness above limits the multipliers: their loose part has no meaning.
@@ -351,11 +346,9 @@ def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, flo
 def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
     """The same for the smallest ones only, by inverse iteration with the sparse matrix of the rows."""
     n = equations.unknowns
-    entries = np.where((equations.row >= n) != (equations.column >= n), point.entries, 0.0)
+    entries = equations.of_rows(point.entries)
     largest = float(np.bincount(equations.row, weights=entries**2, minlength=equations.total)[n:].max())
-    entries[equations.diagonal[:n]] = 1.0
-    entries[equations.diagonal[n:]] -= TINY_SHARE * largest
-    equations.solver.factor(entries)
+    equations.solver.factor(equations.regularised(entries, np.ones(n), TINY_SHARE * largest))
     count = 8
     while True:
         block = np.random.default_rng(0).standard_normal((equations.total, min(count, equations.rows)))

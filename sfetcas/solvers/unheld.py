@@ -146,15 +146,12 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
 def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
     """The state without strain and gaps next to one, across what is free, by Newton steps without reactions."""
     equations = prepared.equations
-    n, turning = equations.unknowns, equations.turning_unknowns
+    n, weight = equations.unknowns, prepared.weight
+    # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
+    primal = SOFT * np.concatenate([weight, np.full(n - len(weight), float(weight.mean()))])
     for _ in range(CORRECTIONS):
         point = equations.at(state, unloaded)
-        entries = point.entries.copy()
-        # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
-        entries[equations.diagonal[:turning]] += SOFT * prepared.weight
-        entries[equations.diagonal[turning:n]] += SOFT * float(prepared.weight.mean())
-        entries[equations.diagonal[n:]] -= CLOSING
-        equations.solver.factor(entries)
+        equations.solver.factor(equations.regularised(point.entries, primal, CLOSING))
         step = equations.solver.solve(-point.residual)[:n]
         state = _moved(prepared, state, step)
         if np.abs(step).max(initial=0.0) < tolerances.CLOSED:
