@@ -208,7 +208,7 @@ class Balance:
         for n in filter(self._turns_freely, held):
             first, axis = 3 * columns["node", n], np.asarray(scene.nodes[n].turn_axis)
             rows.append(({first + k: part for k, part in enumerate(unit(axis))}, 0.0))
-        weights = np.repeat([INSIDE, 1.0], [3 * len(names), 3 * len(held)])
+        weights = np.repeat([INNER_WEIGHT, 1.0], [3 * len(names), 3 * len(held)])
         solved = _smallest(rows, weights).reshape(-1, 3)
         starts = {name: solved[i] for (kind, name), i in columns.items() if kind == "member"}
         return starts, {name: solved[i] for (kind, name), i in columns.items() if kind == "node"}
@@ -332,5 +332,5 @@ def _smallest(rows: Sequence[tuple[dict[int, float], float]], weights: Array) ->
     return smallest(matrix, np.array([right for _, right in rows]), weights)
 
 
-INSIDE = 1e-8
+INNER_WEIGHT = 1e-8
 """Weight of moments inside rigid members where reactions count 1: reactions are made small first."""

@@ -23,7 +23,7 @@ LEADING, SETTLING = 30, 10
 SPRING = 300.0
 """Stiffness of the springs that lead nodes, EI/L^3 of the scene: stiffer than beams, soft enough to yield."""
 
-NEAR = 0.3
+SHORT_STEP = 0.3
 """The same, rad, from a ``start`` that a user gave: the basin it lies in is not to be left."""
 
 BOW = 0.2
@@ -57,7 +57,7 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     metric = equations.elastic_entries()
     metric[equations.diagonal[: equations.turning_unknowns]] += 0.1 * weight
     metric[equations.diagonal[equations.turning_unknowns : n]] += 1e-6
-    metric[equations.diagonal[n:]] -= 1e-9
+    metric[equations.diagonal[n:]] -= tolerances.DUAL
     coupling = (equations.row >= n) != (equations.column >= n)
     gap = np.inf
     for _ in range(60):
@@ -90,7 +90,7 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
         wanted = begun + min(1.0, (count + 1) / LEADING) * (targets[chosen] - begun) - nodal
         entries = point.entries.copy()
         entries[equations.diagonal[: equations.turning_unknowns]] += 1e-3 * weight
-        entries[equations.diagonal[equations.unknowns :]] -= 1e-9
+        entries[equations.diagonal[equations.unknowns :]] -= tolerances.DUAL
         border = np.zeros((equations.total, len(chosen)))
         border[: equations.unknowns] = jacobian.T
         equations.solver.factor(entries)
@@ -120,7 +120,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle
     state, gap = restore(equations, state, loading, weight)
     if gap > tolerances.REACHED or not settle:
         return state, gap
-    return descend(equations, state, loading, weight, most=TURN if targets is None else NEAR), gap
+    return descend(equations, state, loading, weight, most=TURN if targets is None else SHORT_STEP), gap
 
 
 def _placed(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> State:

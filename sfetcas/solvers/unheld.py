@@ -30,7 +30,7 @@ STEP = 0.1
 ROUNDS = 400
 """States of a round at most: six turns of the fastest link."""
 
-CORRECTIONS, SOFT, CLOSING = 12, 1e-3, 1e-11
+CORRECTIONS, RESISTED = 12, 1e-3
 """Newton steps to a state of a round at most; what keeps their matrix regular, beside stiffness and closings."""
 
 FAR = (1.0, 1e6)
@@ -151,9 +151,9 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
         point = equations.at(state, unloaded)
         entries = point.entries.copy()
         # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
-        entries[equations.diagonal[:turning]] += SOFT * prepared.weight
-        entries[equations.diagonal[turning:n]] += SOFT * float(prepared.weight.mean())
-        entries[equations.diagonal[n:]] -= CLOSING
+        entries[equations.diagonal[:turning]] += RESISTED * prepared.weight
+        entries[equations.diagonal[turning:n]] += RESISTED * float(prepared.weight.mean())
+        entries[equations.diagonal[n:]] -= tolerances.DUAL
         equations.solver.factor(entries)
         step = equations.solver.solve(-point.residual)[:n]
         state = _moved(prepared, state, step)
