@@ -9,6 +9,7 @@ from systems import EVERY, SYSTEMS
 
 import sfetcas
 from benchmarks.scenes import large
+from sfetcas import tolerances
 from sfetcas.equilibria.statics import pilot_of, solve_model
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.model import assemble
@@ -321,13 +322,13 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
         monkeypatch.setattr(stability_module, "DENSE_WITH_TRAVEL", 10_000)
         dense = prepared._test.negative(point)
         entries = prepared._test._weighted(point)
-        limit = stability_module.NEUTRAL + stability_module.ENTRIES_BLUR * float(np.abs(entries).max())
+        limit = tolerances.NEUTRAL + stability_module.ENTRIES_BLUR * float(np.abs(entries).max())
         assert prepared._test._below_bordered(point, -limit) == dense
         counts.add(dense)
     assert max(counts) > 0
 
 
-@pytest.mark.parametrize("soft", stability_module.SOFTER)
+@pytest.mark.parametrize("soft", stability_module.SOFTER_BORDERS)
 @pytest.mark.parametrize("kind", ["all types", "lattice"])
 def test_bordered_count_of_nets_is_the_dense_count(kind, soft, monkeypatch):
     """With each softness, at the answer and far from it, where hundreds of eigenvalues are negative."""
@@ -335,8 +336,8 @@ def test_bordered_count_of_nets_is_the_dense_count(kind, soft, monkeypatch):
     equations, loading = prepared.equations, prepared.model.loading(1.0)
     found = prepared.correct(equations.start(loading), loading, iterations=30)
     assert found.converged
-    monkeypatch.setattr(stability_module, "SOFT", soft)
-    monkeypatch.setattr(stability_module, "SOFTER", (soft,))
+    monkeypatch.setattr(stability_module, "SOFT_BORDER", soft)
+    monkeypatch.setattr(stability_module, "SOFTER_BORDERS", (soft,))
     monkeypatch.setattr(StabilityTest, "_below_dense", None)  # the bordered matrix alone is meant
     counts = []
     for factor in (1.0, 100.0, -100.0, -1000.0):

@@ -131,6 +131,12 @@ def column():
     return told(cantilever((-5.0, 0.0)))
 
 
+def round_column():
+    """It buckles to all sides: one eigenvalue is zero."""
+    table = cantilever((-5.0, 0.0, 0.0), dimension="space")
+    return told(table)
+
+
 def damped():
     table = cantilever(analysis={"type": "modes", "modes": 3})
     del table["loads"]
@@ -152,6 +158,7 @@ CASES = {
     "RANK": (lambda: told(small_plane()), 1e10),
     "DUAL": (lambda: told(three_parallel_cranks(0.0, (1.0, 0.0, 0.0))), None),
     "PROXIMAL": (column, 1e10),
+    "NEUTRAL": (round_column, 1e3),
     "SOFT": (lambda: told(three_parallel_cranks(0.0, (1.0, 0.0, 0.0))), None),
     "CONVERGED": (rolled_up, None),
     "EXACT": (rolled_up, None),

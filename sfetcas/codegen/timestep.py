@@ -15,7 +15,7 @@ from ..dynamics.integrating import Memory, Stepper
 from ..dynamics.methods import Method
 from ..dynamics.simulation import INTEGRATORS, Simulation
 from ..dynamics.stages import StageEquations
-from ..dynamics.steps import CONVERGED, step_function
+from ..dynamics.steps import LAST_CHANGE, step_function
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
@@ -134,7 +134,7 @@ class TimeStep:
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         p = np.broadcast_to(p, (len(self.times), self.arguments.defaults.size))
         after, size, _, _ = (np.array(part).ravel() for part in self.advance(state, h, p.T))
-        good = size[0] <= CONVERGED and np.isfinite(after).all()
+        good = size[0] <= LAST_CHANGE and np.isfinite(after).all()
         return after if good else np.full(len(state), np.nan)
 
     def told(self, state: Array, arguments: Array | None = None) -> Array:

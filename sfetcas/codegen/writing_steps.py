@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 
 from ..description.records import counted
-from ..dynamics.steps import CONVERGED
+from ..dynamics.steps import LAST_CHANGE
 from ..mathematics.source import table
 from .rendering import Status, Writer, filled, row, rows, template
 from .timestep import TimeStep
@@ -108,7 +108,7 @@ class StepWriter(Writer):
     @property
     def tables(self) -> list[str]:
         """Where the motion begins, and when a step asks for arguments."""
-        converged = f"#define SF_CONVERGED {CONVERGED!r}\n"
+        converged = f"#define SF_CONVERGED {LAST_CHANGE!r}\n"
         return [converged, table("sf_begin", self.step.begin), table("sf_times", self.step.times)]
 
     @property

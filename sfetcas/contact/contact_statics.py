@@ -30,9 +30,6 @@ from .touching import Toucher
 
 __all__ = ["ContactRun", "Pressed"]
 
-WEAK = 1e-9
-"""Forces of obstacles below this share of the largest force hardly touch."""
-
 STAYS = "unstable, and no stable equilibrium was found along its escape shape"
 """A note."""
 
@@ -363,7 +360,7 @@ class ContactRun:
             notes.append(f"in contact: {_told(held)}; stability is that with these places held on their obstacles")
         pushes = {touch.name: float(np.linalg.norm(touched.force(touch))) for touch in touches}
         largest = max([held.prepared.model.scales.force, *pushes.values()])
-        weak = [name for name, push in pushes.items() if push < WEAK * largest]
+        weak = [name for name, push in pushes.items() if push < tolerances.BALANCED * largest]
         if weak:
             notes.append(f"touches without force: {', '.join(weak)}")
         return stability, notes

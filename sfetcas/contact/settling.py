@@ -39,7 +39,7 @@ __all__ = [
     "stretched",
 ]
 
-NEAR = 0.35
+MAKES_WAY = 0.35
 """Cuts nearer to a place of contact than this share of their element make way for it."""
 
 ONE_PLACE = 1e-7
@@ -125,7 +125,7 @@ def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
         keep = np.ones(len(old), bool)
         for x in places:
             e = int(np.clip(np.searchsorted(old, x) - 1, 0, len(old) - 2))
-            keep &= np.abs(old - x) > NEAR * (old[e + 1] - old[e])
+            keep &= np.abs(old - x) > MAKES_WAY * (old[e + 1] - old[e])
         keep |= np.isin(old, breaks)
         far = [x for x in places if np.abs(breaks - x).min() > ONE_PLACE]
         cuts[name] = np.unique(np.concatenate([old[keep], far]))

@@ -45,7 +45,7 @@ GRID, FINER = 33, 6
 FIRST_RISE, MOST_RISE = 0.05, 0.9
 """Shares of a stretch: how much of it rises where nothing tells, and at most."""
 
-NEAR = 0.2
+BEHIND_EDGE = 0.2
 """Share of the scene's size: a member that is further behind an edge is elsewhere, and not held up by it."""
 
 SAMPLES = 12
@@ -519,7 +519,7 @@ class Touched:
         found = []
         for x in self.passing(contact, member):
             gap = float(self.gaps(contact, member, np.array([x]), offset, way)[0])
-            if gap < -limit and abs(gap) < NEAR * self.model.scene.size:
+            if gap < -limit and abs(gap) < BEHIND_EDGE * self.model.scene.size:
                 found.append(Gap(contact, member, x, x, x, gap, way))
         return found
 
@@ -542,7 +542,7 @@ class Touched:
             if not sharp:
                 x = self._nearest(contact, member, x)
             gaps = self.gaps(contact, member, x, 0.0, way.get((contact, member), 1.0)) if len(x) else x
-            gaps = gaps[gaps > -NEAR * self.model.scene.size] if sharp else gaps
+            gaps = gaps[gaps > -BEHIND_EDGE * self.model.scene.size] if sharp else gaps
             if len(gaps):
                 found.append(float(gaps[np.argmin(np.abs(gaps))] if sharp else gaps.min()))
         return min(found)

@@ -27,7 +27,7 @@ __all__ = ["buckling_factors"]
 TURN = 0.01
 """Rotations, rad, over which matrices are differenced, by fourth order: 1e-8 is left out of what rotations do."""
 
-REAL = 1e-6
+IMAGINARY = 1e-6
 """Imaginary parts of inverse factors below this share are rounding."""
 
 FAR = 1e-7
@@ -67,7 +67,7 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     sizes = np.abs(inverse)
     turned = float(np.abs(start.tangent.z[: equations.turning_unknowns]).max(initial=0.0)) / abs(start.tangent.factor)
     told = sizes > FAR * max(turned, sizes.max(initial=0.0))
-    real = inverse[(np.abs(inverse.imag) <= REAL * sizes) & told].real
+    real = inverse[(np.abs(inverse.imag) <= IMAGINARY * sizes) & told].real
     factors = 1.0 / real
     return np.asarray(factors[np.lexsort((np.abs(factors), factors < 0.0))][:count])
 

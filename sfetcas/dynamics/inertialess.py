@@ -11,7 +11,7 @@ from ..mechanics.equations import Equations
 
 __all__ = ["check_inertia", "check_resisted"]
 
-SINGULAR = 1e-13
+SHIFT = 1e-13
 """Shift of an equilibrated matrix: what its entries have of rounding, or less."""
 
 PART = 1e-3
@@ -78,12 +78,12 @@ def _null(matrix: Array) -> Array | None:
     for _ in range(EQUILIBRATED):
         rows = np.abs(scale[:, None] * matrix * scale).max(axis=1, initial=0.0)
         scale /= np.sqrt(np.where(rows > 0.0, rows, 1.0))
-    shifted = scale[:, None] * matrix * scale + SINGULAR * np.eye(len(matrix))
+    shifted = scale[:, None] * matrix * scale + SHIFT * np.eye(len(matrix))
     # Inverse iteration, twice: a vector that is almost lost comes out as long as the shift is small.
     found = np.random.default_rng(0).standard_normal(len(matrix))
     for _ in range(2):
         found = np.array(ca.solve(ca.sparsify(ca.DM(shifted)), found / np.linalg.norm(found), "csparse")).ravel()
-    if np.linalg.norm(found) * SINGULAR < LOST:
+    if np.linalg.norm(found) * SHIFT < LOST:
         return None
     unscaled = np.abs(found) * scale
     return np.asarray(unscaled / unscaled.max())

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import tolerances
 from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.interpolation import differentiation, evaluation
@@ -14,7 +15,7 @@ from ..mathematics.kernels import Batch
 from ..mechanics.masses import Observables
 from .methods import Method, Radau
 from .stages import StageEquations
-from .steps import CONVERGED, step_function
+from .steps import LAST_CHANGE, step_function
 
 __all__ = ["Memory", "Stepper", "Taken", "integrate"]
 
@@ -97,7 +98,7 @@ class Taken:
     @property
     def converged(self) -> bool:
         """Whether Newton's method has."""
-        return self.size <= CONVERGED
+        return self.size <= LAST_CHANGE
 
 
 def _arms(group: Observables) -> Array:
@@ -284,7 +285,7 @@ class _Adaptive:
         """The steps."""
         span = end - memory.t
         h = min(span if self.h is None else self.h, span)
-        least = SMALLEST * span
+        least = tolerances.DECIMAL * span
         for taken in self._begun(memory, h, least):
             memory = taken.after
             yield taken
@@ -341,9 +342,6 @@ GROWTH = 2.0
 
 REJECTED = 2.0
 """Error over the tolerance from which a step is taken again."""
-
-SMALLEST = 1e-12
-"""Share of the time between two breaks below which steps do not get."""
 
 
 def _failed(stepper: Stepper, taken: Taken) -> SolveError:

@@ -30,7 +30,7 @@ from .conserving import Conserving
 from .idas import Idas
 from .inertia import Inertia
 from .inertialess import check_resisted
-from .integrators import InitialState, Integrator, Stages, TimeGrid
+from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
 from .motion import MotionState, Mover, Trajectory
 from .stages import StageEquations
@@ -353,7 +353,7 @@ class Simulation:
         unit = run.instants[0].mover.time
         if self.scene.analysis.step < SHORTEST * unit:
             return (f"{short}: steps of {SHORTEST * unit:.2g} s or the whole span are taken instead",)
-        if run.gap > ROUNDED:
+        if run.gap > DRIFTED:
             return (f"joints are off by {run.gap:.0e}: {short}",)
         kinetic, elastic, loads = np.array([instant.energies for instant in run.instants]).T
         total = kinetic + elastic + loads
@@ -405,13 +405,7 @@ def _keeps_energy(model: Model) -> bool:
     return not (given or taken or scene.rotating is not None or any(node.drag for node in scene.nodes.values()))
 
 
-SHORTEST = 5e-7
-"""Shortest step, in the unit of time: rounding of places over its square is a thousandth of what accelerates.
-
-It dies away from step to step then; of a tenth of this step it is much of what accelerates, and grows.
-"""
-
-ROUNDED = 1e-11
+DRIFTED = 1e-11
 """Closings off by more than this, over the unit of length: usual are 1e-15."""
 
 LOST = 0.05

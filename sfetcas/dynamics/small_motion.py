@@ -33,10 +33,10 @@ from .stages import StageEquations
 
 __all__ = ["Eigenmotions", "SmallMotion"]
 
-SOFT = 1e-14
+SOFT_ROWS = 1e-14
 """Softness of rows that may depend on each other, beside entries of the size of one."""
 
-PROXIMAL = 1e-13
+HELD_BY_NOTHING = 1e-13
 """Stiffness, over that of the rotation itself, of what neither mass nor stiffness holds, as a straight rod's spin."""
 
 RIGID = 3e-14
@@ -326,11 +326,11 @@ class SmallMotion:
         where, k, m, c = self._entries
         solver, diagonal = where
         entries = k + mass * m + damping * c
-        entries[diagonal[: self.unknowns]] += PROXIMAL * self.equations.noise[: self.unknowns]
+        entries[diagonal[: self.unknowns]] += HELD_BY_NOTHING * self.equations.noise[: self.unknowns]
         # Beside rows of the size of one: loads may make the stiffness as large as any number.
         self._size = float(np.abs(entries[self._inside]).max(initial=TINY))
         entries[self._inside] /= self._size
-        entries[diagonal[self.unknowns :]] -= SOFT
+        entries[diagonal[self.unknowns :]] -= SOFT_ROWS
         solver.factor(entries)
 
     def _solved(self, block: Array) -> Array:

@@ -74,7 +74,7 @@ class StageEquations(System):
         """
         stages = residual.shape[1]
         system = self._system(stages)
-        soft = [-SOFT / part for part in inertia]
+        soft = [-SOFT_CLOSINGS / part for part in inertia]
         matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *soft)))
         left = ca.vec(residual.T)
         # Entries differ by the square of the step: none is too small to divide by.
@@ -134,7 +134,7 @@ class StageEquations(System):
         return Pattern(found, sums, np.argsort(back).tolist(), back.tolist())
 
 
-SOFT = 1e-10
+SOFT_CLOSINGS = 1e-10
 """Softness of closings in the matrix over the inverse of what resists them, the whole mass being one."""
 
 

@@ -14,12 +14,12 @@ from ..mechanics.expressions import moved_by
 from .methods import Begin, Method
 from .stages import StageEquations
 
-__all__ = ["CONVERGED", "ITERATIONS", "step_function"]
+__all__ = ["ITERATIONS", "LAST_CHANGE", "step_function"]
 
 ITERATIONS = 10
 """Iterations of Newton's method at most."""
 
-CONVERGED = 1e-8
+LAST_CHANGE = 1e-8
 """Change, rad or lengths, below which it ends: convergence is quadratic, so the next one would be below rounding."""
 
 
@@ -30,8 +30,8 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
     iterations, gap)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
     quantities x and their rates (quantities, kept); of its stages turns (turns, rotations * stages) since its begin and
     shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a fresh start;
-    factors (groups, loaded) of the loads.  It has converged when ``size`` is at most :data:`CONVERGED`; ``gap`` is what
-    closings miss.
+    factors (groups, loaded) of the loads.  It has converged when ``size`` is at most :data:`LAST_CHANGE`; ``gap`` is
+    what closings miss.
     """
     n, s = system.layout, method.stages
     q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
@@ -93,7 +93,7 @@ def _newton(iteration: ca.Function, *, polished: bool) -> ca.Function:
     for level in range(ITERATIONS):
         q, y, lam, change = iteration(*symbols)
         # What has converged, or gone beyond all numbers, ends.
-        going = ca.logic_and(change > CONVERGED, change < LOST)
+        going = ca.logic_and(change > LAST_CHANGE, change < LOST)
         further = ca.Function.if_else(f"further_{level}", on, end)
         found = further(going, q, y, lam, *constants, change, count + 1)
         on = ca.Function(f"newton_{level}", arguments, list(found))

@@ -64,7 +64,7 @@ GRAZING = 1e-6
 BLURRED = 1e9
 """Slope over that of what is exact from which on rounding of angles is felt, and no scan is complete."""
 
-NEAR = 0.3
+FROM_THE_ROOT = 0.3
 """What Newton's method makes of a root is not further from it than this, rad."""
 
 
@@ -125,7 +125,7 @@ def scan(prepared: Prepared, loading: Loading, first: Corrected) -> Scan | None:
         if not there.converged:
             there = deflated(prepared, state, loading, ()) or there
         new = all(prepared.distance(there.state, other.state) > tolerances.SAME_STATE for other in found)
-        if new and there.converged and prepared.distance(there.state, state) < NEAR:
+        if new and there.converged and prepared.distance(there.state, state) < FROM_THE_ROOT:
             found.append(there)
     return Scan(prepared, found, len(roots), shooting.grazing)
 
@@ -173,7 +173,7 @@ class _Shooting:
             [a + (b - a) / n * np.arange(n) for a, b, n in zip(knots, knots[1:], count, strict=False)]
         )
         lengths = np.repeat(np.diff(knots) / count, count)
-        inside = begins[:, None] + lengths[:, None] * np.array([INSIDE, 0.5, 1.0 - INSIDE])
+        inside = begins[:, None] + lengths[:, None] * np.array([WITHIN, 0.5, 1.0 - WITHIN])
         told = fields.along(name, inside.ravel())["force"].reshape(*inside.shape, 3)
         tangents = line.tangents(inside.ravel()).reshape(*inside.shape, 3)
         rest, stiffness = np.arctan2(tangents[..., 1], tangents[..., 0]), section.stiffness(inside.ravel())[:, axis]
@@ -181,7 +181,7 @@ class _Shooting:
         pull = line.length * np.hypot(told[..., 0], told[..., 1]), np.arctan2(told[..., 1], told[..., 0])
         # Of the moment of a place the end of the step before it and the begin of the one after differ.
         jump = np.zeros(len(begins) + 1)
-        jump[np.searchsorted(begins, self.places[moments != 0.0] - 1e-12)] = moments[moments != 0.0]
+        jump[np.searchsorted(begins, self.places[moments != 0.0] - tolerances.DECIMAL)] = moments[moments != 0.0]
         self.at = np.append(begins, 1.0)
         if self.backwards:
             self.sign, order, self.at = -1.0, slice(None, None, -1), self.at[::-1]
@@ -316,7 +316,7 @@ class _Shooting:
         return found
 
 
-INSIDE = 1e-9
+WITHIN = 1e-9
 """Share of a step by which its ends are looked at from within."""
 
 

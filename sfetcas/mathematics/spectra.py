@@ -21,7 +21,7 @@ Operator = Callable[[Array], Array]
 Pick = Callable[[Array], tuple[Index, bool]]
 """Takes eigenvalues to the numbers of those that are meant, and whether these are enough."""
 
-CONVERGED = 1e-11
+EIGENPAIR = 1e-11
 """Residual of an eigenpair over its eigenvalue."""
 
 SYMMETRIC = 1e-8
@@ -75,7 +75,7 @@ def largest(
     """
     start = np.random.default_rng(0).standard_normal((size, min(size, max(LEAST_BLOCK, wanted))))
     space = _Space(size, inner)
-    block, limit = space.orthonormal(apply(start)), CONVERGED if inner is None else SYMMETRIC
+    block, limit = space.orthonormal(apply(start)), EIGENPAIR if inner is None else SYMMETRIC
     most = max(MOST, LEAST_BLOCKS * block.shape[1])
     course: list[float] = []
 

@@ -29,7 +29,7 @@ from .terms import GROUND
 
 __all__ = ["Reactions", "RigidBalance"]
 
-INSIDE = 1e-8
+INNER_WEIGHT = 1e-8
 """Weight of moments inside rigid members where reactions count 1: reactions are made small first."""
 
 FREE = ("free", "ball")
@@ -202,7 +202,7 @@ class Reactions:
         freely = [n for n in held if self._turns_freely(n)]
         blocks += hinged
         blocks += [({unknowns["node", n]: 1.0}, [], unit(scene.nodes[n].turn_axis)) for n in freely]
-        weights = np.repeat([INSIDE, 1.0], [width * len(names), width * len(held)])
+        weights = np.repeat([INNER_WEIGHT, 1.0], [width * len(names), width * len(held)])
         return RigidBalance(*self._written(blocks, len(weights)), weights, unknowns, width)
 
     def _written(self, blocks: list[Block], size: int) -> tuple[SparseMap, SparseMap]:

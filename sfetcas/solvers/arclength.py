@@ -27,7 +27,7 @@ from .neutral import Neutral
 from .newton import loose_rows, met, redundant, relative_residual, rounded, with_sharing
 from .prepared import Prepared
 from .sharing import shared
-from .stability import LIGHT, NEUTRAL, Inertia
+from .stability import LIGHT, Inertia
 
 __all__ = ["PASSING", "Curve", "Standing", "Tangent"]
 
@@ -245,7 +245,7 @@ class Curve:
         rate, answer, neutral = both[: len(self.weight), 0], both[: self._turning, 1], None
         if along.neutral is not None:
             neutral, values = Neutral.answered(along.neutral.weighted, both[:, 2:], self.prepared.weight)
-            neutral = neutral if np.abs(values).max() <= NEUTRAL else None
+            neutral = neutral if np.abs(values).max() <= tolerances.NEUTRAL else None
             rate = rate if neutral is None else neutral.without(rate)
         loose = loose_rows(self.equations, point) if redundant(self.equations, point) else np.zeros(0)
         if loose.size:

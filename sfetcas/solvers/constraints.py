@@ -26,12 +26,6 @@ from .newton import loose_rows, rows_in
 
 __all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
-SOFT = 1e-7
-"""Eigenvalues of the stiffness beside that of the softest member below which a motion strains nothing.
-
-More than that where many elements are short: rounding of their stiffness leaves 2e-8 of 256 elements.
-"""
-
 MOST = 40
 """Free motions looked for at most: a chain of as many links without any spring."""
 
@@ -106,13 +100,13 @@ def free_motions(equations: Equations, weight: Array, state: State) -> Array:
     point = equations.at(state, equations.model.loading(0.0, 0.0))
     stiffness = point.entries
     metric = np.concatenate([weight, np.full(n - turning, float(weight.mean()) if turning else 1.0)])
-    equations.solver.factor(equations.regularised(stiffness, 0.01 * SOFT * metric, 1e-11))
+    equations.solver.factor(equations.regularised(stiffness, 0.01 * tolerances.NEUTRAL * metric, tolerances.DUAL))
     chosen = (equations.row < n) & (equations.column < n)
     row, column = equations.row[chosen], equations.column[chosen]
     count = min(4, n)
     while True:
         values, vectors = _lowest(equations, stiffness, metric, count)
-        free = vectors[:, values < SOFT + blurred(row, column, stiffness[chosen], vectors)]
+        free = vectors[:, values < tolerances.NEUTRAL + blurred(row, column, stiffness[chosen], vectors)]
         if free.shape[1] < count or count >= min(n, MOST):
             return _told_apart(free)
         count = min(4 * count, n, MOST)

@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import TINY, Array
 from .arclength import Curve, Standing, Tangent
 from .sides import Sides
-from .stability import NEUTRAL
 
 __all__ = ["FIRM", "ONE_EVENT", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
@@ -47,7 +47,7 @@ ASIDE = 0.01
 FIRM = 1e6
 """Times the weight of the proximal term that holds the open direction at a bifurcation point."""
 
-NEAR = 0.02
+TRUSTED = 0.02
 """An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
 
 AROUND_LIMIT = 1e-3
@@ -98,7 +98,7 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
         # Of two that vanish together rounding leaves the same root twice, by a search to the last digit.
-        together = max(ONE_EVENT * abs(value(b) - value(a)), NEUTRAL)
+        together = max(ONE_EVENT * abs(value(b) - value(a)), tolerances.NEUTRAL)
         same = next((e for e in found if abs(value(e.standing)) <= together), None)
         if same is not None:
             found[found.index(same)] = replace(same, multiplicity=same.multiplicity + 1)
@@ -247,7 +247,7 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 
     place = arc * root(missing, 0.0, missing(0.0), 1.0, missing(1.0))
     state, _ = curve.predicted(a, place, curve.bend(a, b))
-    found = curve.at_factor(replace(a, state=state, arc=a.arc + place), factor, most=NEAR)
+    found = curve.at_factor(replace(a, state=state, arc=a.arc + place), factor, most=TRUSTED)
     if found is not None:
         return found
     near = sought(curve, a, b, lambda standing: standing.factor - factor)

@@ -27,7 +27,7 @@ __all__ = ["deflated", "nearest"]
 LONGEST = 0.7
 """No node turns by more than this in an iteration, rad."""
 
-NEAR = 1e-3
+UNDEFLATED = 1e-3
 """Steps shorter than this, rad, go on without deflation."""
 
 OTHER_TURN = 1.5
@@ -49,7 +49,7 @@ def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence
         length = float(np.abs(step[turning]).max(initial=0.0))
         if not np.isfinite(length):
             return None
-        if length < NEAR:
+        if length < UNDEFLATED:
             found = prepared.correct(state, loading)
             return found if found.converged else None
         # The step of the deflated equations points along the plain one, forwards or backwards.

@@ -16,14 +16,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point
 from .newton import independent
-from .stability import ENTRIES_BLUR, LIGHT, NEUTRAL, Inertia, Stability
+from .stability import ENTRIES_BLUR, LIGHT, Inertia, Stability
 
 __all__ = ["TangentTest"]
 
-SINGULAR = 1e-6
+ON_THE_AXIS = 1e-6
 """Imaginary parts below this leave the tangent singular where the real part vanishes: eigenvalues are of size one."""
 
 
@@ -63,7 +64,7 @@ class TangentTest:
             before, after = across @ h, h @ across.T
             inner = before @ across.T + (largest + 1.0) * np.eye(len(across))
             h += across.T @ (inner @ across - before) - after @ across
-        return h, NEUTRAL + ENTRIES_BLUR * largest, free
+        return h, tolerances.NEUTRAL + ENTRIES_BLUR * largest, free
 
     def _eigenvalues(self, tangent: Array) -> Array:
         """Eigenvalues by rising real part."""
@@ -92,7 +93,7 @@ class TangentTest:
         """Whether so many eigenvalues vanish at a point where their real parts do."""
         values = self._eigenvalues(self._tangent(point)[0])
         nearest = values[np.argsort(np.abs(values.real))[:count]]
-        return bool((np.abs(nearest.imag) <= SINGULAR).all())
+        return bool((np.abs(nearest.imag) <= ON_THE_AXIS).all())
 
     def depth(self, point: Point, near: float = 0.0) -> float:
         """How far eigenvalues, or their real parts, are below zero, by ``equations.mass``; zero where none is."""

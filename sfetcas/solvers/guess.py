@@ -23,7 +23,7 @@ LEADING, SETTLING = 30, 10
 SPRING = 300.0
 """Stiffness of the springs that lead nodes, EI/L^3 of the scene: stiffer than beams, soft enough to yield."""
 
-NEAR = 0.3
+SHORT_STEP = 0.3
 """The same, rad, from a ``start`` that a user gave: the basin it lies in is not to be left."""
 
 BOW = 0.2
@@ -55,7 +55,7 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     if rows == 0:
         return state, 0.0
     primal = np.concatenate([0.1 * weight, np.full(n - equations.turning_unknowns, 1e-6)])
-    metric = equations.regularised(equations.elastic_entries(), primal, 1e-9)
+    metric = equations.regularised(equations.elastic_entries(), primal, tolerances.DUAL)
     gap = np.inf
     for _ in range(60):
         point = equations.at(state, loading)
@@ -87,7 +87,7 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
         wanted = begun + min(1.0, (count + 1) / LEADING) * (targets[chosen] - begun) - nodal
         border = np.zeros((equations.total, len(chosen)))
         border[: equations.unknowns] = jacobian.T
-        equations.solver.factor(equations.regularised(point.entries, 1e-3 * weight, 1e-9))
+        equations.solver.factor(equations.regularised(point.entries, 1e-3 * weight, tolerances.DUAL))
         base = equations.solver.solve(np.column_stack([-point.residual, border]))
         pull = np.linalg.solve(border.T @ base[:, 1:] + np.eye(len(chosen)) / SPRING, wanted - border.T @ base[:, 0])
         step = base[:, 0] + base[:, 1:] @ pull
@@ -114,7 +114,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle
     state, gap = restore(equations, state, loading, weight)
     if gap > tolerances.REACHED or not settle:
         return state, gap
-    return descend(equations, state, loading, weight, most=TURN if targets is None else NEAR), gap
+    return descend(equations, state, loading, weight, most=TURN if targets is None else SHORT_STEP), gap
 
 
 def _placed(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> State:

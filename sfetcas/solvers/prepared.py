@@ -317,7 +317,7 @@ class Prepared:
             there = self.stability(found)
             if there.negative == 0:
                 return found, there
-            same = np.abs(found.state.q - state.q).max() < 1e-6
+            same = self.distance(found.state, state) < tolerances.SAME_STATE
             amplitude = 1.7 * amplitude if same else 0.2
             state, stability = found.state, there
         raise SolveError(Status.FAILED, "no stable equilibrium found along the escape shapes", state)

@@ -16,7 +16,7 @@ second order of the rest.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -29,10 +29,7 @@ from ..mechanics.equations import Equations, Point
 from .newton import independent
 from .sides import Sides, alike
 
-__all__ = ["ENTRIES_BLUR", "LIGHT", "NEUTRAL", "Inertia", "Stability", "StabilityTest"]
-
-NEUTRAL = 1e-7
-"""Eigenvalues nearer to zero than this are neutral: rounding and polish leave about 1e-9 on such a scale."""
+__all__ = ["ENTRIES_BLUR", "LIGHT", "Inertia", "Stability", "StabilityTest"]
 
 ENTRIES_BLUR = 2e-15
 """The same, relative to the largest entry of the weighted matrix."""
@@ -77,7 +74,7 @@ class Stability:
     smallest: float
     shape: Array
     travel: Array
-    limit: float = NEUTRAL
+    limit: float = field(default_factory=lambda: tolerances.NEUTRAL)
 
     @property
     def hidden(self) -> bool:
@@ -222,7 +219,7 @@ class StabilityTest:
     @staticmethod
     def _limit(entries: Array) -> float:
         """Largest eigenvalue that cannot be told from zero, whatever its mode."""
-        return NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max())
+        return tolerances.NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max())
 
     def _is_graded(self, limit: float) -> bool:
         return limit > GRADED and self._n <= FULL
@@ -231,7 +228,7 @@ class StabilityTest:
         """Eigenvalues from that which is lowest beside its own limit, its vector, how many are below, that limit."""
         values, vectors, limits = self._mode_by_mode(point, entries)
         if not len(values):
-            return values, vectors, 0, NEUTRAL
+            return values, vectors, 0, tolerances.NEUTRAL
         lowest = int(np.argmin(values / limits))
         return values[lowest:], vectors[:, [lowest]], int((values < -limits).sum()), float(limits[lowest])
 
@@ -262,7 +259,7 @@ class StabilityTest:
         vectors = scale[:, None] * (basis @ np.linalg.solve(root.T, vectors[:, ::-1]))
         vectors = vectors / np.linalg.norm(vectors, axis=0)
         rounding = blurred(self._h_row, self._h_column, entries, vectors)
-        return values, vectors, NEUTRAL + rounding + ENTRIES_BLUR * abs(shift)
+        return values, vectors, tolerances.NEUTRAL + rounding + ENTRIES_BLUR * abs(shift)
 
     @property
     def _is_dense(self) -> bool:
@@ -281,7 +278,7 @@ class StabilityTest:
         most += alike(values[most - 1 :]) - 1 if most else 0
         shapes = self.sides.in_groups(values[:most], basis @ vectors[:, :most] / root, self._weights)
         shapes = shapes[:turning, :count].T
-        limit = NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max(initial=0.0))
+        limit = tolerances.NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
@@ -360,7 +357,7 @@ class StabilityTest:
 
         At zero itself a neutral direction takes all digits from the factors of the bordered matrix.
         """
-        low, high = (self._from_factors(point, shift, (SOFT,)) for shift in (-CLEAR_OF_ZERO, CLEAR_OF_ZERO))
+        low, high = (self._from_factors(point, shift, (SOFT_BORDER,)) for shift in (-CLEAR_OF_ZERO, CLEAR_OF_ZERO))
         if low is None or high is None or limit > 0.1 * CLEAR_OF_ZERO or high - low > NEAREST:
             return None
         if low == high:
@@ -394,7 +391,7 @@ class StabilityTest:
         """
         # Without pivots the factors break down where displacements hang between two slides, or between many rigid
         # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
-        found = self._from_factors(point, shift, (SOFT,) if self._n <= FULL else SOFTER)
+        found = self._from_factors(point, shift, (SOFT_BORDER,) if self._n <= FULL else SOFTER_BORDERS)
         return self._below_dense(point, shift) if found is None else found
 
     def _from_factors(self, point: Point, shift: float, softness: tuple[float, ...]) -> int | None:
@@ -535,10 +532,10 @@ MANY_ROWS = 150
 LIGHT = 1e-3
 """Weight of a displacement over the length scale beside that of a rotation along the length."""
 
-SOFT = 1e-9
+SOFT_BORDER = 1e-9
 """Softness of closings in the bordered matrix, and stiffness of displacements, beside the rest."""
 
-SOFTER = (SOFT, 10.0 * SOFT, 100.0 * SOFT)
+SOFTER_BORDERS = (SOFT_BORDER, 10.0 * SOFT_BORDER, 100.0 * SOFT_BORDER)
 """The same one after the other, where full matrices would take long."""
 
 FULL = 600

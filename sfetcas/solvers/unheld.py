@@ -30,7 +30,7 @@ STEP = 0.1
 ROUNDS = 400
 """States of a round at most: six turns of the fastest link."""
 
-CORRECTIONS, SOFT, CLOSING = 12, 1e-3, 1e-11
+CORRECTIONS, RESISTED = 12, 1e-3
 """Newton steps to a state of a round at most; what keeps their matrix regular, beside stiffness and closings."""
 
 FAR = (1.0, 1e6)
@@ -148,10 +148,10 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
     equations = prepared.equations
     n, weight = equations.unknowns, prepared.weight
     # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
-    primal = SOFT * np.concatenate([weight, np.full(n - len(weight), float(weight.mean()))])
+    primal = RESISTED * np.concatenate([weight, np.full(n - len(weight), float(weight.mean()))])
     for _ in range(CORRECTIONS):
         point = equations.at(state, unloaded)
-        equations.solver.factor(equations.regularised(point.entries, primal, CLOSING))
+        equations.solver.factor(equations.regularised(point.entries, primal, tolerances.DUAL))
         step = equations.solver.solve(-point.residual)[:n]
         state = _moved(prepared, state, step)
         if np.abs(step).max(initial=0.0) < tolerances.CLOSED:
