@@ -35,7 +35,7 @@ def test_package_imports_only_what_hears_signals():
 def test_scene_needs_no_solver():
     modules = loaded("from sfetcas import Node, Scene, load")
     packages = {name.split(".")[1] for name in own(modules)}
-    assert packages == {"stopping", "errors", "quoting", "files", "mathematics", "description"}
+    assert packages == {"stopping", "errors", "quoting", "files", "tolerances", "mathematics", "description"}
     assert "casadi" not in modules
 
 
