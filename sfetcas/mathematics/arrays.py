@@ -37,7 +37,8 @@ TINY = 1e-300
 def first_of_largest(values: Array, alike: float | None = None) -> int:
     """Place of the entry of largest size; of those that miss it by less than the share ``alike`` the first.
 
-    Entries that a symmetry makes the same differ by rounding, which chooses nothing then.
+    Without one the share is :data:`~sfetcas.tolerances.ALIKE`.  Entries that a symmetry makes the same differ by
+    rounding, which chooses nothing then.
     """
     sizes, alike = np.abs(values), tolerances.ALIKE if alike is None else alike
     return int(np.argmax(sizes >= (1.0 - alike) * sizes.max()))
