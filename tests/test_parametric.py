@@ -429,3 +429,28 @@ def test_supports_of_one_rigid_body_share_its_moment(space):
         np.testing.assert_allclose(found[name], value, atol=1e-8)
         np.testing.assert_allclose(found.jacobian[name]["loads.f.value.1"], (other - one) / (2 * h), atol=1e-6)
     assert np.abs(found["reactions.B.moment"][2]) > 0.1
+
+
+@pytest.mark.parametrize("member", ["r1", "r2"])
+@pytest.mark.parametrize("at", [0.0, 0.5, 1.0])
+def test_moments_anywhere_on_a_rigid_body_reach_its_supports(member, at):
+    """What the supports do to turn it changes by as much as the moment on it does, wherever that acts."""
+
+    def total(value):
+        table = held_twice(False).to_dict()
+        table["loads"]["n"] |= {"member": member, "at": at, "value": value}
+        step = solve(Scene.from_dict(table)).last
+        return step.reaction("A")[1][2] + step.reaction("B")[1][2]
+
+    assert total(0.0) - total(0.25) == pytest.approx(0.25, abs=1e-8)
+
+
+def test_supports_of_one_rigid_body_hold_what_turning_axes_do_to_its_sections():
+    """Nothing about the axis about which they let it turn, where the sections and the spring alone are in balance."""
+    table = held_twice(True).to_dict()
+    table["sections"]["s"] |= {"rhoA": 1.0, "rhoI": [0.3, 0.2, 0.1]}
+    table["members"]["r1"]["section"] = table["members"]["r2"]["section"] = "s"
+    step = solve(Scene.from_dict({**table, "rotating": [0.7, 0.5, 0.3]})).last
+    for node in "AB":
+        assert step.reaction(node)[1][1] == pytest.approx(0.0, abs=1e-9)
+        assert np.abs(step.reaction(node)[1]).max() > 0.01

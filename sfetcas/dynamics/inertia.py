@@ -140,8 +140,7 @@ class Inertia:
                 three_of = np.zeros((len(part), 3))
                 three_of[:, 3 - width :] = part
                 np.add.at(moment, turns[used], three_of[used])
-                for sums, number in () if group.at is None else zip((couple, jump), group.at.T, strict=True):
-                    np.add.at(sums, number[number >= 0], three_of[number >= 0])
+                group.put(three_of, couple, jump)
             first = width * group.turns.shape[1]
             for side, at in enumerate(group.places.T):
                 used, begin_of = at >= 0, first + system.axes * side

@@ -374,11 +374,24 @@ class Equations:
         u = places.reshape(len(self.model.segments.places), -1)
         matrix = loading.loads[spinning.pairs][0].reshape(u.shape[1], -1)
         found = loading.plus(spinning.positional(self.model, u, turned_tangents(self.model, q), matrix))
-        moment, force = found.moment.copy(), np.zeros_like(found.force)
-        for number in spinning.bodies:
+        moment, couple, jump, force = (
+            np.zeros_like(part) for part in (found.moment, found.couple, found.jump, found.force)
+        )
+        massive = [group for group in spinning.masses.observables if group.kind.vectors]
+        for number, observed in zip(spinning.bodies, massive, strict=True):
             group = self._terms[1 + number]
-            group.add_forces(-group(state, u, loading.loads[number], np.zeros(0))[3], moment, force)
-        return replace(found, moment=moment, force=found.force + force, own=found.own + force)
+            forces = -group(state, u, loading.loads[number], np.zeros(0))[3]
+            group.add_forces(forces, moment, force)
+            turns = self.model.element.turns
+            observed.put(np.pad(forces[:, :turns], ((0, 0), (3 - turns, 0))), couple, jump)
+        return replace(
+            found,
+            moment=found.moment + moment,
+            couple=found.couple + couple,
+            jump=found.jump + jump,
+            force=found.force + force,
+            own=found.own + force,
+        )
 
     # -- steps ----------------------------------------------------------------------------------
 

@@ -26,7 +26,7 @@ from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
 from .parts import Parts
-from .rotations import Rotations, Turn
+from .rotations import STIFF, Rotations, Turn, end_joints
 from .segments import Segments
 from .singles import turned_vector
 from .terms import GROUND, Discrete, Group, One, Side, Term
@@ -257,7 +257,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
         follows = load.frame == "follower" and (space or load.type != "moment")
         if load.type == "distributed" or not (follows or load.type == "moment"):
             continue
-        number, where = _rotation(parts, name, load), (f"loads.{name}", load.node or "")
+        number, where = _rotation(parts, name, load), (f"loads.{name}", _node_of(parts, load))
         if load.type == "force":
             place = _place(parts.mesh, parts.segments, load)
             yield One(Follower(space), *where, nothing, (number,), (place,))
@@ -290,6 +290,17 @@ def _rotation(parts: Parts, name: str, load: Load) -> int:
     runs = [part.elements for part in parts.segments.parts if part.member == load.member]
     chain = parts.rotations.chain(slice(runs[0].start, runs[-1].stop))
     return int(chain[cut_of(parts.mesh, load) * parts.element.order])
+
+
+def _node_of(parts: Parts, load: Load) -> str:
+    """The node that a load acts on, also at an end of a member that turns with it; empty within members."""
+    if load.node is not None:
+        return load.node
+    member, cut = str(load.member), cut_of(parts.mesh, load)
+    if 0 < cut < len(parts.mesh.cuts[member]) - 1:
+        return ""
+    node, joint = end_joints(parts.scene, parts.scene.members[member])[1 if cut else 0]
+    return node if joint in STIFF else ""
 
 
 def _place(mesh: Mesh, segments: Segments, load: Load) -> int:

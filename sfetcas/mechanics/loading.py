@@ -244,9 +244,10 @@ class _Writer:
         if kind.follows:
             return
         group.add("moment", turn, value)
-        inner = None if load.node is not None else inner_cut(self.mesh, self.beams.first, load)
-        if load.node is not None:
-            group.add("couple", self.segments.place(load.node), value)
+        node = self.connections[i].nodes[number]
+        inner = None if node else inner_cut(self.mesh, self.beams.first, load)
+        if node:
+            group.add("couple", self.segments.place(node), value)
         elif inner is not None:
             group.add("jump", inner, value)
 

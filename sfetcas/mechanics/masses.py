@@ -58,6 +58,11 @@ class Observables:
     numbers: Index | None = None
     at: Index | None = None
 
+    def put(self, moments: Array, couple: Array, jump: Array) -> None:
+        """Add moments (n, 3) where :attr:`at` says to those on places and elements (each n, 3), in place."""
+        for sums, number in () if self.at is None else zip((couple, jump), self.at.T, strict=True):
+            np.add.at(sums, number[number >= 0], moments[number >= 0])
+
 
 @dataclass(frozen=True, eq=False)
 class Masses:
