@@ -13,7 +13,7 @@ from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
 from sfetcas.mechanics.terms import by_turning, curvatures_of, energies_of, rows_of, slopes_of
-from sfetcas.solvers.newton import correct
+from sfetcas.solvers.newton import AtLoads, Limits, correct
 from sfetcas.solvers.stability import StabilityTest
 
 ALL = [Element(space, p, gauss) for p in range(1, 9) for space in (False, True) for gauss in (False, True)]
@@ -305,8 +305,10 @@ def tip(order, gauss, elements, space=False):
     weight = StabilityTest(equations).weight
     state = equations.start(loading)
     for part in (0.05, 0.2, 0.5, 1.0):
-        state = correct(equations, state, equations.model.loading(part), weight, iterations=30).state
-    found = correct(equations, state, loading, weight)
+        state = correct(
+            AtLoads(equations, equations.model.loading(part), weight), state, limits=Limits(iterations=30)
+        ).state
+    found = correct(AtLoads(equations, loading, weight), state)
     assert found.converged
     return Fields(equations, found.state, loading).position("B")[:2]
 

@@ -13,8 +13,8 @@ from sfetcas.mathematics.interpolation import differentiation, evaluation
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.rotations import Turn
-from sfetcas.solvers.newton import relative_residual
 from sfetcas.solvers.prepared import Prepared
+from sfetcas.solvers.residuals import relative_residual
 
 CASES = [(name, assembly, False) for name in EVERY for assembly in ("closing", "nodal")]
 CASES += [(name, "closing", True) for name in ("arch", "hinged_space", "linked_space")]

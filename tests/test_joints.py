@@ -13,7 +13,7 @@ from sfetcas.mechanics import joints, terms
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.positions import normals
-from sfetcas.solvers.newton import correct
+from sfetcas.solvers.newton import AtLoads, Limits, correct
 from sfetcas.solvers.prepared import Prepared
 
 AXIS = np.array([0.2, -1.0, 0.5]) / np.linalg.norm([0.2, -1.0, 0.5])
@@ -549,8 +549,8 @@ def test_joint_in_a_scene_carries_nothing_along_its_freedoms(joint, space):
     from_rest = prepared.correct(prepared.equations.start(prepared.model.loading(0.0)), prepared.model.loading(0.0))
     state = from_rest.state
     for factor in np.linspace(0.1, 1.0, 10):
-        found = correct(prepared.equations, state, prepared.model.loading(factor),
-                        prepared.equations.mass, iterations=30)  # fmt: skip
+        system = AtLoads(prepared.equations, prepared.model.loading(factor), prepared.equations.mass)
+        found = correct(system, state, limits=Limits(iterations=30))
         assert found.converged
         state = found.state
     fields = Fields(prepared.equations, state, prepared.model.loading(1.0))

@@ -13,7 +13,7 @@ from sfetcas.mathematics import quaternion as quat
 from sfetcas.mathematics.nlp import Ipopt
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
-from sfetcas.solvers.newton import correct
+from sfetcas.solvers.newton import AtLoads, Limits, correct
 from sfetcas.solvers.prepared import Prepared
 from sfetcas.solvers.problem import EquilibriumProblem
 from sfetcas.solvers.stability import StabilityTest
@@ -124,7 +124,7 @@ def by_newton(model, factor=1.0, parts=20):
     equations = Equations(model)
     weight, state = StabilityTest(equations).weight, equations.start(model.loading(0.0))
     for part in np.linspace(0, factor, parts + 1)[1:]:
-        found = correct(equations, state, model.loading(part), weight, iterations=30)
+        found = correct(AtLoads(equations, model.loading(part), weight), state, limits=Limits(iterations=30))
         assert found.converged
         state = found.state
     return equations, state

@@ -11,7 +11,7 @@ from sfetcas import tolerances
 from sfetcas.description.scene import Scene
 from sfetcas.description.supports import upwards
 from sfetcas.parametric.equilibrium import equilibrium_solver
-from sfetcas.solvers import newton
+from sfetcas.solvers import redundancy, residuals
 from sfetcas.solvers.divergence import TangentTest
 from sfetcas.solvers.prepared import Prepared
 
@@ -75,7 +75,7 @@ def test_residual_that_rounding_of_rotations_explains_has_converged(turns, monke
     worst = int(np.abs(found.point.residual).argmax())
     off = found.point.residual.copy()
     off[worst] = 1e-10 * found.point.scale[worst]
-    assert not newton.rounded(prepared.equations, found.state, replace(found.point, residual=off))
+    assert not residuals.rounded(prepared.equations, found.state, replace(found.point, residual=off))
 
 
 def test_rows_next_to_straight_are_told_from_straight():
@@ -95,7 +95,7 @@ def test_rows_next_to_straight_are_told_from_straight():
     straight = equations.start(nothing)
     x = prepared.model.along("m")
     bowed = replace(straight, q=straight.q + 1e-8 * np.cos(np.pi * x)[:, None])
-    loose = [newton.loose_rows(equations, equations.at(s, nothing), 1e-10).shape[-1] for s in (straight, bowed)]
+    loose = [redundancy.loose_rows(equations, equations.at(s, nothing), 1e-10).shape[-1] for s in (straight, bowed)]
     assert loose == [1, 0]
 
 

@@ -13,7 +13,7 @@ from sfetcas import tolerances
 from sfetcas.equilibria.statics import pilot_of, solve_model
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.model import assemble
-from sfetcas.solvers import newton
+from sfetcas.solvers import redundancy
 from sfetcas.solvers import stability as stability_module
 from sfetcas.solvers.prepared import Prepared
 from sfetcas.solvers.stability import StabilityTest
@@ -397,9 +397,9 @@ def test_loose_rows_by_inverse_iteration_are_those_of_all_singular_values(name):
     point = equations.at(state, equations.model.loading(1.0))
     if not equations.rows:
         return
-    all_squares, all_left, largest = newton._all_singular(equations, point)
-    squares, left, _ = newton._smallest(equations, point)
-    limit = newton.SLACK**2 * largest
+    all_squares, all_left, largest = redundancy._all_singular(equations, point)
+    squares, left, _ = redundancy._smallest(equations, point)
+    limit = redundancy.SLACK**2 * largest
     loose, few = all_left[:, all_squares < limit], left[:, squares < limit]
     assert loose.shape == few.shape
     assert (name == "redundant") == bool(loose.shape[1])

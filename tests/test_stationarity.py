@@ -9,8 +9,8 @@ from scenes import model_of
 
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.expressions import Expressions
-from sfetcas.solvers.newton import relative_residual
 from sfetcas.solvers.program import Program
+from sfetcas.solvers.residuals import relative_residual
 
 NAMES = ["plane_loads", "arch", "four_bar", "guided", "bend_45", "tripod", "hinged_space", "helix"]
 NAMES += ["linked", "small_plane", "sliding_plane", "linked_space", "small_space", "sliding_space"]

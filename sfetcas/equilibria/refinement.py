@@ -19,8 +19,10 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.constraints import in_words, moves_nodes
 from ..solvers.deflation import deflated
-from ..solvers.newton import LEAST_SCALE, Corrected, loose_rows, named_in, relative_residual, stretched
+from ..solvers.newton import Corrected
 from ..solvers.prepared import BEYOND, Prepared
+from ..solvers.redundancy import loose_rows, named_in, stretched
+from ..solvers.residuals import LEAST_SCALE, relative_residual
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
 from .meshing import Found, Meshing

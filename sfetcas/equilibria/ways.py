@@ -15,8 +15,8 @@ from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
-from ..solvers.newton import loose_rows
 from ..solvers.prepared import BEYOND, Prepared
+from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, Found, Meshing
 from .single import cold

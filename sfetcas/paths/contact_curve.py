@@ -22,8 +22,9 @@ from ..mechanics.mesh import Mesh, Touch
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.between_states import turned_between
 from ..solvers.critical import root
-from ..solvers.newton import Corrected, relative_residual
+from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
+from ..solvers.residuals import relative_residual
 
 __all__ = ["ContactCurve", "Stood"]
 

@@ -27,8 +27,10 @@ from ..mechanics.model import Model, assemble
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, check_slack
 from ..solvers.critical import Event, at_factors, shapes_at
-from ..solvers.newton import Corrected, relative_residual, with_sharing
+from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
+from ..solvers.redundancy import with_sharing
+from ..solvers.residuals import relative_residual
 from ..solvers.tracing import Traced, passes, switched, trace, without
 from .contact_path import MARGIN, STEADY, follow_in_contact
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending

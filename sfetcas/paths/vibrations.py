@@ -33,8 +33,9 @@ from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.between_states import turned_between
 from ..solvers.critical import ONE_EVENT, sought
-from ..solvers.newton import Corrected, relative_residual
+from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
+from ..solvers.residuals import relative_residual
 from .path import FLUTTER, NO_POTENTIAL, Branch, FlutterPoint, Path, PathPoint
 
 __all__ = ["shaken", "with_modes"]

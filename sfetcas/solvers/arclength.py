@@ -24,8 +24,9 @@ from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from .between_states import turned_between
 from .neutral import Neutral
-from .newton import loose_rows, met, redundant, relative_residual, rounded, with_sharing
+from .newton import Balance, Limits, correct
 from .prepared import Prepared
+from .redundancy import loose_rows, met, redundant, with_sharing
 from .sharing import shared
 from .stability import LIGHT, Inertia
 
@@ -33,9 +34,6 @@ __all__ = ["PASSING", "Curve", "Standing", "Tangent"]
 
 PASSING = 1e-10
 """The same for points in passing, which nobody asked for by name."""
-
-ITERATIONS = 10
-"""Newton iterations of a step at most."""
 
 TURN = 0.6
 """No node turns by more than this, rad, in the corrections of a step."""
@@ -46,8 +44,8 @@ FIRMER = 1e3
 DOUBT = 30.0
 """A load of size one that moves more than this may meet an eigenvalue that vanishes: one of 1e-7 answers 1e5 times."""
 
-SHORT = 0.01
-"""Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its shape."""
+LIMITS = Limits(iterations=10, short=0.01, turned=TURN, near=tolerances.BALANCED, returns=False)
+"""Of corrections: beside a bifurcation the first ones wander along its shape, and short ones need not shrink."""
 
 HELD = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
@@ -296,60 +294,14 @@ class Curve:
         With a ``firm`` proximal term directions that the equations leave open stay as they are; a ``sharp`` one is
         iterated to rounding.
         """
-        equations, n, neutral = self.equations, self._turning, across.neutral
-        firm = firm if neutral is None else max(firm, FIRMER)
-        row = self.weight * across.z
-        loading = self.loading(factor)
-        state = self.held(state, loading)
-        point = _balanced(met(equations, equations.at(state, loading)), neutral)
-        residual, last, turned = relative_residual(equations, point), np.inf, 0.0
-        for count in range(ITERATIONS):
-            if count and (residual <= tolerances.EXACT if sharp else self._passes(point, residual)):
-                break
-            try:
-                rights = [-point.residual, -self.slope(state, factor, point)]
-                rights += [] if neutral is None else [*neutral.weighted.T]
-                both = self.solved(point, np.column_stack(rights), firm)
-                if neutral is not None:
-                    neutral = neutral.moved(both[:, 2:])
-                    both = neutral.without(both[:, :2])
-            except np.linalg.LinAlgError:
-                return None
-            base, rate = both[:, 0], both[:, 1]
-            change = -float(row @ base) / (float(row @ rate) + across.factor / self.unit**2)
-            step = base + change * rate
-            length = float(np.abs(step[:n]).max(initial=0.0))
-            turned += length
-            if (
-                not np.isfinite(length + change)
-                or turned > TURN
-                or (count and residual > tolerances.BALANCED and length > max(last, SHORT))
-            ):
-                return None
-            last = length
-            loading = self.loading(factor + change)
-            trial = self.held(equations.moved(state, step), loading)
-            there = _balanced(met(equations, equations.at(trial, loading)), neutral)
-            gained = relative_residual(equations, there)
-            still = count and gained > 0.25 * residual
-            if still and (residual <= tolerances.CONVERGED or rounded(equations, state, point)):
-                break
-            state, factor, point, residual = trial, factor + change, there, gained
-            if not np.isfinite(residual):
-                return None
-        good = residual <= tolerances.CONVERGED or (not sharp and self._passes(point, residual))
-        if not good and not rounded(equations, state, point):
+        system = _Across(self, across, firm if across.neutral is None else max(firm, FIRMER), sharp)
+        found = correct(system, state, factor=factor, limits=LIMITS)
+        if not found.converged:
             return None
-        loading = self.loading(factor)
-        point = equations.at(state, loading) if equations.redundant or neutral is not None else point
-        state, point = with_sharing(equations, state, loading, point, max(residual, tolerances.CONVERGED))
-        tangent, doubtful = self.tangent(state, factor, point, across)
-        return Standing(state, factor, loading, point, tangent, arc, count, self.prepared, doubtful)
-
-    def _passes(self, point: Point, residual: float) -> bool:
-        """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
-        gaps = float(np.abs(point.residual[self.equations.unknowns :]).max(initial=0.0))
-        return residual <= PASSING and gaps <= tolerances.CONVERGED
+        loading = self.loading(found.factor)
+        tangent, doubtful = self.tangent(found.state, found.factor, found.point, across)
+        point, count = found.point, found.iterations
+        return Standing(found.state, found.factor, loading, point, tangent, arc, count, self.prepared, doubtful)
 
     def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
         """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there.
@@ -391,9 +343,52 @@ class Curve:
         return Tangent((b.tangent.z - a.tangent.z) / arc, (b.tangent.factor - a.tangent.factor) / arc)
 
 
-def _balanced(point: Point, neutral: Neutral | None) -> Point:
-    """The equations at a state but for what is out of balance along neutral motions."""
-    return point if neutral is None else replace(point, residual=neutral.balanced(point.residual))
+class _Across:
+    """An equilibrium across a direction from a state near a curve, for :func:`~sfetcas.solvers.newton.correct`.
+
+    One unknown more, the factor, and one equation more, what is left across the direction.  Motions that are neutral
+    along the curve are found anew at each step, and no step goes along them.
+    """
+
+    complete = True
+
+    def __init__(self, curve: Curve, across: Tangent, firm: float, sharp: bool) -> None:
+        self.curve, self.across, self.firm, self.sharp = curve, across, firm, sharp
+        self.equations, self.neutral = curve.equations, across.neutral
+        self.row = curve.weight * across.z
+
+    def loading(self, factor: float) -> Loading:
+        """Loads and motions at a factor."""
+        return self.curve.loading(factor)
+
+    def held(self, state: State, loading: Loading) -> State:
+        """The state with held rotations where the motions want them."""
+        return self.curve.held(state, loading)
+
+    def seen(self, state: State, point: Point) -> Point:
+        """Without what is out of balance along neutral motions, and gaps that no unknown closes."""
+        point = met(self.equations, point)
+        if self.neutral is None:
+            return point
+        return replace(point, residual=self.neutral.balanced(point.residual))
+
+    def step(self, here: Balance) -> Array:
+        """Newton's step of all unknowns, multipliers and the factor."""
+        rights = [-here.point.residual, -self.curve.slope(here.state, here.factor, here.point)]
+        rights += [] if self.neutral is None else [*self.neutral.weighted.T]
+        both = self.curve.solved(here.point, np.column_stack(rights), self.firm)
+        if self.neutral is not None:
+            self.neutral = self.neutral.moved(both[:, 2:])
+            both = self.neutral.without(both[:, :2])
+        base, rate = both[:, 0], both[:, 1]
+        unit = self.across.factor / self.curve.unit**2
+        change = -float(self.row @ base) / (float(self.row @ rate) + unit)
+        return np.append(base + change * rate, change)
+
+    def suffices(self, here: Balance) -> bool:
+        """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
+        gaps = float(np.abs(here.point.residual[self.equations.unknowns :]).max(initial=0.0))
+        return not self.sharp and here.residual <= PASSING and gaps <= tolerances.CONVERGED
 
 
 def _kind(rate: Loading) -> tuple[float, bool]:

@@ -11,8 +11,9 @@ from ..mechanics.loading import Loading
 from .arclength import Curve, Standing, Tangent
 from .continuation import follow
 from .deflation import nearest
-from .newton import Corrected, loose_rows, named_in, stretched
+from .newton import Corrected
 from .prepared import Prepared
+from .redundancy import loose_rows, named_in, stretched
 from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
 from .unheld import refuse_unheld

@@ -20,9 +20,10 @@ from ..description.records import enumerated
 from ..description.supports import along, upwards
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.linear import SparseMap, blurred
-from ..mechanics.equations import Equations, State
+from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
-from .newton import loose_rows, rows_in
+from .newton import Iterate, moving, newton
+from .redundancy import loose_rows, rows_in
 
 __all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
@@ -248,23 +249,30 @@ def contradiction(equations: Equations, state: State, loading: Loading) -> str:
 def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[State, Array, float]:
     """A state with the smallest gaps near one, by Levenberg and Marquardt, and the largest slope of their square."""
     n, soft = equations.unknowns, 1e-2
-    rows = (equations.row >= n) & (equations.column < n)
-    state = equations.holding(state, loading)
-    point = equations.at(state, loading)
-    for _ in range(DAMPED):
-        gaps = point.residual[n:]
-        equations.solver.factor(equations.regularised(equations.of_rows(point.entries), np.full(n, soft), 1.0))
+
+    def at(state: State) -> Point:
+        return equations.at(state, loading)
+
+    def step(here: Iterate) -> Array:
+        primal, gaps = np.full(n, soft), here.point.residual[n:]
+        equations.solver.factor(equations.regularised(equations.of_rows(here.point.entries), primal, 1.0))
         step = equations.solver.solve(np.concatenate([np.zeros(n), -gaps]))
         step[n:] = 0.0
-        trial = equations.moved(state, step)
-        there = equations.at(trial, loading)
-        if np.linalg.norm(there.residual[n:]) < np.linalg.norm(gaps):
-            state, point, soft = trial, there, 0.3 * soft
-        else:
-            soft *= 10.0
-    slope, gaps = np.zeros(n), point.residual[n:]
-    np.add.at(slope, equations.column[rows], point.entries[rows] * gaps[equations.row[rows] - n])
-    return state, gaps, float(np.abs(slope).max(initial=0.0))
+        return step
+
+    def after(here: Iterate, step: Array) -> Iterate:
+        nonlocal soft
+        there = moving(equations, at)(here, step)
+        nearer = np.linalg.norm(there.point.residual[n:]) < np.linalg.norm(here.point.residual[n:])
+        soft *= 0.3 if nearer else 10.0
+        return there if nearer else here
+
+    state = equations.holding(state, loading)
+    here, _ = newton(Iterate(state, at(state)), step, after, lambda here: False, DAMPED)
+    chosen = (equations.row >= n) & (equations.column < n)
+    slope, gaps = np.zeros(n), here.point.residual[n:]
+    np.add.at(slope, equations.column[chosen], here.point.entries[chosen] * gaps[equations.row[chosen] - n])
+    return here.state, gaps, float(np.abs(slope).max(initial=0.0))
 
 
 def _asked(equations: Equations, state: State, loading: Loading, name: str) -> Array:

@@ -11,15 +11,14 @@ Source: Farrell, Birkisson and Funke 2015, SIAM J. Sci. Comput. 37, A2026 (shift
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-import numpy as np
+from dataclasses import replace
 
 from .. import tolerances
 from ..mathematics.arrays import Array
-from ..mechanics.equations import Equations, State
+from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
-from .newton import Corrected, newton_step
+from .newton import Corrected, Iterate, newton, newton_step, turned_by
 from .prepared import Prepared
 
 __all__ = ["deflated", "nearest"]
@@ -39,24 +38,29 @@ ITERATIONS = 40
 
 def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence[State]) -> Corrected | None:
     """A run of Newton's method that keeps away from known states; None where it does not arrive."""
-    equations, turning = prepared.equations, slice(0, prepared.equations.turning_unknowns)
-    state = equations.holding(state, loading)
-    for _ in range(ITERATIONS):
-        try:
-            step = newton_step(equations, equations.at(state, loading), prepared.weight)
-        except np.linalg.LinAlgError:
-            return None
-        length = float(np.abs(step[turning]).max(initial=0.0))
-        if not np.isfinite(length):
-            return None
+    equations = prepared.equations
+
+    def at(state: State) -> Point:
+        return equations.at(state, loading)
+
+    def step(here: Iterate) -> Array:
+        return newton_step(equations, here.point, prepared.weight)
+
+    def after(here: Iterate, step: Array) -> Iterate:
+        length = turned_by(equations, step)
         if length < UNDEFLATED:
-            found = prepared.correct(state, loading)
-            return found if found.converged else None
+            return replace(here, length=length)
         # The step of the deflated equations points along the plain one, forwards or backwards.
-        left = 1.0 - sum(_slope(equations, state, other, step[turning]) for other in known)
+        turned = step[: equations.turning_unknowns]
+        left = 1.0 - sum(_slope(equations, here.state, other, turned) for other in known)
         stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / length)
-        state = equations.moved(state, (stretch if left > 0.0 else -stretch) * step)
-    return None
+        state = equations.moved(here.state, (stretch if left > 0.0 else -stretch) * step)
+        return Iterate(state, at(state))
+
+    begin = equations.holding(state, loading)
+    near, arrived = newton(Iterate(begin, at(begin)), step, after, lambda here: here.length < UNDEFLATED, ITERATIONS)
+    found = prepared.correct(near.state, loading) if arrived else None
+    return found if found is not None and found.converged else None
 
 
 def nearest(prepared: Prepared, loading: Loading) -> Corrected | None:

@@ -19,7 +19,7 @@ import numpy as np
 from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point
-from .newton import independent
+from .redundancy import independent
 from .stability import ENTRIES_BLUR, LIGHT, Inertia, Stability
 
 __all__ = ["TangentTest"]

@@ -8,17 +8,21 @@ import numpy as np
 
 from .. import tolerances
 from ..mathematics import quaternion
-from ..mathematics.arrays import TINY, Array
-from ..mechanics.equations import Equations, State
+from ..mathematics.arrays import Array
+from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import Turn
-from .newton import TURN, descend, loose_rows
+from .newton import TURN, Iterate, descend, moving, newton
+from .redundancy import loose_rows
 
 __all__ = ["first_guess", "lacks_slack", "lead", "restore"]
 
 LEADING, SETTLING = 30, 10
 """Steps in which nodes are led to the places wished for them, and in which they settle there."""
+
+LONGEST, CLOSING = 0.5, 60
+"""Steps that close gaps and lead nodes turn no node by more, rad; so many of them close gaps, at most."""
 
 SPRING = 300.0
 """Stiffness of the springs that lead nodes, EI/L^3 of the scene: stiffer than beams, soft enough to yield."""
@@ -48,7 +52,7 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     """A state near the given one that satisfies closings, motions and joints, and the gap that is left.
 
     Each step is the smallest change in the elastic energy of the undeformed scene that closes the linearised
-    gaps, shortened to 0.5 rad.
+    gaps, shortened to :data:`LONGEST`.
     """
     state = replace(equations.holding(state, loading), lam=np.zeros(equations.rows))
     n, rows = equations.unknowns, equations.rows
@@ -56,18 +60,22 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
         return state, 0.0
     primal = np.concatenate([0.1 * weight, np.full(n - equations.turning_unknowns, 1e-6)])
     metric = equations.regularised(equations.elastic_entries(), primal, tolerances.DUAL)
-    gap = np.inf
-    for _ in range(60):
-        point = equations.at(state, loading)
-        gap = float(np.abs(point.residual[n:]).max())
-        if gap < tolerances.CLOSED:
-            break
-        equations.solver.factor(metric + equations.of_rows(point.entries))
-        step = equations.solver.solve(np.concatenate([np.zeros(n), -point.residual[n:]]))
+
+    def at(state: State) -> Point:
+        return equations.at(state, loading)
+
+    def gap(here: Iterate) -> float:
+        return float(np.abs(here.point.residual[n:]).max())
+
+    def step(here: Iterate) -> Array:
+        equations.solver.factor(metric + equations.of_rows(here.point.entries))
+        step = equations.solver.solve(np.concatenate([np.zeros(n), -here.point.residual[n:]]))
         step[n:] = 0.0
-        length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
-        state = equations.moved(state, step * min(1.0, 0.5 / max(length, TINY)))
-    return state, gap
+        return step
+
+    begin, after = Iterate(state, at(state)), moving(equations, at, LONGEST)
+    here, _ = newton(begin, step, after, lambda here: gap(here) < tolerances.CLOSED, CLOSING)
+    return here.state, gap(here)
 
 
 def lead(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> tuple[State, float]:
@@ -78,22 +86,24 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
     """
     unloaded = loading.unloaded()
     chosen = np.flatnonzero(np.isfinite(targets))
-    begun, missing = None, np.zeros(0)
-    for count in range(LEADING + SETTLING):
-        point = equations.at(state, unloaded, convex=True)
-        nodal, jacobian = equations.node_jacobian(state, unloaded, chosen)
-        begun = nodal if begun is None else begun
-        missing = targets[chosen] - nodal
-        wanted = begun + min(1.0, (count + 1) / LEADING) * (targets[chosen] - begun) - nodal
+    begun = equations.node_jacobian(state, unloaded, chosen)[0]
+
+    def at(state: State) -> Point:
+        return equations.at(state, unloaded, convex=True)
+
+    def step(here: Iterate) -> Array:
+        nodal, jacobian = equations.node_jacobian(here.state, unloaded, chosen)
+        wanted = begun + min(1.0, (here.count + 1) / LEADING) * (targets[chosen] - begun) - nodal
         border = np.zeros((equations.total, len(chosen)))
         border[: equations.unknowns] = jacobian.T
-        equations.solver.factor(equations.regularised(point.entries, 1e-3 * weight, tolerances.DUAL))
-        base = equations.solver.solve(np.column_stack([-point.residual, border]))
+        equations.solver.factor(equations.regularised(here.point.entries, 1e-3 * weight, tolerances.DUAL))
+        base = equations.solver.solve(np.column_stack([-here.point.residual, border]))
         pull = np.linalg.solve(border.T @ base[:, 1:] + np.eye(len(chosen)) / SPRING, wanted - border.T @ base[:, 0])
-        step = base[:, 0] + base[:, 1:] @ pull
-        length = np.abs(step[: equations.turning_unknowns]).max(initial=0.0)
-        state = equations.moved(state, step * min(1.0, 0.5 / max(length, TINY)))
-    return state, float(np.abs(missing).max())
+        return np.asarray(base[:, 0] + base[:, 1:] @ pull)
+
+    begin, after = Iterate(state, at(state)), moving(equations, at, LONGEST)
+    state = newton(begin, step, after, lambda here: False, LEADING + SETTLING)[0].state
+    return state, float(np.abs(targets[chosen] - equations.node_jacobian(state, unloaded, chosen)[0]).max())
 
 
 def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle: bool = True) -> tuple[State, float]:

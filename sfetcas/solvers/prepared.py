@@ -25,10 +25,11 @@ from .constraints import Diagnosis, contradiction, diagnose, free_motions
 from .divergence import TangentTest
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
-from .newton import Corrected, correct, loose_rows, stretched
+from .newton import AtLoads, Corrected, Limits, correct
 from .problem import EquilibriumProblem
 from .program import Program
-from .pseudo_transient import flow
+from .pseudo_transient import Drag, flow
+from .redundancy import loose_rows, stretched
 from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
 
@@ -122,9 +123,19 @@ class Prepared:
         """Whether ``start`` places of nodes choose among equilibria."""
         return any(node.start is not None for node in self.model.scene.nodes.values())
 
-    def correct(self, state: State, loading: Loading, *, firm: float = 1.0, **limits: Any) -> Corrected:
-        """Newton's method from a near state, with a proximal term that may be made firmer."""
-        return correct(self.equations, state, loading, firm * self._test.weight, **limits)
+    def correct(
+        self,
+        state: State,
+        loading: Loading,
+        *,
+        tangent: Array | None = None,
+        flat: Array | None = None,
+        drag: Drag | None = None,
+        **limits: Any,
+    ) -> Corrected:
+        """Newton's method from a near state, see :class:`~sfetcas.solvers.newton.AtLoads`, within ``Limits``."""
+        system = AtLoads(self.equations, loading, self._test.weight, tangent, flat, drag)
+        return correct(system, state, limits=Limits(**limits))
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:

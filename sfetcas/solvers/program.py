@@ -27,7 +27,7 @@ from ..mechanics.rotations import Turn
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
 from ..mechanics.terms import GROUND, energies_of
-from .newton import LEAST_SCALE
+from .residuals import LEAST_SCALE
 
 __all__ = ["Program", "data_of", "is_data"]
 

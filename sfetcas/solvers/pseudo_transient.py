@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
-from .newton import newton_step
+from .newton import Iterate, moving, newton, newton_step, turned_by
 
 __all__ = ["Drag", "flow"]
 
@@ -57,30 +58,32 @@ def flow(
         At a point of the equations, and with what it was before: how far eigenvalues are below zero, or a number
         that is not much larger; zero where none is.
     """
-    turning = equations.turning_unknowns
-    length, deep, last, age = 0.0, 0.0, SMALL, 0
-    for count in range(MOST):
-        point = equations.at(state, loading)
-        if not length > ARRIVED or age == LASTING:
-            deep, age = depth(point, deep), 0
+    diagonal = equations.diagonal[: equations.turning_unknowns]
+    deep, last, age = 0.0, SMALL, 0
+
+    def at(state: State) -> Point:
+        return equations.at(state, loading)
+
+    def step(here: Iterate) -> Array:
+        nonlocal deep, last, age
+        if not ARRIVED < here.length < np.inf or age == LASTING:
+            deep, age = depth(here.point, deep), 0
         age += 1
         shift, length = 2.0 * deep, np.inf
         while length > LONGEST:
-            entries = point.entries.copy()
-            entries[equations.diagonal[:turning]] += shift * equations.mass
-            try:
-                step = newton_step(equations, replace(point, entries=entries), equations.mass)
-            except np.linalg.LinAlgError:
-                return None, count
-            length = float(np.abs(step[:turning]).max(initial=0.0))
-            if not np.isfinite(length):
-                return None, count
+            entries = here.point.entries.copy()
+            entries[diagonal] += shift * equations.mass
+            step = newton_step(equations, replace(here.point, entries=entries), equations.mass)
+            length = turned_by(equations, step)
             used, shift = shift, max(FIRMER * shift, last / FIRMER**2, SMALL)
         last = used
-        state = equations.moved(state, step)
-        if deep == 0.0 and length < ARRIVED and (age == 1 or depth(point, deep) == 0.0):
-            return state, count
-    return None, MOST
+        return step
+
+    def arrived(here: Iterate) -> bool:
+        return deep == 0.0 and here.length < ARRIVED and (age == 1 or depth(here.point, deep) == 0.0)
+
+    here, rests = newton(Iterate(state, at(state)), step, moving(equations, at), arrived, MOST)
+    return here.state if rests else None, here.count
 
 
 @dataclass(frozen=True)

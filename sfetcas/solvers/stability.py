@@ -26,7 +26,7 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.linear import InertiaSolver, Product, SparseSolver, blurred, pattern
 from ..mechanics.equations import Equations, Point
-from .newton import independent
+from .redundancy import independent
 from .sides import Sides, alike
 
 __all__ = ["ENTRIES_BLUR", "LIGHT", "Inertia", "Stability", "StabilityTest"]

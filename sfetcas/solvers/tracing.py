@@ -16,7 +16,7 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
 from .critical import FIRM, Event, events_between
-from .newton import relative_residual
+from .residuals import relative_residual
 
 __all__ = ["FAR", "Traced", "passes", "switched", "trace", "without"]
 

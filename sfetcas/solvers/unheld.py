@@ -17,9 +17,10 @@ from .. import tolerances
 from ..description.supports import free_to_move
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mechanics.equations import State
+from ..mechanics.equations import Point, State
 from ..mechanics.loading import Loading
 from .constraints import free_motions, in_words
+from .newton import Iterate, moving, newton
 from .prepared import Prepared
 
 __all__ = ["refuse_unheld"]
@@ -149,14 +150,22 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
     n, weight = equations.unknowns, prepared.weight
     # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
     primal = RESISTED * np.concatenate([weight, np.full(n - len(weight), float(weight.mean()))])
-    for _ in range(CORRECTIONS):
-        point = equations.at(state, unloaded)
-        equations.solver.factor(equations.regularised(point.entries, primal, tolerances.DUAL))
-        step = equations.solver.solve(-point.residual)[:n]
-        state = _moved(prepared, state, step)
-        if np.abs(step).max(initial=0.0) < tolerances.CLOSED:
-            break
-    return state
+
+    def at(state: State) -> Point:
+        return equations.at(state, unloaded)
+
+    def step(here: Iterate) -> Array:
+        equations.solver.factor(equations.regularised(here.point.entries, primal, tolerances.DUAL))
+        step = equations.solver.solve(-here.point.residual)
+        step[n:] = 0.0
+        return step
+
+    def after(here: Iterate, step: Array) -> Iterate:
+        # Displacements are to arrive as rotations are.
+        return replace(moving(equations, at)(here, step), length=float(np.abs(step).max(initial=0.0)))
+
+    begin = Iterate(state, at(state))
+    return newton(begin, step, after, lambda here: here.length < tolerances.CLOSED, CORRECTIONS)[0].state
 
 
 def _of_unit_speed(turning: int, motion: Array) -> Array | None:
