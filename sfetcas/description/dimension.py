@@ -32,7 +32,9 @@ def out_of_plane(
     contacts: Mapping[str, Contact],
     rotating: Triple | None,
 ) -> Finding | None:
-    """The place of the first thing out of x-y with what it does there; None where all lies in it."""
+    """The place in the scene of the first thing that does not lie in x-y, with a description; None where all lies in
+    it.
+    """
     if gravity is not None and _leaves(gravity):
         return ("gravity",), "has a z component"
     if rotating is not None and _turns_out(rotating):
