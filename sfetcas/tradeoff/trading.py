@@ -60,16 +60,16 @@ STALLED = 2
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is run.
+    """Limits of a measurement.
 
     Attributes
     ----------
     repeats : int
-        Whole runs of each variant after the first; of solves alone three times as many.
+        Number of whole runs of each variant after the first; solves alone are repeated three times as often.
     longest : float
-        s, a variant that takes longer ends its family.
+        Time, s, of a run that ends its family of variants.
     budget : float
-        s, in all: what is left out then is told.
+        Time, s, of all runs; variants that are left out then are reported.
     """
 
     repeats: int = 5
