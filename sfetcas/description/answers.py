@@ -395,9 +395,7 @@ def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
 
 
 def single_number(motion: Any, key: str) -> bool:
-    """Whether the force or moment that enforces a motion is one number: at a driven joint, or a moment about a hinge
-    axis.
-    """
+    """Whether what enforces a motion is one number: at a driven joint, or a moment about a hinge axis."""
     return motion.between is not None or (key == "moment" and isinstance(motion.rotation, float))
 
 

@@ -124,9 +124,7 @@ class History(Record):
 
     @cached_property
     def kinks(self) -> tuple[float, ...]:
-        """Values of t where the factor, its rate or its second derivative jumps by more than rounding to six digits
-        explains.
-        """
+        """Values of t where the factor or its first or second derivative jumps, by more than six-digit rounding."""
         size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._terms(i))) for i in range(len(self.t) - 1)), 0.0)
         found = []
         for i, t in enumerate(self.t):

@@ -63,9 +63,7 @@ class Obstacle:
     side: Array | None = None
 
     def gaps(self, points: Array, tangents: Array, offset: float = 0.0, way: float = 1.0) -> Array:
-        """Distances (n,), m, of points (n, 3) of a member, negative inside the obstacle; of an edge along the member's
-        normal.
-        """
+        """Distances (n,), m, of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
         if self.kind == "round":
             return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius) + offset
         normals = self.normals(points, tangents, way)

@@ -128,9 +128,7 @@ class Scene(Record):
         return math.hypot(*np.ptp(points, axis=0))
 
     def spring_axis(self, name: str) -> tuple[float, float, float]:
-        """Axis (3,) of a rotational spring, fixed axes of the undeformed scene: its own, or that of the joint at its
-        node.
-        """
+        """Axis (3,) of a rotational spring, fixed axes of the undeformed scene: its own, or that of its joint."""
         spring = self.springs[name]
         return self.nodes[spring.node].joint_axis if spring.axis is None else spring.axis
 

@@ -364,9 +364,7 @@ class CrossSection(Record):
         return np.stack([shear * torsion, young * about_2, young * about_3], axis=1)
 
     def fibres(self, x: ArrayLike) -> Floats:
-        """Young's modulus (N/m2) and distances (m) of the outermost fibre from the axes b2 and b3, (n, 3), at fractions
-        x (n,).
-        """
+        """Young's modulus (N/m2) and distances (m) of the outermost fibre from axes b2 and b3, (n, 3), at x (n,)."""
         half, names = {
             "rectangle": (0.5, ("width", "height")),
             "circle": (1.0, ("radius", "radius")),

@@ -1,4 +1,4 @@
-"""Springs, dampers and stops between members, between nodes, or to the ground."""
+"""Springs, dampers and stops between members, between nodes, or between them and the ground."""
 
 from __future__ import annotations
 

@@ -297,7 +297,7 @@ class Assembled:
         return self.pieces.nlp()
 
     def recentre(self, states: Array) -> None:
-        """Replace the reference states (cases, states), which are constants of the program; nothing is rebuilt."""
+        """Replace the reference states (cases, states), dimensionless constants of the program, which is kept."""
         self._c = np.concatenate([states, self._fixed[:, self.equations.fixed]], axis=1)
         self.states = states
         self.pieces.set_constants(STATES, self._c)

@@ -39,9 +39,11 @@ BOTH_SIDES = 2
 
 
 def buckling_factors(prepared: Prepared, count: int) -> Array:
-    """The lowest linear buckling factors (at most ``count``,): positive ones first, each sign by rising size.
+    """The lowest linear buckling factors (n,) of the loads, dimensionless: positive ones first, each sign by rising
+    size.
 
-    Empty where there is no equilibrium at factor 0, as of a mechanism that only its loads stabilise.
+    There are at most ``count``; none where there is no equilibrium at factor 0, as of a mechanism stabilised by its
+    loads.
 
     Raises
     ------

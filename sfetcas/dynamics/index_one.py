@@ -158,9 +158,7 @@ class IndexOne:
     # -- in time --------------------------------------------------------------------------------------
 
     def factors(self, s: ca.MX, p: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Factors of loads and motions and their first two rates at the fraction s of an interval, from its parameters
-        p.
-        """
+        """Factors of loads and motions and their first two rates at fraction s of an interval with parameters p."""
         count = self.system.layout.factors
         length, terms = p[0], ca.reshape(p[1:], count, self.degree + 1)
         value, first, second = (ca.MX.zeros(count) for _ in range(3))

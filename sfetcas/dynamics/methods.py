@@ -85,9 +85,7 @@ class Method(abc.ABC):
 
     @abc.abstractmethod
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
-        """The further arguments of :meth:`iteration` in a step of length h; factors (groups, loaded) multiply the
-        loads.
-        """
+        """The further arguments of :meth:`iteration`; h is the step, factors (groups, loaded) multiply the loads."""
 
     @abc.abstractmethod
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
@@ -96,9 +94,7 @@ class Method(abc.ABC):
 
 @dataclass(frozen=True)
 class Begin:
-    """State at the begin of a step: rotations, displacements, quantities, rates (quantities, kept), angles counting
-    turns.
-    """
+    """State at the begin of a step: rotations, displacements, quantities, rates (quantities, kept), angles."""
 
     q: ca.MX
     y: ca.MX
@@ -180,7 +176,7 @@ class GeneralisedAlpha(StageMethod):
         self.beta = 0.25 * (self.gamma + 0.5) ** 2
 
     def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
-        """Newmark's formulas with the averaged acceleration of the method."""
+        """Newmark's formulas with the auxiliary, acceleration-like variable of the method."""
         velocity, lagging, true = ca.horzsplit(rates)
         first = -velocity / (self.beta * h) - (0.5 / self.beta - 1.0) * lagging
         share = (1.0 - self.of_mass) / (1.0 - self.of_force)
@@ -193,7 +189,7 @@ class GeneralisedAlpha(StageMethod):
         )
 
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
-        """Velocity, averaged acceleration and true acceleration."""
+        """Velocity, auxiliary acceleration-like variable, and true acceleration."""
         velocity, lagging, _ = ca.horzsplit(rates)
         now = self.relations(h, rates)
         true = now.B * moved + now.a

@@ -38,9 +38,7 @@ class Mover:
         self.model: Model = equations.model
 
     def instant(self, sample: Sample) -> MotionState:
-        """The state by name of a dimensionless sample; its multipliers balance loads, inertia and damping in least
-        squares.
-        """
+        """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
         model, equations = self.model, self.equations
         loading = self.inertia.system.loading(self.factors(sample.t))
         free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.near)
@@ -135,9 +133,7 @@ class MotionState(Configuration):
 
     @functools.cached_property
     def momentum(self) -> dict[str, Array]:
-        """``linear`` momentum, (3,) kg m/s, and ``angular`` momentum about the centre of mass, (3,) kg m2/s, fixed
-        axes.
-        """
+        """``linear`` momentum, (3,) kg m/s, and ``angular`` momentum about the centre of mass, (3,) kg m2/s."""
         linear, angular = self.mover.inertia.momentum(self.sample.x, self.sample.v)
         time, scales = self.mover.time, self.model.scales
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
@@ -154,9 +150,7 @@ class MotionState(Configuration):
         return found if turning is None else {**found, "angular_velocity": turning}
 
     def to_dict(self) -> dict[str, Any]:
-        """The quantities of this time, as nested dictionaries; :meth:`Trajectory.to_dict` makes lists over time of
-        them.
-        """
+        """The quantities of this time as nested dictionaries, of which :meth:`Trajectory.to_dict` makes lists."""
         tables = self.tables("nodes", "reactions", "springs", "motions")
         return {**tables, "energy": self.energy, "momentum": self.momentum}
 

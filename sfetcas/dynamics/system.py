@@ -259,9 +259,7 @@ class System(Expressions):
         return ca.sparsify(ca.mtimes(ca.diagcat(*weights), ca.diagcat(*crosses)))
 
     def turned_rows(self, group: Observables) -> Array:
-        """``2 Omega x`` on the rows of an observable, (rows, rows): it acts on its leading vectors, not on the scalars
-        after.
-        """
+        """``2 Omega x`` on the rows of an observable, (rows, rows): on its leading vectors, not on later scalars."""
         assert self.crossing is not None
         found, count = np.zeros((group.kind.sizes[2],) * 2), group.kind.vectors
         found[: self.axes * count, : self.axes * count] = np.kron(np.eye(count), self.crossing)
@@ -269,9 +267,7 @@ class System(Expressions):
 
     @functools.cached_property
     def place_weights(self) -> tuple[Index, Index, Array]:
-        """Row, column and mass (dimensionless) of each pair of places; inner nodes hang on the first place of their
-        element.
-        """
+        """Row, column and mass (dimensionless) of pairs of places; inner nodes hang on the first of their element."""
         mass = mapped(self.place_mass)
         first = mass.row % self.axes == 0
         return mass.row[first] // self.axes, mass.column[first] // self.axes, mass.value[first]

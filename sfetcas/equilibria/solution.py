@@ -45,8 +45,8 @@ class Certificate:
     Attributes
     ----------
     residual : float
-        The larger of two ratios: largest out-of-balance force or moment over the largest that is summed there, and
-        largest gap of the loop closures and joints over the length scale of the model.
+        Largest of the ratios of out-of-balance forces and moments to the magnitudes that are summed there, and of the
+        gaps of loop closures and joints to the length scale of the model.
     stable : bool, "neutral", or "not defined" for loads without potential
         Whether the second variation of the energy is positive on the tangent space of the constraints.
     negative : int

@@ -20,9 +20,7 @@ def constant(matrix: SparseMap) -> ca.DM:
 
 
 def sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> ca.DM:
-    """A sparse CasADi matrix of given shape from rows, columns and values (n,) of its entries; repeated entries are
-    added.
-    """
+    """A sparse CasADi matrix from rows, columns and values (n,) of entries; repeated entries are added."""
     row, column = np.broadcast_arrays(np.asarray(row, np.intp), column)
     return constant(SparseMap(row.ravel(), column.ravel(), np.ravel(value), shape))
 

@@ -69,9 +69,7 @@ class NLP:
         return replace(self, f=self.f + term, gradient=gradient, hessian=hessian)
 
     def with_row(self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None) -> NLP:
-        """The program with constraints ``lower <= row <= upper`` added for all entries of ``row``; without upper ``row
-        == lower``.
-        """
+        """The program with constraints ``lower <= row <= upper`` added; equal to ``lower`` without ``upper``."""
         row = ca.vec(row)
         size = row.numel()
         old, before = self.hessian, self.g.numel()

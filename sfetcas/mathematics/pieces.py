@@ -154,9 +154,7 @@ class Pieces:
     def add_cost(
         self, name: str, function: ca.Function, index: Index, constants: Array | None = None, weight: float = 1.0
     ) -> None:
-        """Add the cost ``weight * sum of function(w, c)`` over instances; index (instances, w), constants (instances,
-        c).
-        """
+        """Add the cost ``weight * sum of function(w, c)``; index is (instances, w), constants (instances, c)."""
         self._add(name, function, index, constants, 0.0, 0.0, 1.0, weight)
 
     def add_expression(

@@ -30,9 +30,7 @@ BLUR = 1e-12
 
 
 def largest_difference(coarse: Fields, fine: Fields) -> float:
-    """Largest distance between positions on two meshes, at ends of the coarse elements and within, over the scene's
-    size.
-    """
+    """Largest distance between positions on two meshes, at and within coarse elements, over the scene's size."""
     largest = 0.0
     for name, cuts in coarse.model.mesh.cuts.items():
         x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel(), cuts[-1])

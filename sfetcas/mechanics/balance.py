@@ -46,9 +46,7 @@ class SpringState:
     stop: float | None = None
 
     def to_dict(self) -> dict[str, float]:
-        """The spring under the keys of the JSON answer: ``angle`` and ``moment``, or ``travel`` and ``force``, and
-        ``stop``.
-        """
+        """The spring with the keys of the JSON answer: ``angle``, ``moment`` or ``travel``, ``force``; ``stop``."""
         names = ("angle", "moment") if self.rotational else ("travel", "force")
         found = dict(zip(names, (self.travel, self.effort), strict=True))
         return found if self.stop is None else {**found, "stop": self.stop}
@@ -145,9 +143,7 @@ class Balance:
         return replace(state, stop=effort)
 
     def answers(self, table: str, name: str) -> dict[str, float]:
-        """The quantities that the terms of a record (``table``, ``name``) add to the answer, by their keys, in SI
-        units.
-        """
+        """Quantities that the terms of a record (``table``, ``name``) add to the answer, by key, in SI units."""
         found: dict[str, float] = {}
         for number, i in connections_of(self.model.connections, table, name):
             units = self.model.connections[number].kind.answers

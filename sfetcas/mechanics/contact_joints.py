@@ -47,9 +47,7 @@ class OnPlane(Term):
 @final
 @dataclass(frozen=True)
 class OnRound(Term):
-    """Constraint: a place lies on a circle, cylinder or sphere; data: projection across the axis, centre to place,
-    radius, sign.
-    """
+    """Constraint: a place lies on a circle, cylinder or sphere; data: projection, centre to place, radius, sign."""
 
     on_face: ClassVar[bool] = True
 
@@ -81,9 +79,7 @@ class CushionedPlane(Term):
 @final
 @dataclass(frozen=True)
 class CushionedRound(Term):
-    """Penalty contact of a place with a circle, cylinder or sphere; data: those of :class:`OnRound`, stiffness,
-    thickness.
-    """
+    """Penalty contact of a place with something round; data: those of :class:`OnRound`, stiffness, thickness."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -158,9 +154,7 @@ class Along(Term):
 @final
 @dataclass(frozen=True)
 class AlongRound(Term):
-    """Constraint: a section is tangential to a circle about its centre; data: centre to place, undeformed tangent.
-    Plane only.
-    """
+    """Constraint: a section is tangential to a circle; data: centre to place, undeformed tangent.  Plane only."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:

@@ -97,7 +97,7 @@ class Equations:
     row, column, diagonal : ndarray
         Rows and columns of the entries of the Newton matrix; which of them are on the diagonal.
     noise : ndarray (total,)
-        Rounding errors of the residual in the unloaded scene, over the unit roundoff.
+        Reference for rounding errors of each residual in the unloaded scene: a hundredth of stiffness; 1 for gaps.
     """
 
     def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
@@ -162,9 +162,7 @@ class Equations:
 
     @functools.cached_property
     def mass(self) -> Array:
-        """Weights (rotation unknowns,) for norms that do not depend on the mesh: length of member at each node,
-        dimensionless.
-        """
+        """Length of member at each rotation unknown (n,), dimensionless: weights for mesh-independent norms."""
         model = self.model
         lump = np.zeros(len(model.rotations.kind))
         w = model.beams.weight

@@ -222,9 +222,7 @@ class SymbolicTerms:
         return ca.reshape(flat, group.kind.sizes[4], len(group.data))
 
     def multipliers(self, number: int, lam: ca.MX) -> ca.MX:
-        """Multipliers of the rows of a group of terms, (rows, n); for elements combinations of those of the loop
-        closures.
-        """
+        """Multipliers of the rows of a group, (rows, n); for elements combinations of those of loop closures."""
         group = self.model.terms[number]
         if number == 0:
             return ca.reshape(times(self.closing.T, lam[: self.closing.shape[0], :]), self.axes, self.elements)
@@ -302,9 +300,7 @@ class Expressions(SymbolicTerms):
     # -- what is given --------------------------------------------------------------------------------
 
     def columns(self, part: str) -> ca.DM:
-        """A part of the loads with a column for each group; ``pull`` includes forces on places that follow from
-        segments.
-        """
+        """A part of the loads, a column for each group; ``pull`` includes forces on places hanging on segments."""
         found = [getattr(loading, part) for loading in self.loadings]
         if part == "pull":
             hung = (self.reaching.T @ ca.DM(loading.force.ravel()) for loading in self.loadings)

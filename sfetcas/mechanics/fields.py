@@ -375,9 +375,7 @@ class Fields:
         return touch.way / (contact.radius - (-1.0 if contact.side == "inside" else 1.0) * touch.offset)
 
     def pressed_moments(self, touch: Touch, x: Array) -> tuple[Array, Array]:
-        """Bending moments (n,) of a member that has the shape of the obstacle it lies on, dimensionless, and their axes
-        (n, 3).
-        """
+        """Moments (n,) that bend a member to the shape of an obstacle, dimensionless, and their axes (n, 3)."""
         if self.model.space:
             return self._pressed_in_space(touch, x)
         scene = self.model.scene
@@ -467,9 +465,7 @@ class Fields:
         return rest, rest + _three(self._nodal[places]) * model.scales.length
 
     def bent(self, member: str) -> float:
-        """Deformation of a small member: its largest nodal displacement over its size, or rotation, relative to its
-        frame.
-        """
+        """Deformation of a small member in its frame: largest nodal displacement over its size, or rotation, rad."""
         model = self.model
         rest, now = self._ends(member)
         turned = self.state.q[list(model.rotations.ends[member])]

@@ -115,9 +115,7 @@ class DrivenTurn(Term):
 @final
 @dataclass(frozen=True)
 class Slide(Term):
-    """Constraint: a place moves along a line that is carried by a rotation at another place; data: directions across
-    the line.
-    """
+    """Constraint: a place moves along a line carried by a rotation at another one; data: directions across it."""
 
     one_sided: ClassVar[bool] = True
 

@@ -196,9 +196,7 @@ class FollowingMoment(Term):
 @final
 @dataclass(frozen=True)
 class AxisMoment(Turning):
-    """A moment on a rotation that is restrained to an axis, in space; it works on the counted angle.  Load: its
-    components.
-    """
+    """A moment on a rotation restrained to an axis, in space; it works on the counted angle; load: components."""
 
     is_load: ClassVar[bool] = True
     is_couple: ClassVar[bool] = True
@@ -385,9 +383,7 @@ def _put(model: Any, group: Group, moments: Array, found: Mapping[str, Array]) -
 
 
 def inner_cut(mesh: Mesh, first: Mapping[str, int], load: Load) -> int | None:
-    """Number of the element that begins where a load acts within its member; None where it acts at an end of the
-    member.
-    """
+    """Element that begins where a load acts within its member; None where it acts at an end of the member."""
     member, cut = str(load.member), cut_of(mesh, load)
     return first[member] + cut if 0 < cut < len(mesh.cuts[member]) - 1 else None
 

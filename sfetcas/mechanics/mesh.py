@@ -122,9 +122,7 @@ class Mesh:
         return sum(len(cuts) - 1 for cuts in self.cuts.values())
 
     def refined(self, marked: Mapping[str, Array] | None = None) -> Mesh:
-        """The mesh with marked elements halved; ``marked`` has a boolean array (elements,) for each member, None marks
-        all.
-        """
+        """The mesh with marked elements halved: boolean arrays (elements,) by member; None marks all."""
         cuts = {}
         for name, old in self.cuts.items():
             chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]

@@ -152,9 +152,7 @@ class Model:
 
     @functools.cached_property
     def conservative(self) -> bool:
-        """Whether there is a potential energy: as :attr:`has_potential`, or all followers are pressure, which has one
-        too.
-        """
+        """Whether there is a potential energy: as :attr:`has_potential`, or all followers are pressure."""
         return self.has_potential or is_pressure(self.scene)
 
     @property

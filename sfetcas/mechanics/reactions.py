@@ -174,9 +174,7 @@ class Reactions:
         return [turn for turn in turns if turn not in elsewhere]
 
     def shared(self, node: str) -> bool:
-        """Whether another support restrains the rotation of a node as well, so that :attr:`rigid` has to separate their
-        moments.
-        """
+        """Whether another support restrains the rotation of a node as well, so that :attr:`rigid` is needed."""
         number, nodes = self.model.rotations.node_turn[node], self.model.scene.nodes
         if number is None:
             return False

@@ -24,9 +24,7 @@ __all__ = ["Segment", "Segments", "cushioned", "cut_members"]
 
 @dataclass(frozen=True)
 class Segment:
-    """A run of elements of a member between two places: name of the member, numbers of the elements, names of the
-    places.
-    """
+    """A run of elements of a member between two places: member, slice of elements, names of the places."""
 
     member: str
     elements: slice

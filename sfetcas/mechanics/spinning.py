@@ -34,9 +34,7 @@ def _matrix(load: ca.SX, axes: int) -> ca.SX:
 @final
 @dataclass(frozen=True)
 class SpunPair(Term):
-    """Centrifugal potential of an entry of the mass matrix of two places; data: their undeformed positions, mass; load:
-    P.
-    """
+    """Centrifugal potential of a mass-matrix entry of two places; data: undeformed positions, mass; load: P."""
 
     is_load: ClassVar[bool] = True
 

@@ -60,9 +60,7 @@ class Stations:
 
     @functools.cached_property
     def gained(self) -> Array:
-        """Weights (n, points) of values at the points, which include quadrature weights, in their integral up to the
-        station.
-        """
+        """Weights (n, points) of values at the points, quadrature weights included, in their integral up to here."""
         return self._rows(lambda xi: interpolation.integration(self._element.points, xi)) / self._element.weights
 
     @property

@@ -64,9 +64,7 @@ class Entries:
 
     @functools.cached_property
     def places(self) -> Places:
-        """Row, column and weight in the unknowns, and number of the entry; entries on prescribed coordinates are left
-        out.
-        """
+        """Row, column and weight in the unknowns, and number, of the entries that are not on prescribed coordinates."""
         nothing = np.zeros(0, np.intp)
         rows = np.concatenate([nothing, *self._rows])
         columns = np.concatenate([nothing, *self._columns])
@@ -79,9 +77,7 @@ class Entries:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Sparsity pattern of a matrix, the map that sums entries into it, and a permutation of its unknowns with its
-    inverse.
-    """
+    """Sparsity pattern of a matrix, the map that sums entries into it, and a permutation and its inverse."""
 
     pattern: ca.Sparsity
     sums: ca.DM
@@ -274,9 +270,7 @@ class Tables:
         return Entries(self.unknown, self.weight)
 
     def tied(self, entries: Entries) -> Places:
-        """The positions of entries, then those of the displacements in loop closures, whose entry is the number 1 after
-        all.
-        """
+        """The positions of entries, then those of displacements in loop closures, of one last entry, the number 1."""
         w = self.model.positions.W
         row, column, value, entry = entries.places
         r, c = self.unknowns + w.row, self.turning_unknowns + w.column
@@ -289,9 +283,7 @@ class Tables:
 
     @functools.cached_property
     def whole(self) -> Places:
-        """Positions of the entries of the terms, of displacements in loop closures, and of the diagonal, with a further
-        entry 0.
-        """
+        """Positions of the entries of the terms, of displacements in loop closures, and of a diagonal of entry 0."""
         row, column, weight, entry = self.tied(self.static)
         every = np.arange(self.total)
         return (

@@ -117,9 +117,7 @@ class Term(Components, abc.ABC):
 
     @property
     def vectors(self) -> int:
-        """How many vectors its rows begin with that have momentum and, in rotating axes, centrifugal and Coriolis
-        forces.
-        """
+        """How many vectors its rows begin with that have momentum, centrifugal and Coriolis forces."""
         return 0
 
     @property
@@ -171,9 +169,7 @@ class Term(Components, abc.ABC):
         return ca.SX(0)
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """Quantities for the answer, in the order of :attr:`answers`, dimensionless; ``lam`` are the multipliers of its
-        rows.
-        """
+        """Quantities for the answer, in the order of :attr:`answers`, dimensionless; ``lam``: multipliers."""
         return []
 
     # -- what the sides say to each other --------------------------------------------------------

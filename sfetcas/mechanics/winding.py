@@ -64,9 +64,7 @@ class Winding:
         return len(self.sides)
 
     def angles(self, q: Array, near: Array) -> Array:
-        """The angles (n,), rad, at rotations q (rotations, 4): of all with the same rotation those nearest to ``near``
-        (n,).
-        """
+        """The angles (n,), rad, at q (rotations, 4): of all with the same rotation those nearest to ``near``."""
         if not self.count:
             return near
         sine, cosine, share = self._parts(q)
@@ -103,9 +101,7 @@ class Winding:
         return np.where(self._crossed, 1.0, 2.0)
 
     def moved(self, q: Array, near: Array, turn: Array, there: Array) -> Array:
-        """The angles (n,), rad, after rotations ``q`` have changed by vectors ``turn`` (rotations, 3), fixed axes, to
-        ``there``.
-        """
+        """The angles (n,), rad, after ``q`` has changed by vectors ``turn`` (rotations, 3), rad, to ``there``."""
         if not self.count:
             return near
         if self._on_ground:

@@ -1,6 +1,4 @@
-"""Numbers of a scene as arguments: their names, defaults and ranges, and the data of the equations as functions of
-them.
-"""
+"""Numbers of a scene as arguments: names, defaults, ranges, and the data of the equations as their functions."""
 
 from __future__ import annotations
 
@@ -103,9 +101,7 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest accepted value: the range given, else above zero for sections, from zero for stiffness of
-        springs.
-        """
+        """Least and largest accepted value: the range; else above zero for sections, from zero for ``stiffness``."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         if self.name.startswith("sections.") and ".polynomial" not in self.name:
@@ -121,9 +117,7 @@ class Argument:
 
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
-"""Names of numbers of a scene, or a mapping of them to ranges (None: no range) or to :class:`Parameter`; None:
-defaults.
-"""
+"""Names of numbers, or a mapping of them to ranges (None: no range) or :class:`Parameter`; None: defaults."""
 
 
 def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
@@ -456,9 +450,7 @@ class Arguments:
                 raise SceneError(message, ("arguments", self._names[i]))
 
     def scene_at(self, values: Array) -> Scene:
-        """The scene with values (numbers,) of its numbers, in its units; a value of the load factor replaces all
-        ``steps``.
-        """
+        """The scene with values (numbers,) of its numbers, in its units; a load factor replaces all ``steps``."""
         scene = with_numbers(self._scene, self._followed([float(values[i]) for i in self._own]))
         steps, histories = (self._scene.analysis.steps[-1],), dict(scene.histories)
         for name, value in zip(self._names, values.tolist(), strict=True):

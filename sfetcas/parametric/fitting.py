@@ -426,7 +426,7 @@ class Fit:
 
     @property
     def chi_square(self) -> float:
-        """Sum of the squared residuals over deviations; for a correct model it is near :attr:`freedom`."""
+        """Sum of squared residuals over deviations; with known deviations near :attr:`freedom` for a correct model."""
         return float(self.minimum.fun @ self.minimum.fun)
 
     @property

@@ -224,9 +224,7 @@ class Results:
                 raise SceneError(message, ("results",))
 
     def rest(self, model: Model) -> Array:
-        """Undeformed positions (m) of nodes, then of the places along members, then data of sections for curvatures;
-        flat.
-        """
+        """Undeformed positions (m) of nodes and places along members, then section data for curvatures; flat."""
         scene = model.scene
         nodes = [numbers(scene.nodes[name].position) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]

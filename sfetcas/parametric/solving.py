@@ -252,9 +252,7 @@ class ParametricAnswer:
 
     @property
     def stable(self) -> bool | str:
-        """Whether the second variation of the energy has no negative eigenvalue; "not defined" for loads without
-        potential.
-        """
+        """Whether the second variation has no negative eigenvalue; "not defined" for loads without potential."""
         return "not defined" if self.outcome.negative == NOT_DEFINED else self.outcome.negative == 0
 
     @functools.cached_property
@@ -264,7 +262,7 @@ class ParametricAnswer:
         Raises
         ------
         SolveError
-            A stiffness or compliance that was asked for is infinite.
+            A stiffness or compliance that was asked for has no value, as the equilibrium is singular.
         """
         solver = self.of.solver
         given = np.array(solver.prepare(self.numbers)).ravel()

@@ -102,9 +102,7 @@ class ContactCurve:
     # -- points ---------------------------------------------------------------------------------
 
     def stood(self, held: Held, factor: float, along: Tangent, arc: float = 0.0) -> Stood | None:
-        """A point of the curve for an equilibrium in contact, its tangent oriented as ``along``; None if that is
-        undetermined.
-        """
+        """A point of the curve for an equilibrium, its tangent oriented as ``along``; None if that is undetermined."""
         curve = self.plain(held.prepared)
         return self._with_tangent(held, curve.standing(held.corrected.state, factor, along, arc=arc), along, arc)
 
@@ -193,9 +191,7 @@ class ContactCurve:
         return curve.held(state, curve.loading(factor)), factor, rates
 
     def along(self, start: Stood, length: float, before: Stood | None = None) -> Stood | None:
-        """The point of the curve in the plane normal to the tangent at a length from another point; None where none is
-        found.
-        """
+        """The point of the curve in the plane normal to the tangent at a length; None where none is found."""
         free = free_places(start.held.mesh.touches)
         state, factor, change = self.expected(start, length, before)
         found = self._held_at(start.held, free, change, state, factor, start.tangent)

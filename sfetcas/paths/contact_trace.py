@@ -239,9 +239,7 @@ class Tracer:
         return curve.prepared.distance(expected, there.standing.state) <= FAR * turned + EVENT * FAR
 
     def wrong(self, now: Stood, there: Stood) -> tuple[Touch, ...] | None:
-        """The contacts that a point should have instead; the present ones where the step passed an obstacle; None if
-        right.
-        """
+        """The contacts a point should have instead; the present ones where a step passed an obstacle; else None."""
         held, reviser, way = there.held, self.run.reviser, self.run.at(there.factor)
         released = reviser.released(held.prepared.model, held.loading, held.mesh.touches, way)
         if released != held.mesh.touches:

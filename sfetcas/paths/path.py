@@ -29,7 +29,7 @@ FLUTTER = (
     "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
     "tangent is singular (divergence), flutter points where one of the modes asked for starts to grow"
 )
-"""The same note where modes are asked for, which find flutter points."""
+"""A note as :data:`NO_POTENTIAL` where modes are asked for, which find flutter points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class Branch:
 
     @property
     def factors(self) -> Array:
-        """Load factors of the points, (points,)."""
+        """Load factors of the points, (points,), dimensionless."""
         return np.array([point.factor for point in self.points])
 
     def stretches(self) -> list[tuple[bool | str, int, int]]:
@@ -194,9 +194,7 @@ class Path:
 
     @property
     def steps(self) -> tuple[Equilibrium, ...]:
-        """Equilibria at the factors of ``analysis.steps``, wherever the path crosses them: of the path, then of the
-        branches.
-        """
+        """Equilibria where the path, then its branches, cross the factors of ``analysis.steps``."""
         return tuple(entry for branch in self.branches for entry in branch.steps)
 
     @property

@@ -298,7 +298,7 @@ class Sketch:
         self.marks.append(mark)
 
     def dot(self, point: Array, name: str) -> None:
-        """Sketch a small circle at (3,)."""
+        """Add a small circle at (3,), in drawn units."""
         mark = Mark(kind="dot", points=point[None, :], name=name, colour=SUPPORT, fill="white", level=8.0)
         self.marks.append(mark)
 
@@ -308,12 +308,12 @@ class Sketch:
         self.marks.append(Mark(kind="arrow", points=points, level=7.0, **look))
 
     def label(self, text: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
-        """Ask for a text."""
+        """Add a text beside an anchor (3,), in drawn units."""
         label = Label(anchor=anchor, away=away, text=text, colour=ink.colour, name=ink.name, gap=gap)
         self.labels.append(label)
 
     def tell(self, value: float, unit: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
-        """Ask for a value with its unit, which may be left out where larger ones take the place."""
+        """Add a value with its unit beside an anchor (3,); it may be left out where larger ones need the space."""
         self.label(amount(value, unit), anchor, away, ink, gap)
         self.labels[-1] = replace(self.labels[-1], value=abs(value), unit=unit)
 

@@ -61,7 +61,7 @@ class Outcome:
     Attributes
     ----------
     status, reason : str
-        ``solved``, ``failed``, ...; why, as a sentence, or empty.
+        ``solved``, ``short``, ``refused``, ``failed`` or ``not run``; why, as a sentence, or empty.
     numbers : tuple of ndarray (k,)
         Values of each quantity, in its unit; empty without an answer.
     notes : str

@@ -219,17 +219,17 @@ def trade(
     against: Literal["refined", "file"] = "refined",
     progress: Callable[[str], object] | None = None,
 ) -> Trade:
-    """Measure accuracy against time of a scene.
+    """Measure accuracy against time for the discretisations of a scene.
 
-    A script that calls this does so below ``if __name__ == "__main__":``, as processes are started.
+    Processes are started: a script has to call this below ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     limits : Limits, optional
     against : str
-        Errors are those against an own ``refined`` solution, or against what the ``file`` expects.
+        Reference of the errors: a ``refined`` solution, or the expected values of the ``file``.
     progress : callable, optional
-        Told the name of each variant before it is run.
+        Called with the name of each variant before it is run.
 
     Raises
     ------

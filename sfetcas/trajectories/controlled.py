@@ -122,9 +122,7 @@ class ControlledSystem:
 
     @property
     def reference(self) -> Array:
-        """The initial rotations and turn-counting angles as one vector, see :meth:`referring`; rotations ``d`` are from
-        these.
-        """
+        """Initial rotations and turn-counting angles as one vector, see :meth:`referring`; the reference of ``d``."""
         return self.referring(self.begin.state.q, self.begin.state.wound)
 
     @staticmethod
@@ -134,9 +132,7 @@ class ControlledSystem:
 
     @functools.cached_property
     def start(self) -> Array:
-        """The vector ``d`` (total,) of the initial state: no rotation, its displacements and multipliers;
-        dimensionless.
-        """
+        """The vector ``d`` (total,) of the initial state, dimensionless: no rotation, displacements, multipliers."""
         state = self.begin.state
         return np.concatenate([np.zeros(self.system.equations.turning_unknowns), state.y, state.lam])
 

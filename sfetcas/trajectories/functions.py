@@ -101,9 +101,7 @@ class MotionFunctions:
 
     @functools.cached_property
     def alg(self) -> ca.Function:
-        """``(x, z, u, p) ->`` residual of the equations of motion, then accelerations of the constraints;
-        dimensionless.
-        """
+        """``(x, z, u, p) ->`` residual of the equations of motion, accelerations of the constraints; dimensionless."""
         s = self._symbols()
         return ca.Function("alg", s, [self.dae(*s)[1]], ["x", "z", "u", "p"], ["alg"])
 

@@ -50,7 +50,7 @@ def at_rest(
     Parameters
     ----------
     end : end time, s
-    controls : start values of controls, at evenly spaced times, and of variables; by default those of the scene
+    controls : start values (n,) of controls, at n evenly spaced times, and of variables, in the units of the scene
 
     Raises
     ------
