@@ -1,4 +1,4 @@
-"""What a scene asks for is what is done: statics, a path, modes or a motion; only that is imported."""
+"""The entry point :func:`solve`: runs the analysis that a scene asks for, and imports only what that analysis needs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["LATER", "solve"]
 
 LATER = ("sfetcas.dynamics.modes", "sfetcas.dynamics.simulation", "sfetcas.paths.paths")
-"""Modules that :func:`solve` imports by the type of the analysis; for processes that solve they are imported once."""
+"""Modules that :func:`solve` imports for some analyses only; servers that start worker processes preload them."""
 
 
 def solve(
@@ -28,7 +28,7 @@ def solve(
     progress: Callable[[float], object] | None = None,
     **changes: Any,
 ) -> Answer:
-    """The answer of a scene, by the type of its analysis.
+    """Run the analysis that a scene asks for (static, path, modes or dynamic) and return its answer.
 
     Parameters
     ----------
@@ -36,13 +36,14 @@ def solve(
     settings : Settings, optional
         Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
     progress : callable, optional
-        Of a motion: told the time reached, s, after each step.  Times start anew with each finer run; what it raises
-        ends the motion, and where that is KeyboardInterrupt the answers up to there are returned.
+        Dynamic analyses only: called with the time reached, in s, after each time step.  Times start anew with each
+        run on a finer discretisation.  An exception that it raises ends the motion; after KeyboardInterrupt the
+        answers up to that time are returned.
 
     Returns
     -------
-    Solution, Path, Motion or Modes
-        All have ``steps``, ``last``, ``status`` and ``to_dict``.
+    Solution, Path, Modes or Trajectory
+        For ``static``, ``path``, ``modes`` and ``dynamic``.  All have ``steps``, ``last``, ``status``, ``to_dict``.
 
     Raises
     ------

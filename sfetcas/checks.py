@@ -26,21 +26,23 @@ __all__ = ["Answer", "Check", "asked", "check"]
 
 
 Answer: TypeAlias = "Solution | Path | Trajectory | Modes"
-"""What an analysis may give."""
+"""What :func:`sfetcas.solve` may return."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison.
+    """The comparison of one expected value with the answer.
 
     Attributes
     ----------
     expect : Expect
+        The expectation from the scene.
     value : object
-        What the answer says, as far as the reference goes.
+        The value in the answer; of a vector only as many components as the expectation gives.
     error : float
-        Largest absolute difference; infinite where exact values differ.
+        Largest absolute difference, in the unit of the quantity; infinite where a text, boolean or integer differs.
     passed : bool
+        Whether the error is within the tolerance of the expectation.
     """
 
     expect: Expect
@@ -55,7 +57,7 @@ def check(scene: Scene, solution: Answer) -> list[Check]:
     Raises
     ------
     SceneError
-        A quantity that the answer does not have.
+        An expectation names a quantity that the answer does not have, or its value has another shape.
     """
     check_scene(scene, "check({}, ...)")
     checks = []
@@ -89,14 +91,14 @@ def _plain(value: Any) -> Any:
 
 
 def asked(solution: Answer, expect: Expect) -> Any:
-    """What an answer says of the quantity that an expectation names, whatever it expects.
+    """The value in an answer of the quantity that an expectation names; its expected value plays no part.
 
-    Where a search listed several equilibria it is the default one.
+    Where a search listed several equilibria, the value is that of the default one.
 
     Raises
     ------
     SceneError
-        The answer does not have it.
+        The answer has no such quantity.
     """
     if isinstance(solution, Solution) and expect.step is None:
         expect = expect.model_copy(update={"step": solution.last.factor})

@@ -24,12 +24,12 @@ class SceneError(ValueError):
         self.where = where
 
     def within(self, *outer: str) -> SceneError:
-        """The same error seen from further outside."""
+        """The error with further keys put before its place, as when a record is part of another one."""
         return SceneError(self.bare, (*outer, *self.where))
 
 
 class Status(enum.Enum):
-    """How a solve ended; the values are sentences."""
+    """How a solve ended; the value of each member is a sentence for the user."""
 
     SOLVED = "solved"
     SHORT = "solved, but not to the accuracy asked for"
@@ -48,17 +48,18 @@ class Status(enum.Enum):
 
 
 class SolveError(RuntimeError):
-    """No solution: the status, what was tried and, where there is one, the last iterate.
+    """No solution was found; the message says why and what was tried.
 
     Attributes
     ----------
     status : Status
+        Why there is no solution.
     detail : str
         What was tried.
     last : object or None
-        Last iterate as the solver left it; never an answer.
+        Last iterate as the solver left it, for diagnosis; not an equilibrium.
     reached : object or None
-        The :class:`~sfetcas.equilibria.solution.Solution` with the steps before the one that failed, if any.
+        The :class:`~sfetcas.equilibria.solution.Solution` with the load steps before the one that failed, if any.
     """
 
     reached: object = None

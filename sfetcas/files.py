@@ -1,4 +1,4 @@
-"""Files and folders that are written whole or not at all, and files that are read only where they are plain."""
+"""Reading and writing files safely: only regular files of limited size are read; what is written appears as a whole."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["UnreadableError", "read_file", "write_file", "write_folder"]
 
 
 class UnreadableError(ValueError):
-    """A file that is not read; the sentence says what it is and what is accepted, without its name."""
+    """A file that is refused; the sentence says what it is and what is accepted, without the name of the file."""
 
 
 KINDS = {
@@ -34,9 +34,9 @@ def read_file(path: str | os.PathLike[str], most: int, accepted: str = "a plain 
     ----------
     path
     most : int
-        Bytes at most: a larger file is refused before it is read.
+        Largest size in bytes; a larger file is refused before it is read.
     accepted : str
-        What is, in words.
+        The kind of file that is accepted, in words for the message.
 
     Raises
     ------
@@ -72,7 +72,20 @@ def _check_plain(found: os.stat_result, accepted: str) -> None:
 
 
 def write_file(path: Path, writer: Callable[[Path], Any]) -> None:
-    """Write beside the final name first, so that nothing half-written is ever seen."""
+    """Write a file atomically: under a temporary name in the same folder, then renamed.
+
+    Parameters
+    ----------
+    path : Path
+        The final name; an existing file is replaced.
+    writer : callable
+        Writes the content to the path that it is given, which has the same ending.
+
+    Raises
+    ------
+    SceneError
+        The file could not be written.
+    """
     name = ""
     try:
         # By its ending a writer knows its kind; a long one is of no kind, and there may be no longer name.
@@ -90,7 +103,20 @@ def write_file(path: Path, writer: Callable[[Path], Any]) -> None:
 
 
 def write_folder(path: Path, writer: Callable[[Path], Any]) -> None:
-    """Write a folder of files beside its final name first; it takes the place of one that is there."""
+    """Write a folder of files atomically: under a temporary name, then renamed; an existing folder is replaced.
+
+    Parameters
+    ----------
+    path : Path
+        The final name.
+    writer : callable
+        Makes the folder that it is given, with its files.
+
+    Raises
+    ------
+    SceneError
+        The folder could not be written.
+    """
     try:
         with tempfile.TemporaryDirectory(dir=path.parent) as place:
             new, old = Path(place) / "new", Path(place) / "old"

@@ -1,4 +1,4 @@
-"""Processes that are started by this one: whole or not at all, and interrupts are not theirs."""
+"""Starting worker processes so that an interrupt neither leaves one half-started nor reaches the workers."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 
 LONGEST = 70
-"""Bytes of the folder for temporary files, so that with 32 more a socket may have its name, on any system."""
+"""Longest path of the temporary folder, in bytes, with which names of sockets (32 bytes more) are valid everywhere."""
 
 
 def context_of(preloaded: Sequence[str]) -> Any:
-    """How processes are started: by a server that has imported some modules, where the system can (``forkserver``)."""
+    """The :mod:`multiprocessing` context for workers: ``forkserver`` with preloaded modules if possible, else spawn."""
     short = len(os.fsencode(tempfile.gettempdir())) <= LONGEST
     if not (short and "forkserver" in multiprocessing.get_all_start_methods()):
         return multiprocessing.get_context("spawn")
@@ -34,7 +34,7 @@ def context_of(preloaded: Sequence[str]) -> Any:
 
 @contextlib.contextmanager
 def postponed() -> Iterator[None]:
-    """Within this signals wait: a process is started whole, or not at all."""
+    """Context manager that delays SIGINT and SIGTERM until it is left: a process is started whole or not at all."""
     signals: list[int] = []
     try:
         # Other threads take them, too, so that it is not enough to block them in this one.
@@ -61,7 +61,7 @@ def _blocked() -> Iterator[None]:
 
 
 def begin_apart() -> None:
-    """In a process that another one started: interrupts are for that one to see, and what was postponed there ends."""
+    """For the start of a worker process: ignore SIGINT, which its parent handles, and unblock signals."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)

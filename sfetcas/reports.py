@@ -1,4 +1,4 @@
-"""What the command line prints of answers."""
+"""Text reports of answers, sweeps and checks that the command line prints."""
 
 from __future__ import annotations
 

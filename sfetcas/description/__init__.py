@@ -1,1 +1,1 @@
-"""What the user says, validated at construction: frozen records, each with its rules, and the files they come from."""
+"""The description of a scene: frozen records, validated at construction, and the files that they are read from."""

@@ -1,11 +1,11 @@
-"""What can be asked of an answer: every quantity once, with its name, unit, components and meaning.
+"""Names of quantities of an answer: every quantity once, with its name, unit, components and meaning.
 
 One grammar of names for expectations, ``accuracy_of``, ``until``, sweeps, parameters, measurements, design, generated C
 and the JSON answer::
 
     nodes.tip.position                    a table, the name of a record, a key
     nodes.tip.position.1                  one component, counted from 0
-    nodes.tip.position.y                  the same by its name: x y z, w x y z, or b1 b2 b3 about the axes of a section
+    nodes.tip.position.y                  the same component by its name: x y z, w x y z, or b1 b2 b3 (section axes)
     members.beam.moment at 0.5            at a fraction of the length of a member
     energy.elastic step 2                 of one of several answers: step, time, crossing, limit_point, ...
 """
@@ -38,8 +38,9 @@ __all__ = [
 ]
 
 STATICS, MOTION, PARAMETERS, STEPS = "statics", "motion", "parameters", "steps"
-"""Where quantities are told: equilibria; times of a motion; equilibria as expressions of parameters, in
-:func:`~sfetcas.parametric`, design and generated C; motions as expressions, in optimal control and generated C."""
+"""Kinds of answers: equilibria; states of a motion; equilibria as expressions of parameters
+(:func:`~sfetcas.parametric`, design, generated C); motions as expressions (optimal control, generated C).
+"""
 
 MODES = "modes"
 """Small vibrations."""
@@ -52,21 +53,21 @@ EVERYWHERE = (STATICS, MOTION, PARAMETERS, STEPS)
 
 @dataclass(frozen=True)
 class AnswerKind:
-    """A quantity of answers.
+    """A kind of quantity that answers may have.
 
     Attributes
     ----------
     name : str
-        With NAME in the place of the name of a record: ``nodes.NAME.position``.
+        With NAME for the name of a record: ``nodes.NAME.position``.
     unit : str
-        Empty for what has none.
+        SI unit; empty for dimensionless quantities.
     meaning : str
     where : tuple of str
-        Where it is told, see :data:`EVERYWHERE`.
+        The kinds of answers that have it, see :data:`EVERYWHERE`.
     components : tuple of str
         Names of the components of a vector; empty for a single value.
     along : bool
-        It has a value at each place of a member.
+        Whether it is a field along members.
     applies : callable
         (scene, record) -> whether a record of its table has it.
     """
@@ -81,23 +82,23 @@ class AnswerKind:
 
     @property
     def table(self) -> str:
-        """Its table: ``nodes``; empty for what stands in none."""
+        """Its table in the answer: ``nodes``; empty for a quantity of the whole answer."""
         return self.name.partition(".")[0] if "." in self.name else ""
 
     @property
     def key(self) -> str:
-        """Its key: ``position``; empty where the name of the record is the last word."""
+        """Its key in the table: ``position``; empty where the name ends with that of the record."""
         last = self.name.rpartition(".")[2]
         return "" if last == "NAME" else last
 
     @property
     def numeric(self) -> bool:
-        """Whether it is made of numbers."""
+        """Whether its value consists of numbers."""
         return self.name not in ("certificate.stable", "contacts.NAME.member")
 
     @property
     def named(self) -> bool:
-        """Whether it is of a record of the scene."""
+        """Whether it belongs to a record of the scene, as a node."""
         return "NAME" in self.name.split(".")
 
 
@@ -223,17 +224,17 @@ SELECTED = re.compile(rf"(?P<name>.*\S)\s+(?P<key>{'|'.join(SELECTORS)})\s+(?P<v
 
 @dataclass(frozen=True)
 class AnswerName:
-    """The name of one quantity of an answer, read.
+    """The parsed name of one quantity of an answer.
 
     Attributes
     ----------
     kind : AnswerKind
     record : str
-        Name of the node, member, ... that it is of; empty without one.
+        Name of the node, member, ...; empty for a quantity of the whole answer.
     component : int or None
-        Which component of a vector.
+        Index of a component of a vector.
     selectors : mapping
-        Place along a member (``at``), and of which answer: ``step``, ``time``, ``crossing``, ...
+        Place along a member (``at``), and which of several answers: ``step``, ``time``, ``crossing``, ...
     """
 
     kind: AnswerKind
@@ -243,7 +244,7 @@ class AnswerName:
 
     @property
     def at(self) -> float | None:
-        """The fraction of the length of a member."""
+        """The fraction of the member's length; None where the name has none."""
         return self.selectors.get("at")
 
     @property
@@ -269,13 +270,13 @@ def _shortest(value: float) -> str:
 
 
 def answer_name(text: Any, *where: str) -> AnswerName:
-    """Read a name; whether the scene has such a record says :func:`check_answer`.
+    """Parse a name; :func:`check_answer` checks that the scene has such a record.
 
     Parameters
     ----------
     text : str
     where : str
-        Where it stands, for messages.
+        Keys of the place in the scene where it is given, for messages.
 
     Raises
     ------
@@ -295,7 +296,7 @@ def answer_name(text: Any, *where: str) -> AnswerName:
 
 
 def selected(text: str) -> tuple[str, dict[str, float]]:
-    """A name and its selectors, in the order in which they stand.
+    """Split a text into a name and its selectors, in their order.
 
     Raises
     ------
@@ -359,12 +360,12 @@ def _component(kind: AnswerKind, word: str) -> int:
 
 
 def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
-    """Refuse a name of what the scene does not have, or its answers do not tell.
+    """Refuse a name of a record that the scene does not have, or of a quantity that its answers do not have.
 
     Parameters
     ----------
     where : str
-        Where it shall be told; empty: in the answers of the analysis of the scene.
+        The kind of answer, see :data:`EVERYWHERE`; empty: that of the scene's analysis.
 
     Raises
     ------
@@ -394,7 +395,7 @@ def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
 
 
 def single_number(motion: Any, key: str) -> bool:
-    """Whether what makes a motion is one number: at a driven joint, and a moment about the axis of a hinge."""
+    """Whether what enforces a motion is one number: at a driven joint, or a moment about a hinge axis."""
     return motion.between is not None or (key == "moment" and isinstance(motion.rotation, float))
 
 
@@ -402,7 +403,7 @@ HEAD = "name | unit | components | told of | what it is"
 
 
 def answers_table() -> str:
-    """The quantities as the table of Markdown that stands in the README."""
+    """The kinds of quantities as the Markdown table of the README."""
     rows = [row.split(" |") for row in (HEAD, *TABLE.strip().splitlines())]
     cells = [[cell.strip() for cell in row] for row in rows]
     quoted = [cells[0], ["---"] * 5, *([f"`{name.removesuffix(' at')}`", *rest] for name, *rest in cells[1:])]

@@ -32,7 +32,7 @@ def out_of_plane(
     contacts: Mapping[str, Contact],
     rotating: Triple | None,
 ) -> Finding | None:
-    """The place of the first thing out of x-y with what it does there; None where all lies in it."""
+    """Place in the scene and description of the first thing that does not lie in x-y; None where all does."""
     if gravity is not None and _leaves(gravity):
         return ("gravity",), "has a z component"
     if rotating is not None and _turns_out(rotating):

@@ -21,11 +21,11 @@ __all__ = ["History", "Load", "Motion"]
 
 
 class History(Record):
-    """A factor over time, or over the step's factor in statics.
+    """A factor as a function of time, or in statics of the load factor.
 
     Parameters
     ----------
-    t : (n,), s or the step's factor - rising
+    t : (n,), s, or in statics the load factor - rising
     value : (n,) - the factor at t, linear between and constant outside
     polynomial : (n - 1, any) - instead of value: for each interval c0 + c1 x + ... in
         x = (t - t_i)/(t_i+1 - t_i), constant outside
@@ -124,7 +124,7 @@ class History(Record):
 
     @cached_property
     def kinks(self) -> tuple[float, ...]:
-        """Where the factor, its rate or its second derivative jumps by more than coefficients of six digits do."""
+        """Values of t where the factor or its first or second derivative jumps, by more than six-digit rounding."""
         size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._terms(i))) for i in range(len(self.t) - 1)), 0.0)
         found = []
         for i, t in enumerate(self.t):
@@ -143,7 +143,7 @@ class History(Record):
 
     @cached_property
     def rounding(self) -> tuple[float, float]:
-        """What is no more than the rounding of its coefficients: of the factor, and of the rate in 1/s."""
+        """Bounds below which a jump is rounding of the coefficients: of the factor, and of its rate in 1/s."""
         size, rate = abs(self.factor(self.t[0])), 0.0
         for i, (left, right) in enumerate(pairwise(self.t)):
             terms = self._terms(i)
@@ -180,10 +180,10 @@ class Load(Record):
     node : name of the node it acts on; or
     member, at : name of the member, and the fraction of its length; a distributed load acts along all of it
     value : (3,), fixed axes of the undeformed scene; a moment about z may be one number
-    frame : fixed, or follower: the value turns with the node, or with the section under it; section, of a
-        distributed load: the value is along b1, b2, b3 of the sections and turns with them
-    profile : factor along a distributed load
-    history : name of the history that replaces the step's factor
+    frame : fixed (dead load); follower: the value rotates with the node, or with the section it acts on; section, of a
+        distributed load: the value is along b1, b2, b3 of the sections and rotates with them
+    profile : factor along a distributed load: a number, :class:`Table` or :class:`Polynomial`
+    history : name of the history that replaces the load factor
     """
 
     type: Literal["force", "moment", "distributed"]
@@ -231,27 +231,27 @@ class Load(Record):
 
     @property
     def follows(self) -> bool:
-        """Whether it is a force that turns with what it acts on."""
+        """Whether it is a follower load."""
         return self.frame != "fixed" and self.type != "moment"
 
     @property
     def vector(self) -> tuple[float, float, float]:
-        """(3,), N, N m or N/m, fixed axes; one number is a moment about z."""
+        """The value with three components (3,), N, N m or N/m, fixed axes; a single number is a moment about z."""
         return self.value if isinstance(self.value, tuple) else (0.0, 0.0, self.value)
 
 
 class Motion(Record):
-    """A prescribed displacement or rotation of a held node, or both.
+    """A prescribed displacement or rotation at a support, or of a joint between two members.
 
     Parameters
     ----------
     node : name of the node
     displacement : (3,), m, fixed axes
     rotation : rad, about the axis of a hinge (z where the node is clamped in a plane scene);
-        or (3,), rad, fixed axes - rotation vector of a node that cannot turn by itself
+        or (3,), rad, fixed axes - rotation vector of a node whose support prevents rotation
     between : drives a joint instead of a support: two members that end at the node, hinged there (rotation: angle
         of the second against the first) or the second released as a slider (displacement along the direction)
-    history : name of the history that replaces the step's factor
+    history : name of the history that replaces the load factor
     """
 
     node: str

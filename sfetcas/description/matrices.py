@@ -68,7 +68,7 @@ Stiffness = Annotated[Rows, BeforeValidator(lambda value: _matrix(value, "stiffn
 """A square matrix: rows of numbers, an array, or the name of a file (.npz, or Matrix Market .mtx)."""
 
 Mass = Annotated[Rows, BeforeValidator(lambda value: _matrix(value, "mass"))]
-"""The same for a mass."""
+"""The mass matrix of a small member: an array, or the name of a file."""
 
 
 def read_matrix(path: Path, name: str = "stiffness") -> Floats:
@@ -218,7 +218,7 @@ def _whole(numbers: Floats) -> NDArray[np.intp]:
 
 
 def check_stiffness(matrix: ArrayLike, nodes: int) -> None:
-    """Refuse a stiffness of the wrong size or that is not symmetric.
+    """Refuse a stiffness matrix that is not (6 n, 6 n) for n nodes or not symmetric; N/m, N, N m.
 
     Raises
     ------
@@ -229,7 +229,13 @@ def check_stiffness(matrix: ArrayLike, nodes: int) -> None:
 
 
 def check_mass(matrix: ArrayLike, nodes: int, condensed: bool) -> None:
-    """The same for a mass, which belongs to a stiffness."""
+    """Refuse a mass matrix that is not (6 n, 6 n) for n nodes, not symmetric, or without a stiffness; kg, kg m, kg m2.
+
+    Raises
+    ------
+    SceneError
+        Place within the member.
+    """
     if not condensed:
         raise SceneError("accepted with a stiffness only: a member with a section has the mass of that", ("mass",))
     _check_symmetric(np.asarray(matrix), nodes, "mass")

@@ -1,4 +1,4 @@
-"""What vibrations and motions ask of a scene: masses, a beginning in time, and motions that do not jump."""
+"""Checks of scenes for vibrations and motions: masses, initial conditions, and prescribed motions that do not jump."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def check_masses(
 
 
 def check_no_contact(analysis: Analysis, contacts: Mapping[str, Contact], springs: Mapping[str, Spring]) -> None:
-    """Refuse what stops members, of which vibrations and motions know nothing.
+    """Refuse contacts and stops, which vibrations and motions cannot treat.
 
     Raises
     ------

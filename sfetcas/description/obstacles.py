@@ -34,23 +34,24 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """An obstacle by numbers.
+    """An obstacle in numbers, SI units and fixed axes.
 
     Attributes
     ----------
     kind : str
-        flat, round or sharp.
+        ``flat``, ``round`` or ``sharp``.
     place : ndarray (3,)
-        Point of a plane, centre, point of an edge.
+        A point of a plane, a centre, or a point of an edge, m.
     across : ndarray (3, 3)
-        Projection on the directions that count: on the normal, on those across an axis, on those across an edge.
+        Projection onto the directions of the distance: onto the normal, across an axis, across an edge.
     normal : ndarray (3,)
-        Of a plane; direction of an edge (z for a point in the plane); zero for what is round.
+        Unit normal of a plane; direction of an edge (z for a point in the plane); zero for round obstacles.
     radius : float
+        m.
     sign : float
         1, or -1 where members are inside.
     side : ndarray (3,)
-        Of an edge: where members are allowed.
+        For an edge: direction towards the permitted side.
     """
 
     kind: Literal["flat", "round", "sharp"]
@@ -62,7 +63,7 @@ class Obstacle:
     side: Array | None = None
 
     def gaps(self, points: Array, tangents: Array, offset: float = 0.0, way: float = 1.0) -> Array:
-        """Distances (n,) of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
+        """Distances (n,), m, of points (n, 3) of a member, negative inside; of an edge along the member's normal."""
         if self.kind == "round":
             return self.sign * (np.linalg.norm((points - self.place) @ self.across, axis=1) - self.radius) + offset
         normals = self.normals(points, tangents, way)
@@ -72,7 +73,7 @@ class Obstacle:
         return np.einsum("ni,ni->n", points - self.place, normals) + offset
 
     def normals(self, points: Array, tangents: Array, way: float = 1.0) -> Array:
-        """Unit normals (n, 3) towards where members are allowed."""
+        """Unit normals (n, 3), fixed axes, towards the side on which members are allowed."""
         if self.kind == "flat":
             return np.broadcast_to(self.normal, points.shape)
         if self.kind == "round":
@@ -90,14 +91,14 @@ class Obstacle:
 
 
 def rounded(stop: Obstacle, radius: float) -> Obstacle:
-    """The obstacle itself, or in the place of an edge something thin and round behind it."""
+    """The obstacle; an edge is replaced by a thin rod of given radius, m, behind it."""
     if stop.side is None:
         return stop
     return Obstacle("round", stop.place - radius * unit(stop.side), stop.across, np.zeros(3), radius)
 
 
 def obstacle(contact: Contact, space: bool) -> Obstacle:
-    """The numbers of an obstacle; in the plane a line along z is a point, one within it a wall."""
+    """The obstacle of a contact in numbers; in the plane a line along z is a point, and one within x-y a wall."""
     eye = np.eye(3)
     if contact.type == "plane" or (contact.type == "line" and not space and abs(unit(contact.direction)[2]) < 0.5):
         side = None if contact.side is None else np.asarray(contact.side, dtype=float)
@@ -124,10 +125,7 @@ def members_of(contact: Contact, members: Iterable[str]) -> list[str]:
 
 
 def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle) -> bool:
-    """Whether a node can be pushed by an obstacle: no support holds it against it.
-
-    A slider takes part where its guide leads towards the obstacle and nothing drives it.
-    """
+    """Whether an obstacle can push a node: it is free, or its guide leads towards the obstacle and is not driven."""
     if node.support == "free":
         return True
     if not node.slides or any(m.node == name and m.displacement is not None for m in motions):
@@ -138,10 +136,10 @@ def takes_part(name: str, node: Node, motions: Iterable[Motion], stop: Obstacle)
 
 
 def swept(stop: Obstacle, before: Array, after: Array) -> bool:
-    """Whether a curve that moves from some places (n, 3) to others (m, 3) runs over the middle of an obstacle.
+    """Whether a curve that moves from points (n, 3) to points (m, 3), m, passes over the middle of an obstacle.
 
-    The two curves and what joins their ends wind round it then.  A plane is nowhere run over, nor a sphere, nor what
-    members are inside of.
+    The closed curve of both and of what joins their ends then winds round the middle.  Planes, spheres, and obstacles
+    that members are inside of, cannot be passed over.
     """
     if stop.kind == "flat" or stop.sign < 0.0 or np.linalg.matrix_rank(stop.across) != 2:
         return False
@@ -155,7 +153,7 @@ Curve = Callable[[Array], Array]
 
 
 def nearest(edge: Obstacle, positions: Curve, tangents: Curve, samples: Array) -> list[float]:
-    """Fractions at which a curve comes nearest to an edge, by its neighbourhood."""
+    """Fractions of the length, near the ``samples`` (n,), at which a curve is locally nearest to an edge."""
     slopes = edge_slopes(edge, positions, tangents, samples)
     found = []
     for i in np.flatnonzero((slopes[:-1] <= 0.0) & (slopes[1:] > 0.0)):

@@ -44,7 +44,7 @@ R = TypeVar("R", bound="Record")
 
 
 def say(value: object) -> str:
-    """A found value, short enough for a sentence."""
+    """A value as text, short enough for a message."""
     try:
         return _short(repr(list(value) if isinstance(value, tuple) else value))
     except ValueError:
@@ -102,12 +102,12 @@ def number(value: Any) -> float:
 
 
 def whole(value: Any, least: int, most: int | None = None, *, what: str = "whole number", name: str = "") -> int:
-    """A whole number within limits as an int: one of Python or NumPy; in messages it is ``what``, with its ``name``.
+    """A whole number within limits as an int, from Python or NumPy; messages call it ``what``, with its ``name``.
 
     Raises
     ------
     SceneError
-        Anything else, also true and false and whole numbers written with a dot.
+        Anything else, also booleans and floats.
     """
     try:
         found = None if isinstance(value, bool) else operator.index(value)
@@ -260,7 +260,7 @@ class Record(BaseModel):
 
 
 def counted(number: int, one: str, more: str | None = None) -> str:
-    """A number with what it counts: ``1 way out``, ``2 ways out``; without a third word the plural ends on s."""
+    """A number and what it counts: ``1 way out``, ``2 ways out``; without ``more`` the plural ends on s."""
     return f"{number} {one if number == 1 else more or one + 's'}"
 
 

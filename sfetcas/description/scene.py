@@ -48,18 +48,18 @@ __all__ = [
 
 
 class Scene(Record):
-    """Flexible members between nodes, how they are held, loaded and moved, and what is asked for.
+    """A structure of members between nodes, with its supports, loads and prescribed motions, and its analysis.
 
     Parameters
     ----------
     title, source : free text
     dimension : plane (x-y), space, or auto: plane where everything lies in x-y
     gravity : (3,), m/s2, fixed axes
-    rotating : (3,), rad/s - the axes turn with this about the origin, and the answers are in them
+    rotating : (3,), rad/s - angular velocity of the axes about the origin; answers are in the rotating axes
     sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only; ``prescribed``
         is another name of ``motions``, which prescribe displacements and rotations
-    analysis : what is asked for
-    expect : what is known about the answer
+    analysis : what is to be computed
+    expect : known values to compare the answer with
 
     Raises
     ------
@@ -128,7 +128,7 @@ class Scene(Record):
         return math.hypot(*np.ptp(points, axis=0))
 
     def spring_axis(self, name: str) -> tuple[float, float, float]:
-        """Axis of a rotational spring, fixed axes of the undeformed scene: its own, or that of its node's joint."""
+        """Axis (3,) of a rotational spring, fixed axes of the undeformed scene: its own, or that of its joint."""
         spring = self.springs[name]
         return self.nodes[spring.node].joint_axis if spring.axis is None else spring.axis
 
@@ -176,12 +176,12 @@ def _check_members(scene: Scene) -> None:
 
 
 def check_loaded(scene: Scene) -> None:
-    """Refuse a scene of which nothing moves or strains anything; it can be looked at, but there is nothing to solve.
+    """Refuse a static scene without any load; it can be displayed, but there is nothing to solve.
 
     Raises
     ------
     SceneError
-        There is no load, no motion, no gravity, no turning of the axes and no spring that is not at rest.
+        There are no loads, prescribed motions, gravity, rotation of the axes or preloaded springs.
     """
     if scene.analysis.type in ("modes", "dynamic"):
         return
@@ -214,7 +214,7 @@ def _check_lengths(scene: Scene) -> None:
 
 
 SHORTEST, LONGEST = 1e-100, 1e100
-"""Of members, m."""
+"""Smallest and largest length of a member, m."""
 
 
 def _check_releases(scene: Scene) -> None:
@@ -482,17 +482,17 @@ def _check_expect(scene: Scene) -> None:
 
 
 def check_scene(value: object, call: str) -> None:
-    """Refuse what is no scene where a public function takes one.
+    """Refuse an argument that is no scene.
 
     Parameters
     ----------
-    value : what was given
-    call : the call with the scene in braces, as ``check({}, ...)``
+    value : the argument
+    call : the call for the message, with braces for the argument: ``check({}, ...)``
 
     Raises
     ------
     SceneError
-        Names of files and tables get the call that would take them.
+        For names of files and for tables the message shows how to make a scene of them.
     """
     if isinstance(value, Scene):
         return

@@ -67,7 +67,7 @@ def parse(text: str, format: str, folder: Path | None = None) -> Scene:
     ----------
     text : the content of a scene file
     format : toml or json
-    folder : where files that the scene names are, unless they are named from the root; left out: where one is
+    folder : folder of relative file names in the scene; left out: the current one
 
     Raises
     ------

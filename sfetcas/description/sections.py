@@ -65,7 +65,7 @@ class Polynomial(Record):
 
 
 def quantity(value: Any) -> Any:
-    """A quantity along a member from what stands for it: a number, a table of a file, or a record.
+    """A quantity along a member from a number, a table as in a file, or a record.
 
     Raises
     ------
@@ -326,7 +326,7 @@ class CrossSection(Record):
 
     @property
     def even(self) -> bool:
-        """Whether it is the same all along the member."""
+        """Whether it is constant along the member."""
         return not any(isinstance(item, (Table, Polynomial)) for item in self._varying())
 
     def _varying(self) -> list[Quantity]:
@@ -335,7 +335,7 @@ class CrossSection(Record):
         return [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
 
     def missing(self, names: Iterable[str]) -> list[str]:
-        """Which of EI2, EI3, GJ, rhoA (N m2, kg/m) this section cannot tell, in the order asked."""
+        """Which of the names EI2, EI3, GJ, rhoA (N m2, kg/m) this section does not define, in the order given."""
         if self.shape is None:
             known = set(self._given(_NUMBERS)) | {"rhoI"}
         else:
@@ -354,7 +354,7 @@ class CrossSection(Record):
 
         Returns
         -------
-        (n, 3) - GJ, EI2, EI3 in N m2 (about b1, b2, b3), nan where not known
+        (n, 3) - GJ, EI2, EI3 in N m2 (about b1, b2, b3), nan where not defined
         """
         if self.shape is None:
             return np.stack([self._value(name, x) for name in ("GJ", "EI2", "EI3")], axis=1)
@@ -364,7 +364,7 @@ class CrossSection(Record):
         return np.stack([shear * torsion, young * about_2, young * about_3], axis=1)
 
     def fibres(self, x: ArrayLike) -> Floats:
-        """E and the outermost fibre of a shape: x (n,) fractions -> (n, 3), N/m2 and m from the axes b2 and b3."""
+        """Young's modulus (N/m2) and distances (m) of the outermost fibre from axes b2 and b3, (n, 3), at x (n,)."""
         half, names = {
             "rectangle": (0.5, ("width", "height")),
             "circle": (1.0, ("radius", "radius")),

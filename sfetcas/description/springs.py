@@ -1,4 +1,4 @@
-"""Springs between members, nodes and the ground."""
+"""Springs, dampers and stops between members, between nodes, or between them and the ground."""
 
 from __future__ import annotations
 

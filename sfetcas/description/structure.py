@@ -1,4 +1,4 @@
-"""Nodes and the members between them."""
+"""The nodes of a structure, with their supports and joints, and the members between them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["SLIDING", "Member", "Node", "released", "unit"]
 
 
 def unit(direction: Iterable[float]) -> tuple[float, float, float]:
-    """The direction with length one, also where its square is no number of the machine."""
+    """The unit vector of a direction, also where squares of its components overflow or underflow."""
     x, y, z = direction
     largest = max(abs(x), abs(y), abs(z))
     x, y, z = x / largest, y / largest, z / largest
@@ -76,7 +76,7 @@ Spin = Annotated[Quantity | tuple[float, float, float], BeforeValidator(_spin)]
 
 
 class Node(Record):
-    """A point where members end, are joined and are held.
+    """A point where members end, with the joint between them and the support.
 
     Parameters
     ----------
@@ -127,22 +127,22 @@ class Node(Record):
 
     @property
     def slides(self) -> bool:
-        """Whether it is held but for one direction."""
+        """Whether its support is a guide along one direction."""
         return self.support in ("slider", "cylindrical")
 
     @property
     def has_hinge(self) -> bool:
-        """Whether its support or its joint turns about the axis."""
+        """Whether its support or its joint is a hinge."""
         return "hinge" in (self.support, self.rotation, self.joint) or self.is_universal
 
     @property
     def is_universal(self) -> bool:
-        """Whether its support or its joint needs a second axis."""
+        """Whether its support or its joint is a universal joint, with two axes."""
         return "universal" in (self.support, self.joint)
 
     @property
     def turn(self) -> Literal["free", "fixed", "hinge", "ball", "universal"]:
-        """How the ground lets the node turn."""
+        """How its support lets the node rotate."""
         if self.support == "slider":
             return self.rotation
         if self.support == "cylindrical":
@@ -151,25 +151,25 @@ class Node(Record):
 
     @property
     def turn_axis(self) -> tuple[float, float, float]:
-        """Axis about which its support lets it turn: the direction of a cylindrical one."""
+        """Axis about which its support lets it rotate; the direction for a cylindrical support."""
         return self.direction if self.support == "cylindrical" and self.direction is not None else self.axis
 
     @property
     def joint_axis(self) -> tuple[float, float, float]:
-        """Axis about which its support or its joint turns: the direction of a cylindrical one."""
+        """Axis of its support or its joint; the direction for a cylindrical support."""
         cylindrical = self.direction is not None and "cylindrical" in (self.support, self.joint)
         return self.direction if cylindrical and self.direction is not None else self.axis
 
 
 class Member(Record):
-    """A member between nodes: a flexible inextensible beam, a rigid body, or a body of small deformation.
+    """A member between nodes: a flexible inextensible beam, a rigid body, or a superelement with small deformation.
 
     Parameters
     ----------
     nodes : names of the nodes at its first and second end; a small member with a stiffness may have more
     section : name of the cross-section; a rigid member needs it for its mass only, a small one has it instead of
         a stiffness
-    type : flexible, rigid, or small (or superelement: linear elasticity in a frame that the member carries)
+    type : flexible, rigid, or small (or superelement: linear elasticity in a corotated frame)
     shape : the unloaded centre line
     b2 : (3,), fixed axes - direction of the section's axis b2 at the first end; left out: b3 along z
         where the member lies in x-y

@@ -1,4 +1,4 @@
-"""What supports hold, and which motions they can be given."""
+"""Which motions supports restrain, and which they can prescribe."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def drives(node: Node, displacement: Triple | None) -> bool:
 
 
 def held_directions(node: Node, displacement: Triple | None = None) -> Floats:
-    """(k, 3): directions in which the ground holds the node, a slider that is driven in all of them."""
+    """Unit directions (k, 3) in which the ground restrains a node's displacement; all for a driven slider."""
     if node.support == "free":
         return np.zeros((0, 3))
     if not node.slides or node.direction is None or drives(node, displacement):
@@ -50,7 +50,7 @@ def held_directions(node: Node, displacement: Triple | None = None) -> Floats:
 def components(
     nodes: Iterable[str], members: Mapping[str, Member], springs: Mapping[str, Spring]
 ) -> Iterator[list[str]]:
-    """The names of the nodes of each part that members and springs connect."""
+    """Names of the nodes of each part of the structure that members and springs connect."""
     neighbours: dict[str, list[str]] = {name: [] for name in nodes}
     pairs = [(m.nodes[0], other) for m in members.values() for other in m.nodes[1:]]
     for first, second in pairs + [(s.node, s.to) for s in springs.values() if s.to is not None]:
@@ -69,7 +69,7 @@ def components(
 
 
 def free_directions(held: Floats, dimension: str) -> Floats:
-    """(k, 3): unit directions across all of the held ones, within x-y in a plane scene."""
+    """Unit directions (k, 3) normal to all restrained ones (m, 3), within x-y in a plane scene."""
     axes = 2 if dimension == "plane" else 3
     if not len(held):
         return np.eye(3)[:axes]
@@ -106,7 +106,7 @@ def check_floating(
 
 
 def free_to_move(motion: str) -> str:
-    """The sentence that refuses a motion that nothing holds, whoever finds it."""
+    """The sentence that refuses an unrestrained motion."""
     return f"free to move: {motion}; neither stiffness nor a load holds it, add a support, a spring or a motion"
 
 
@@ -116,7 +116,7 @@ def along(direction: Floats | Sequence[float]) -> str:
 
 
 def upwards(direction: Floats) -> Floats:
-    """The same direction with its largest component above zero, of equal ones the first."""
+    """The direction with its sign chosen such that its largest component, of equal ones the first, is positive."""
     return np.asarray(direction * np.sign(direction[first_of_largest(direction)]))
 
 
@@ -177,7 +177,7 @@ def _check_rotation(motion: Motion, node: Node, dimension: str, reason: str) -> 
 
 
 def turned_about(motion: Motion, node: Node, members: Mapping[str, Member]) -> Triple:
-    """Axis about which a motion turns its node, or where it drives a joint its second member against the first."""
+    """Axis (3,) about which a motion rotates its node or, at a driven joint, the second member."""
     if motion.between is None:
         return node.turn_axis
     hinged = node.joint != "rigid" or "hinge" in members[motion.between[1]].release

@@ -1,4 +1,4 @@
-"""What is asked of a scene: its analysis, and the values that the answer is compared with."""
+"""What is asked of a scene: its analysis, and known values that the answer is compared with."""
 
 from __future__ import annotations
 
@@ -93,13 +93,13 @@ def _expected(value: Any) -> Any:
 
 
 class Until(Record):
-    """What ends a motion before its time: a quantity that passes a value.
+    """A condition that ends a motion early: a quantity passes a value.
 
     Parameters
     ----------
-    quantity : place in the answer, as ``nodes.tip.position``
-    component : 0, 1 or 2 - of a vector; left out for what is one number
-    above, below : in the unit of the quantity - one of them: the motion ends when the quantity gets beyond it
+    quantity : name in the answer, as ``nodes.tip.position``
+    component : 0, 1 or 2 - of a vector; left out for a single number
+    above, below : in the unit of the quantity - one of them: the motion ends when the quantity passes it
     """
 
     quantity: str
@@ -115,35 +115,35 @@ class Until(Record):
 
 
 class Analysis(Record):
-    """What is asked for.
+    """The analysis of a scene.
 
     Parameters
     ----------
     type : static; path: the equilibria from factor 0 on, through limit points; modes: small vibrations about the
         equilibrium of the loads (factor 1); or dynamic: the motion in time
     accuracy : wanted error of the positions relative to the size of the scene, 1e-14 to 0.1
-    accuracy_of : static, dynamic: place in the answer of a quantity that the accuracy is meant of instead, as
-        ``reactions.A.moment`` or ``members.beam.moment at 0.5``: positions over the size of the scene, rotations in
-        rad, all else over itself, along members over the largest there
-    steps : (n,) - factors of the loads, gravity and motions that have no history, each an answer of its own
+    accuracy_of : static, dynamic: name of the quantity that the accuracy refers to instead, as ``reactions.A.moment``
+        or ``members.beam.moment at 0.5``; errors of positions are over the size of the scene, of rotations in rad, all
+        others relative to the value, along members to the largest there
+    steps : (n,) - load factors: each multiplies loads, gravity and motions without history, and gives an answer
     unstable : leave an unstable equilibrium for a stable one, or stay there
     equilibria : one, to which the loads lead when they grow together from zero, or all that a search finds
     range : (2,) - path: the factors between which it is followed, downwards where the range ends at 0
-    points : path: it ends after so many points
+    points : path: largest number of points
     branches : path: from the first so many bifurcation points the branches that cross there are followed too, to
         both sides, each for so many points; their answers stand after those of the path, in the order of the
         bifurcations and of the sides 1 and -1.  0, the default, stays on the path.  Where several eigenvalues
         vanish at once the first shape is taken; ``switch`` takes others
-    modes : so many of the lowest, 8 where left out; of a path at each of its points, where left out none
+    modes : number of the lowest modes, 8 where left out; of a path at each of its points, where left out none
     end : s - dynamic: the motion is followed from 0 to this time
     output : s - dynamic: spacing of the answers, left out: a hundredth of the span
-    step : s - dynamic: fixed step in time, left out: chosen by the accuracy
-    integrator : dynamic: how steps in time are made, left out: chosen
+    step : s - dynamic: fixed time step, left out: chosen by the accuracy
+    integrator : dynamic: time integration method, left out: radau-3
     initial : dynamic: the motion begins undeformed, or at rest in the equilibrium of the loads and motions as their
         histories give them at t = 0 (factor 1 where there is none)
     cut : dynamic: names of loads that act in that equilibrium only
-    release : dynamic: names of nodes whose support holds in that equilibrium only
-    until : dynamic: what ends the motion earlier
+    release : dynamic: names of nodes whose support exists in that equilibrium only
+    until : dynamic: a condition that ends the motion earlier
 
     On a path each crossing of a factor of ``steps`` is an answer, in the order in which they are met.
     """
@@ -217,22 +217,22 @@ class Analysis(Record):
 
     @property
     def count_of_modes(self) -> int:
-        """How many modes are asked for: none on a path that does not say so."""
+        """Number of modes asked for; zero on a path that does not ask for modes."""
         return self.modes or (USUAL_MODES if self.type == "modes" else 0)
 
     @property
     def moves(self) -> bool:
-        """Whether masses count: vibrations or a motion are asked for."""
+        """Whether masses matter: vibrations or a motion are asked for."""
         return self.type == "dynamic" or self.count_of_modes > 0
 
 
 class Expect(Record):
-    """What the literature or an independent method says about one quantity of one answer.
+    """An expected value of one quantity of one answer, from the literature or an independent method.
 
     Parameters
     ----------
-    quantity : place in the answer, as ``nodes.B.position``, ``nodes.B.position.y``; the keys from ``at`` on may stand
-        behind it instead, ``members.beam.moment at 0.5``
+    quantity : name in the answer, as ``nodes.B.position``, ``nodes.B.position.y``; the keys from ``at`` on may be
+        appended to it instead, ``members.beam.moment at 0.5``
     value : number, nested list of numbers, true, false or a text, in the unit of the quantity
     tolerance : largest accepted absolute difference; may be left out for what is met exactly
     why : reason for the tolerance
@@ -240,7 +240,7 @@ class Expect(Record):
     at : fraction of the length of a member
     step : factor of the answer; left out: the last step
     time : s - dynamic: time of the answer, from 0 to the end; left out: the end
-    equilibrium : expects of the same number are met by one of several equilibria, which one is free
+    equilibrium : with several equilibria: all expectations with the same number have to be met by one of these
     crossing : path: which crossing of that factor, 1 is the first
     limit_point, bifurcation, flutter_point : path: which limit, bifurcation or flutter point
     """

@@ -1,1 +1,1 @@
-"""Inverse problems, design over several load cases, and quasi-static trajectories: all equilibria at once."""
+"""Inverse problems, design over several load cases, and quasi-static trajectories, each as one nonlinear program."""

@@ -1,4 +1,4 @@
-"""All cases, answers and relations of a formulation as one nonlinear program."""
+"""All load cases, answers and constraints of a formulation assembled as one nonlinear program."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ REQUIRED = "required "
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """The lowest eigenvalue of a case and its shape, kept above a margin.
+    """A stability constraint: the lowest eigenvalue of a case, which has to stay above a margin.
 
     Attributes
     ----------
     case : int
     shape : ndarray (total,)
+        Its eigenvector, dimensionless.
     value, margin : float
         Dimensionless.
     """
@@ -45,7 +46,7 @@ class Pair:
 
 
 def places_asked(formulation: Formulation) -> tuple[list[str], dict[str, tuple[float, ...]]]:
-    """Names of all answers, and for each member all places at which it is told of."""
+    """Names of all answers, and for each member all fractions of its length at which answers are needed."""
     asked = formulation.asked.values()
     names = list(dict.fromkeys(one.name for one in asked))
     places: dict[str, set[float]] = {}
@@ -63,12 +64,13 @@ class Assembled:
     formulation : Formulation
     equations : CaseEquations
     states : ndarray (cases, states)
-        References: equilibria, or what was near them.
+        Reference states, near equilibria.
     values : mapping of str to ndarray
-        Free numbers to begin with.
+        Start values of the free numbers.
     pairs : sequence of Pair
-        Eigenvalues that are kept above a margin.
+        Stability constraints.
     kernels : str
+        ``auto``, ``compiled`` or ``interpreted``.
     """
 
     def __init__(
@@ -282,7 +284,7 @@ class Assembled:
 
     @property
     def freedom(self) -> tuple[int, int]:
-        """Numbers that are free, and equations that are asked for beside equilibria."""
+        """Number of free numbers, and of equality constraints beside the equilibria."""
         free = sum(int((one.low < one.high).sum()) for one in self.formulation.free.values())
         rows = 0
         for one in self.formulation.required:
@@ -291,11 +293,11 @@ class Assembled:
         return free, rows
 
     def nlp(self) -> NLP:
-        """The program."""
+        """The nonlinear program."""
         return self.pieces.nlp()
 
     def recentre(self, states: Array) -> None:
-        """Take other references: constants of the program, which is not made again."""
+        """Replace the reference states (cases, states), dimensionless constants of the program, which is kept."""
         self._c = np.concatenate([states, self._fixed[:, self.equations.fixed]], axis=1)
         self.states = states
         self.pieces.set_constants(STATES, self._c)
@@ -305,52 +307,52 @@ class Assembled:
             self.pieces.set_constants("stability", self._c[[pair.case for pair in self._pairs]])
 
     def recentred(self, x: Array) -> Array:
-        """The same answer from where it stands: steps are zero."""
+        """The solution x (n,) of the program about its own states as new references: its steps are zero."""
         self.recentre(self.arrived(x))
         found = x.copy()
         found[self._steps.index] = 0.0
         return found
 
     def tell(self, steps: Array, values: Array | None = None) -> Array:
-        """All results of all cases after steps, (cases, results); ``values`` are all unknowns."""
+        """All results (cases, results), SI units, after steps (cases, total); ``values`` are all free numbers."""
         x = self.pieces.guess if values is None else values
         w = np.concatenate([steps, x[self._numbers]], axis=1)
         return np.stack([np.array(self.equations.tell(a, b)).ravel() for a, b in zip(w, self._c, strict=True)])
 
     def unknowns(self, x: Array) -> Array:
-        """All unknowns in their own units."""
+        """All unknowns (n,) in their own units from a scaled solution x."""
         return np.asarray(x * self.pieces.units)
 
     def values(self, x: Array) -> dict[str, Array]:
-        """Free numbers of an answer of the program."""
+        """The free numbers by name, in their own units, from a solution x (n,) of the program."""
         return {name: self.pieces.value(block, x) for name, block in self._free.items()}
 
     def numbers(self, x: Array) -> Array:
-        """All numbers of all cases, (cases, numbers)."""
+        """All numbers of the scene in all cases, (cases, numbers), in their own units."""
         found = self._fixed.copy()
         found[:, self.equations.free] = self.unknowns(x)[self._numbers]
         return found
 
     def steps(self, x: Array) -> Array:
-        """Steps from the references, (cases, total)."""
+        """Steps from the reference states, (cases, total), dimensionless."""
         return self.pieces.value(self._steps, x)
 
     def turned(self, x: Array, y: Array) -> float:
-        """Largest rotation of a node between two answers, rad."""
+        """Largest rotation of a node between two solutions, rad."""
         turning = self.equations.program.equations.turning_unknowns
         return float(np.abs(self.steps(y) - self.steps(x))[:, :turning].max(initial=0.0))
 
     def arrived(self, x: Array) -> Array:
-        """States after the steps, (cases, states)."""
+        """States after the steps, (cases, states), dimensionless."""
         w = np.concatenate([self.steps(x), self.unknowns(x)[self._numbers]], axis=1)
         return np.stack([np.array(self.equations.arrive(a, b)).ravel() for a, b in zip(w, self._c, strict=True)])
 
     def shapes(self, x: Array) -> Array:
-        """Shapes of the eigenvalues that are kept above a margin, (pairs, total)."""
+        """Eigenvectors of the stability constraints, (pairs, total), dimensionless."""
         return self.pieces.value(self.pieces.blocks["shapes"], x)
 
     def eigenvalues(self, x: Array) -> Array:
-        """These eigenvalues, dimensionless, (pairs,)."""
+        """Eigenvalues of the stability constraints, (pairs,), dimensionless."""
         return self.pieces.value(self.pieces.blocks["eigenvalues"], x).ravel()
 
 

@@ -1,4 +1,4 @@
-"""Bounds that contradict each other, found before anything is solved."""
+"""Detection of contradictory bounds and linear constraints before anything is solved."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["refuse_contradictions"]
 
 
 def refuse_contradictions(formulation: Formulation) -> None:
-    """Refuse linear relations that bounds, or relations before them, exclude.
+    """Refuse linear constraints that cannot be met within bounds and constraints before them.
 
     Raises
     ------
     SceneError
-        Names the relation, what it asks for, and what is left of it.
+        Names the constraint, the value it requires, and the range that is possible.
     """
     known: list[Free | Asked] = [*formulation.free.values(), *formulation.asked.values()]
     symbols = [one.symbol for one in known]

@@ -1,4 +1,4 @@
-"""What an answer of a program is worth: each case again by Newton's method, its stability, and half the elements."""
+"""Certification of a solution: each case again by Newton's method, with its stability, and on half as long elements."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class Certified:
     equilibrium : Equilibrium
         On the mesh of the program.
     shape : ndarray
-        Its softest shape: rotations, then displacements.
+        Eigenvector of its lowest eigenvalue: rotations (rad), then displacements (dimensionless).
     smallest : float
         The eigenvalue, dimensionless.
     prepared : Prepared
-        What it was solved with.
+        Its model.
     error : float
-        Difference of positions to those on half the elements' length, over the size of the scene.
+        Difference of positions to those with all elements halved, over the size of the scene.
     """
 
     equilibrium: Equilibrium
@@ -51,7 +51,7 @@ class Certified:
 
 
 def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -> Certified:
-    """A case that a program found, looked at by what knows nothing of the program.
+    """Solve a case again, independently of the program, and certify it.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -
 
 
 def prepared_case(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepared:
-    """The scene of a case on a mesh, in the units of the program: those of multipliers, too."""
+    """The model of a case on a mesh, with the units of the program."""
     assembly: Any = equations.assembly
     return Prepared(assemble(scene, mesh, assembly=assembly, scales=equations.scales))
 

@@ -1,4 +1,4 @@
-"""Inverse problems and design over several load cases: numbers of a scene as unknowns with bounds."""
+"""Design and inverse problems over several load cases, with numbers of a scene as unknowns."""
 
 from __future__ import annotations
 
@@ -34,16 +34,17 @@ ONE = ""
 
 @dataclass(frozen=True, eq=False)
 class DesignIterate:
-    """Where an unconverged solution stood: never an answer.
+    """The last iterate of a problem that did not converge; not a solution.
 
     Attributes
     ----------
     values : mapping of str to ndarray
-        All unknowns; those of cases are called ``case: name``.
+        All unknowns, in the units of the scene; inputs of a case are called ``case: name``.
     told : mapping of (case, name, places) to ndarray
-        Answers that were asked for.
+        The answers that expressions use.
     objective : float
     iterations : int
+        Of IPOPT.
     """
 
     values: Mapping[str, Array]
@@ -59,14 +60,15 @@ class DesignAnswer:
     Attributes
     ----------
     values : mapping of str to ndarray or float
-        All unknowns; those of cases are called ``case: name``.
+        All unknowns, in the units of the scene; inputs of a case are called ``case: name``.
     objective : float
     cases : mapping of str to Equilibrium
-        Each with its certificate: stable or not, and the error of its mesh.
+        The equilibrium of each case, with its certificate.
     multipliers : mapping of str to ndarray
-        Of each relation.
+        Multipliers of each constraint, by its name.
     notes : tuple of str
     iterations : int
+        Of IPOPT.
     """
 
     values: Mapping[str, Any]
@@ -84,12 +86,12 @@ class DesignAnswer:
         return all(case.certificate.stable is True for case in self.cases.values())
 
     def answers(self, case: str, name: str, at: Sequence[float] | None = None) -> Array:
-        """An answer that expressions asked for, as the program has it.
+        """The value of an answer that the objective or the constraints use; shapes as of :meth:`Design.answer`.
 
         Raises
         ------
         SceneError
-            It was not asked for.
+            They do not use it.
         """
         key = case, name, None if at is None else tuple(at)
         if key not in self.told:
@@ -98,15 +100,21 @@ class DesignAnswer:
         return self.told[key]
 
     def scene(self, case: str = ONE) -> Scene:
-        """The scene of a case with what was found in it: ``solve(answer.scene("open"))`` is another way to it."""
+        """The scene of a case with the values found, for instance for ``solve(answer.scene("open"))``.
+
+        Raises
+        ------
+        SceneError
+            There is no such case.
+        """
         if case not in self.scenes:
             raise SceneError(not_known(case, list(self.scenes), "cases"), ("cases",))
         return self.scenes[case]
 
     def replayed(self, case: str = ONE) -> float:
-        """How far the nodes are from those that ``solve`` finds from the undeformed state, over the scene's size.
+        """Largest distance of nodes from the equilibrium that ``solve`` finds for the case, over the size of the scene.
 
-        That may be another equilibrium under the same loads, where there are several.
+        Where there are several equilibria under the same loads, that may be another one.
         """
         here = self.cases[case]
         there = solve(self.scene(case), accuracy=here.certificate.error_estimate or None).last
@@ -115,22 +123,22 @@ class DesignAnswer:
 
 
 class Design(Cases):
-    """Numbers of a scene chosen for several load cases at once.
+    """A design problem: numbers of a scene that minimise an objective under constraints, in several load cases.
 
     Parameters
     ----------
     scene : Scene
         Static and without contact.
     variables : mapping of str to (low, high) or Parameter
-        Numbers of the scene that are chosen once for all cases; infinite bounds where there are none.
+        Numbers of the scene that are unknown and the same in all cases, with their bounds (possibly infinite).
     cases : mapping of str to mapping of str to numbers
-        What differs from case to case; one case without.
+        For each case the numbers that differ from the scene; left out: a single case.
     inputs : mapping of str to (low, high)
         Numbers that are unknown in each case by itself: loads, prescribed displacements.
     guess : mapping of str to numbers
-        Where variables and inputs begin; the values of the scene, or of the case, without.
+        Start values of variables and inputs; by default those of the scene or the case.
     accuracy : float, optional
-        Wanted error of positions over the size of the scene; that of the scene without.
+        Wanted error of positions over the size of the scene; by default that of the scene.
     kernels : str
         ``auto``, ``compiled`` or ``interpreted`` derivatives.
 
@@ -197,9 +205,9 @@ class Design(Cases):
     def set(
         self, name: str, value: ArrayLike | ca.MX, *, case: str | None = None, between: Bounds | None = None
     ) -> None:
-        """What a number of the scene is, in one case or in all: a number or an expression of unknowns.
+        """Set a number of the scene, in one case or in all, to a value or an expression of unknowns, in its unit.
 
-        ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``; ``between`` limits each of them.
+        ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``; ``between`` bounds the value.
         """
         self.statement.set(name, value, case=case, between=between)
 
@@ -218,9 +226,9 @@ class Design(Cases):
 
         Parameters
         ----------
-        case : name of a case, "" where there is one only
-        name : as in the answer of generated code: positions, rotations, reactions, section forces, springs, energies
-        at : fractions of the length, of members; 21 evenly spaced ones without
+        case : name of a case, "" where there is only one
+        name : as for :func:`~sfetcas.parametric`: positions, rotations, reactions, section forces, springs, energies
+        at : fractions of the length, of members; by default 21 evenly spaced ones
 
         Returns
         -------
@@ -237,14 +245,14 @@ class Design(Cases):
     # -- the answer -----------------------------------------------------------------------------------
 
     def solve(self, solver: Ipopt | None = None) -> DesignAnswer:
-        """The answer, every case certified.
+        """Solve the problem and certify the equilibrium of each case.
 
         Raises
         ------
         SceneError
-            What is asked for contradicts itself.
+            Bounds and constraints contradict each other.
         SolveError
-            None was found; ``last`` is the last :class:`DesignIterate`.
+            No solution was found; ``last`` is a :class:`DesignIterate`.
         """
         solving = Solving(self.statement, solver, self._kernels)
         try:
@@ -286,14 +294,15 @@ def find(
     guess: Mapping[str, ArrayLike] | None = None,
     accuracy: float | None = None,
 ) -> DesignAnswer:
-    """Numbers of a scene for which answers are as wanted.
+    """Solve an inverse problem: numbers of a scene for which answers have wanted values.
 
     ``find(scene, ["loads.tip.value"], {"nodes.tip.position": [0.8, 0.3]})``: the force for a tip position.
 
     Parameters
     ----------
-    unknown : names, or a mapping of them to bounds
-    wanted : answers by name; of vectors in a plane scene two numbers
+    unknown : names of numbers, or a mapping of them to bounds
+    wanted : values of answers by name, SI units; of vectors in a plane scene two components
+    guess, accuracy : as of :class:`Design`
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The equilibrium of a case as rows of a larger program: functions of a step from a reference state and of numbers.
+"""The equilibrium of a case as constraints of a larger program: functions of a step from a reference state and numbers.
 
 The unknown of an equilibrium is no state but the *step* that leads to it from a reference: rotation vectors of the
 nodes, displacements, multipliers.  So there are no norms to keep and no more unknowns than equations, and what comes
@@ -37,23 +37,23 @@ class CaseEquations:
     Parameters
     ----------
     scene : Scene
-        With the numbers to begin with.
+        With start values of its numbers.
     mesh : Mesh
     assembly : str
-        Of the model.
+        As of :func:`~sfetcas.assemble`.
     arguments : sequence of Argument
-        Numbers that vary from case to case, or are unknown; single ones, a name each.
+        Numbers that vary from case to case, or are unknown; single numbers only.
     free : sequence of int
-        Which of them are unknown in any case.
+        Indices of those that are unknown in any case.
     results : sequence of str
-        What shall be told.
+        Names of the results that are needed.
     places : mapping
-        Where members are told of.
+        Fractions of the length at which results along members are needed.
 
     Attributes
     ----------
     total : int
-        Unknowns of a step.
+        Number of unknowns of a step, multipliers included.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class CaseEquations:
 
     @functools.cached_property
     def balance(self) -> ca.Function:
-        """(w, c) -> what is not in balance, (total,), dimensionless."""
+        """``(w, c) ->`` residual of the equilibrium, (total,), dimensionless; w unknowns, c constants of a case."""
         return self._function("balance", [], self._at(self.program.stationarity.residual))
 
     @functools.cached_property
@@ -134,23 +134,23 @@ class CaseEquations:
 
     @functools.cached_property
     def tell(self) -> ca.Function:
-        """(w, c) -> all results, flat, in SI units."""
+        """``(w, c) ->`` all results, flat, in SI units."""
         return self._function("tell", [], self._told)
 
     def lifted(self, part: Sequence[int]) -> ca.Function:
-        """(w, c) -> what a name says less some of the results, w ending with what the name says."""
+        """``(w, c) ->`` some of the results less unknowns that stand for them, which come last in w."""
         said = ca.MX.sym("said", len(part))
         return self._function("lifted", [said], said - self._told[list(part)])
 
     @functools.cached_property
     def mass(self) -> Array:
-        """What eigenvalues of the tangent are of, (total,): rotations, as in certificates."""
+        """Weights (total,) of the eigenvalue problem of stability, as in certificates; only rotations have any."""
         equations = self.program.equations
         return np.concatenate([equations.mass, np.zeros(self.total - equations.turning_unknowns)])
 
     @functools.cached_property
     def eigen(self) -> ca.Function:
-        """(w, c) -> K v - sigma M v on the closings, and v.M v - 1; w ends with v and multipliers, then sigma."""
+        """``(w, c) -> K v - sigma M v`` on the constraints, and ``v.M v - 1``; w ends with v, multipliers, sigma."""
         v, sigma = ca.MX.sym("v", self.total), ca.MX.sym("sigma")
         tangent, mass = self._at(self.program.matrix), self.mass
         rows = ca.mtimes(tangent, v) - sigma * ca.DM(mass) * v
@@ -158,28 +158,29 @@ class CaseEquations:
 
     @functools.cached_property
     def arrive(self) -> ca.Function:
-        """(w, c) -> the state after the step."""
+        """``(w, c) ->`` the state after the step, (states,)."""
         return self._function("arrive", [], self._there)
 
     # -- numbers ----------------------------------------------------------------------------------------
 
     @functools.cached_property
     def method(self) -> Globalised:
-        """Newton's method from afar, for the first equilibria."""
+        """Globalised Newton method, for the first equilibria."""
         return Globalised(self.program, Prepared(self.model).weight, Rules())
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
-        """(numbers) -> what is given."""
+        """``(numbers) ->`` data and loads of the equations."""
         return self.arguments.prepare("design_prepare")
 
     def equilibrium(self, numbers: Array, start: State | None, *, leave: bool = True) -> tuple[Array | None, bool]:
-        """A flat state in equilibrium for values of all numbers, None where none was found, and whether it is stable.
+        """The equilibrium (states,) for values of all numbers (None where none was found), and whether it is stable.
 
         Parameters
         ----------
-        start : where to begin; the undeformed state without
-        leave : leave what is unstable
+        numbers : (numbers,), in the units of the scene
+        start : state to start from; by default the undeformed one
+        leave : leave an unstable equilibrium for a stable one
         """
         given = np.array(self.prepare(numbers)).ravel()
         flat = None if start is None else self.program.flat(start)

@@ -1,4 +1,4 @@
-"""What is asked for: unknowns, what numbers of a scene are in each case, answers by name, relations, an objective."""
+"""Statement of a design problem: unknowns, numbers of the scene in each case, answers, constraints, objective."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ EVENLY = tuple(np.linspace(0.0, 1.0, 21).tolist())
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What a number of the scene is in one case.
+    """The setting of a number of the scene in one case.
 
     Attributes
     ----------
     value : float or MX
-        A number, or an expression of free ones, (1,).
+        A number, or an expression (1,) of unknowns.
     between : tuple of float or None
-        Range, of what the model is no polynomial of.
+        Bounds of its value.
     """
 
     value: float | ca.MX
@@ -54,15 +54,15 @@ class Asked:
     name : str
         ``nodes.tip.position``.
     member : str
-        The member along which it is; empty of all else.
+        The member along which it is; empty for others.
     label : str
-        With the case: what rows are called.
+        Name of constraints on it, with the case.
     at : tuple of float
         Fractions of the length of a member.
     cases : tuple of int
     symbol : MX
     shape : tuple of int
-        Of the symbol; the numbers of each case follow each other.
+        Shape of the symbol; the numbers of each case are consecutive.
     unit : str
     """
 
@@ -77,12 +77,12 @@ class Asked:
 
 
 def labelled(case: str, name: str) -> str:
-    """What something of a case is called; the case of a problem that has one only has no name."""
+    """The label of a quantity in a case, ``case: name``; in a problem with a single case just its name."""
     return f"{case}: {name}" if case else name
 
 
 class Formulation(Statement):
-    """What a problem asks for; :class:`~sfetcas.design.solving.Solving` finds it.
+    """The statement of a problem, which :class:`~sfetcas.design.solving.Solving` solves.
 
     Parameters
     ----------
@@ -134,12 +134,12 @@ class Formulation(Statement):
         return found
 
     def bounds(self, label: str, name: str, given: Bounds | Parameter, guess: ArrayLike | None) -> Bounds:
-        """Lower and upper bound of a variable; what is tied is made known.
+        """Lower and upper bound of a variable; registers a :class:`Parameter`.
 
         Raises
         ------
         SceneError
-            What is given are no two numbers.
+            The bounds are not two numbers.
         """
         if isinstance(given, Parameter):
             if given.low is None or given.high is None:
@@ -150,12 +150,12 @@ class Formulation(Statement):
         return bounds_of(label, given)
 
     def tie(self, name: str, tied: Parameter, guess: float, bounds: Bounds) -> None:
-        """Let a name stand for what moves several numbers of the scene.
+        """Register a :class:`Parameter`, a name on which several numbers of the scene depend.
 
         Raises
         ------
         SceneError
-            A name that is there already, or numbers that the scene does not have.
+            A name that is in use, or numbers that the scene does not have.
         """
         known = {n.partition(".")[0] for n in ("factor", "histories.x", *type(self.scene).model_fields)}
         if name.partition(".")[0] in known or name in self.tied:
@@ -167,15 +167,15 @@ class Formulation(Statement):
     def set(
         self, name: str, value: ArrayLike | ca.MX, *, case: str | None = None, between: Bounds | None = None
     ) -> None:
-        """What a number of the scene is, in one case or in all: a number or an expression of unknowns.
+        """Set a number of the scene, in one case or in all, to a value or an expression of unknowns, in its unit.
 
         ``design.set("sections.strip.EI3", E * b * thickness**3 / 12)``.
 
         Parameters
         ----------
-        name : as in the scene; of a vector an expression of as many numbers
-        case : all cases without
-        between : limits of each
+        name : as in the scene; the value of a vector has as many entries
+        case : name of a case; by default all cases
+        between : bounds of each entry
 
         Raises
         ------
@@ -215,7 +215,7 @@ class Formulation(Statement):
     def ask(
         self, name: str, cases: Sequence[int], label: str, at: Sequence[float] | None, *, rows: bool = False
     ) -> ca.MX:
-        """The symbol of an answer; ``rows`` for a row of numbers a case."""
+        """The symbol of an answer in some cases, with a row for each case if ``rows``; SceneError for wrong places."""
         key = (name, tuple(cases), None if at is None else tuple(at), rows)
         if key not in self.asked:
             places = EVENLY if at is None else tuple(float(x) for x in at)
@@ -228,16 +228,16 @@ class Formulation(Statement):
         return self.asked[key].symbol
 
     def result(self, name: str, places: Sequence[float]) -> Any:
-        """What an answer is: shape, unit, meaning."""
+        """Shape, unit and meaning of an answer."""
         if self._results is None:
             self._results = Results(assemble(self.scene, first_mesh(self.scene, 4)), [], {})
         members = [n for n, record in self.scene.members.items() if record.type == "flexible"]
         return Results(self._results.model, [name], dict.fromkeys(members, tuple(places))).results[0]
 
     def stable(self, margin: float = 0.0) -> None:
-        """Only stable cases are answers: each lowest eigenvalue, N, is at least the margin.
+        """Require stability: in each case the lowest eigenvalue (``certificate.smallest``, N) is at least the margin.
 
-        The eigenvalue is that of ``certificate.smallest``: energy over the integral of the squared rotations.
+        SceneError for a negative margin.
         """
         if not margin >= 0.0:
             raise SceneError(f"found {margin}, accepted: zero or more", ("stable",))
@@ -246,7 +246,7 @@ class Formulation(Statement):
     # -- what follows ---------------------------------------------------------------------------------
 
     def value(self, expression: ca.MX, values: Mapping[str, Array]) -> Array:
-        """An expression of free numbers for values of them, column by column."""
+        """The value (n,) of an expression of unknowns, column by column; SceneError if it has other symbols."""
         symbols = ca.symvar(expression)
         by_hash = {one.symbol.__hash__(): one.name for one in self.free.values()}
         for symbol in symbols:
@@ -257,18 +257,18 @@ class Formulation(Statement):
         return np.array(function(*(values[by_hash[s.__hash__()]] for s in symbols))).ravel()
 
     def numbers_of(self, case: int, values: Mapping[str, Array]) -> dict[str, float]:
-        """What is set in a case, for values of the free numbers."""
+        """The numbers of the scene that are set in a case, by name and in their units, for values of the unknowns."""
         return {
             name: float(self.value(one.value, values)[0]) if isinstance(one.value, ca.MX) else one.value
             for name, one in self.settings[case].items()
         }
 
     def case_scene(self, case: int, values: Mapping[str, Array]) -> Scene:
-        """The scene of a case, for values of the free numbers."""
+        """The scene of a case for values of the unknowns, in their units."""
         return self.scene_with(self.numbers_of(case, values))
 
     def scene_with(self, numbers: Mapping[str, float]) -> Scene:
-        """The scene with other values of numbers, and of what moves several."""
+        """The scene with other values of numbers and of parameters."""
         found: dict[str, float] = {}
         for name, value in numbers.items():
             follow = self.tied[name].numbers if name in self.tied else None
@@ -277,11 +277,11 @@ class Formulation(Statement):
 
     @property
     def guesses(self) -> dict[str, Array]:
-        """Of all free numbers."""
+        """Start values of all unknowns, by name, in their units."""
         return {name: one.guess for name, one in self.free.items()}
 
     def varying(self) -> tuple[list[Argument], list[bool]]:
-        """Numbers that differ from case to case or are unknown, a name each, with ranges; and which are unknown."""
+        """Single numbers that differ between cases or are unknown, with ranges; and for each whether it is unknown."""
         names = dict.fromkeys(name for setting in self.settings for name in setting)
         chosen: list[Argument] = []
         unknown: list[bool] = []
@@ -306,7 +306,7 @@ class Formulation(Statement):
 
 
 class Cases(Problem):
-    """What problems over several cases have in common.
+    """Base class of problems over several cases.
 
     Attributes
     ----------
@@ -316,11 +316,11 @@ class Cases(Problem):
     statement: Formulation
 
     def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
-        """Free numbers under a name of their own, which ``set`` makes numbers of the scene of.
+        """Add unknowns with a name of their own; ``set`` makes numbers of the scene depend on them.
 
         Parameters
         ----------
-        guess : number, (n,) or (n, m): where to begin, and the shape
+        guess : number, (n,) or (n, m): start values, and the shape
         low, high : broadcast to it
 
         Raises
@@ -331,7 +331,7 @@ class Cases(Problem):
         return self.statement.unknown(name, guess, low, high)
 
     def stable(self, margin: float = 0.0) -> None:
-        """Only stable cases are answers, each lowest eigenvalue (``certificate.smallest``, N) at least the margin."""
+        """Require stability: in each case the lowest eigenvalue (``certificate.smallest``, N) is at least a margin."""
         self.statement.stable(margin)
 
     def _free(self, label: str) -> ca.MX:

@@ -1,4 +1,4 @@
-"""Quasi-static trajectories: a mechanism follows a path through equilibria, its inputs found all at once."""
+"""Quasi-static trajectories: inputs that move a mechanism through a path of equilibria, found all at once."""
 
 from __future__ import annotations
 
@@ -27,19 +27,21 @@ from .solving import Iterate, Solved, Solving
 __all__ = ["QuasiStatic", "QuasiStaticAnswer", "QuasiStaticIterate"]
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Steps from a point to the next where one does not lead there."""
+"""Fractions of the way between two points that are tried one after the other where one step does not arrive."""
 
 
 @dataclass(frozen=True, eq=False)
 class QuasiStaticIterate:
-    """Where an unconverged solution stood: never an answer.
+    """The last iterate of a problem that did not converge; not a solution.
 
     Attributes
     ----------
     inputs : mapping of str to ndarray (points, n)
+        In the units of the scene.
     values : mapping of str to ndarray
         All other unknowns.
     told : mapping of str to ndarray (points, n)
+        The answers that expressions use, SI units.
     objective : float
     iterations : int
     """
@@ -60,15 +62,16 @@ class QuasiStaticAnswer:
     s : ndarray (points,)
         The path parameter from 0 to 1.
     inputs : mapping of str to ndarray (points, n)
+        In the units of the scene.
     values : mapping of str to ndarray
         Variables that are the same at all points.
     told : mapping of str to ndarray (points, n)
-        Answers that were asked for.
+        The answers that expressions use, SI units.
     objective : float
     cases : tuple of Equilibrium
-        Of each point, with its certificate.
+        The equilibrium of each point, with its certificate.
     jumps : tuple of int
-        Points that their predecessor does not lead to: there the mechanism would snap.
+        Indices of points that do not follow continuously from their predecessor: the mechanism would snap there.
     multipliers : mapping of str to ndarray
     notes : tuple of str
     iterations : int
@@ -92,19 +95,19 @@ class QuasiStaticAnswer:
         return all(case.certificate.stable is True for case in self.cases)
 
     def answers(self, name: str) -> Array:
-        """An answer that expressions asked for, (points, n), rows of places one after the other.
+        """The values (points, n) of an answer that the objective or constraints use; along members place by place.
 
         Raises
         ------
         SceneError
-            It was not asked for.
+            They do not use it.
         """
         if name not in self.told:
             raise SceneError(not_known(name, list(self.told), "answers"), ("answers",))
         return self.told[name]
 
     def scene(self, point: int) -> Scene:
-        """The scene of a point with what was found."""
+        """The scene with the values found at a point, given by its index."""
         return self.scenes[point]
 
 
@@ -116,13 +119,13 @@ class QuasiStatic(Cases):
     scene : Scene
         Static and without contact.
     inputs : mapping of str to (low, high)
-        Numbers of the scene that may change along the path.
+        Numbers of the scene that are unknown at each point of the path, with their bounds.
     points : int
         Points of the path, evenly spaced from 0 to 1.
     variables : mapping of str to (low, high) or Parameter
         Numbers of the scene that are unknown, but the same everywhere.
     guess : mapping of str to numbers
-        Where they begin: of an input (n,) or (points, n); the values of the scene without.
+        Start values: of an input (n,) or (points, n); by default the values of the scene.
     accuracy, kernels : as of :class:`~sfetcas.design.designing.Design`
 
     Attributes
@@ -186,7 +189,7 @@ class QuasiStatic(Cases):
     # -- expressions --------------------------------------------------------------------------------
 
     def set(self, name: str, value: ArrayLike | ca.MX, *, between: Bounds | None = None) -> None:
-        """What a number of the scene is: everywhere, or with a row for each point.
+        """Set a number of the scene to a value or an expression of unknowns: the same everywhere, or (points, n).
 
         Raises
         ------
@@ -203,26 +206,26 @@ class QuasiStatic(Cases):
             self.statement.set(name, own, case=case, between=between)
 
     def input(self, name: str) -> ca.MX:
-        """An input, (points, n)."""
+        """The symbol of an input, (points, n), in its unit; SceneError where it is no input."""
         if name not in self._inputs:
             raise SceneError(not_known(name, self._inputs, "inputs"), ("inputs",))
         return self.statement.free[name].symbol
 
     def variable(self, name: str) -> ca.MX:
-        """An unknown by its name, as it was declared."""
+        """The symbol of an unknown by its name, in the shape of its guess."""
         return self._free(name)
 
     def answer(self, name: str, at: Sequence[float] | None = None) -> ca.MX:
-        """An answer along the path, (points, n); along members the numbers of a place after those of the one before."""
+        """An answer along the path, (points, n), SI units; of members the numbers place by place."""
         return self.statement.ask(name, range(len(self.s)), name, at, rows=True)
 
     def at(self, expression: ca.MX, place: float) -> ca.MX:
-        """The row of an expression at a point of the path, from 0 to 1, as a column.
+        """The value of an expression (points, n) at the path parameter ``place``, from 0 to 1, as a column (n, 1).
 
         Raises
         ------
         SceneError
-            No point is there.
+            There is no point of the path.
         """
         number = int(np.argmin(np.abs(self.s - place)))
         if abs(self.s[number] - place) > tolerances.WRITTEN:
@@ -231,16 +234,16 @@ class QuasiStatic(Cases):
         return expression[number, :].T
 
     def rate(self, expression: ca.MX) -> ca.MX:
-        """Derivative by the path parameter between the points, (points - 1, n)."""
+        """Derivative of an expression (points, n) by the path parameter, between the points, (points - 1, n)."""
         return ca.diff(expression, 1, 0) * (len(self.s) - 1)
 
     def smooth(self, name: str, weight: float = 1.0, order: int = 2) -> None:
-        """A cost: the mean square of the first or second derivative of an input by the path parameter.
+        """Add to the objective ``weight`` times the mean square of a derivative of an input by the path parameter.
 
         Raises
         ------
         SceneError
-            Another order.
+            The order is not 1 or 2.
         """
         if order not in (1, 2):
             raise SceneError(f"found {order}, accepted: 1 or 2", ("smooth", name))
@@ -252,14 +255,14 @@ class QuasiStatic(Cases):
     # -- the answer -----------------------------------------------------------------------------------
 
     def solve(self, solver: Ipopt | None = None) -> QuasiStaticAnswer:
-        """The path, every point certified.
+        """Solve the problem and certify the equilibrium of each point.
 
         Raises
         ------
         SceneError
-            What is asked for contradicts itself.
+            Bounds and constraints contradict each other.
         SolveError
-            None was found; ``last`` is the last :class:`QuasiStaticIterate`.
+            No solution was found; ``last`` is a :class:`QuasiStaticIterate`.
         """
         solving = Solving(self.statement, solver, self._kernels)
         try:

@@ -1,4 +1,4 @@
-"""A formulation solved: all equilibria at once by IPOPT, each certified, meshes and stability seen to in rounds."""
+"""Solution of a formulation: all equilibria at once by IPOPT, in rounds that refine meshes and ensure stability."""
 
 from __future__ import annotations
 
@@ -59,18 +59,18 @@ VIOLATED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Where a program stood.
+    """An iterate of a program.
 
     Attributes
     ----------
     values : mapping of str to ndarray
-        Of all unknowns by their names.
+        All unknowns by their names, in their units.
     asked : mapping
         Answers in the shapes of their symbols.
     states : ndarray (cases, states)
     objective : float
     message : str
-        What IPOPT said.
+        Return status of IPOPT.
     iterations : int
     """
 
@@ -84,14 +84,14 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """An answer of a formulation.
+    """A solution of a formulation.
 
     Attributes
     ----------
     iterate : Iterate
     cases : tuple of Certified
     multipliers : mapping of str to ndarray
-        Of what is required: by how much the objective falls where an upper bound is raised by one.
+        Multipliers of the constraints: decrease of the objective where an upper bound is raised by one unit.
     notes : tuple of str
     mesh : Mesh
     equations : CaseEquations
@@ -108,7 +108,7 @@ class Solved:
 
 
 class Solving:
-    """One run over the rounds.
+    """The solution of one formulation, in rounds.
 
     Parameters
     ----------
@@ -173,14 +173,14 @@ class Solving:
 
     @single_threaded
     def solve(self) -> Solved:
-        """The answer.
+        """Solve the formulation.
 
         Raises
         ------
         SceneError
-            What is asked for contradicts itself, or is more than there are unknowns.
+            Constraints contradict each other, or are more than there are unknowns.
         SolveError
-            None was found; ``last`` is the last :class:`Iterate`.
+            No solution was found; ``last`` is the last :class:`Iterate`.
         """
         refuse_contradictions(self.formulation)
         pilots = self._pilots()

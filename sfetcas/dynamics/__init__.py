@@ -1,1 +1,1 @@
-"""Motion and modes: masses, the equations of a time step, integrators, and what they give by name."""
+"""Dynamics: masses, equations of motion, time integrators, modes of vibration, and their answers by name."""

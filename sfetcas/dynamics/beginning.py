@@ -1,4 +1,4 @@
-"""Where a motion begins: a state of rotations and displacements, and velocities that joints allow."""
+"""Initial conditions of a motion: a configuration, and velocities that are compatible with the joints."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ __all__ = ["at_rest", "equilibrium_before", "moving", "posed", "velocities"]
 
 
 def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
-    """The equilibrium in which a motion begins: of loads and motions as they are at t = 0, of those cut as well.
+    """The equilibrium from which a motion starts: under the loads and motions at t = 0, with those that are cut then.
 
     Raises
     ------
     SceneError, SolveError
-        As of statics.
+        As :func:`sfetcas.equilibria.statics.solve`.
     """
     histories = scene.histories
 
@@ -56,7 +56,7 @@ def equilibrium_before(scene: Scene, settings: Settings) -> Equilibrium:
 
 
 DRIVEN = ("value", "displacement", "rotation")
-"""Keys of loads and motions that a history multiplies."""
+"""Keys of loads and prescribed motions whose values a history multiplies."""
 
 
 def _given_keys(scene: Scene) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def moving(scene: Scene) -> Scene:
-    """The scene as it moves: without the loads that are cut and the supports that are released at the begin."""
+    """The scene during the motion: without the loads that are cut and the supports that are released at t = 0."""
     cut, released = scene.analysis.cut, scene.analysis.release
     if not cut and not released:
         return scene
@@ -98,7 +98,7 @@ def _freed(scene: Scene, name: str) -> Node:
 
 
 def at_rest(model: Model) -> State:
-    """The undeformed state of a model."""
+    """The undeformed state of a model, dimensionless."""
     q = np.zeros((len(model.rotations.kind), model.element.components))
     q[:, 0] = 1.0 if model.space else 0.0
     y, lam = np.zeros(len(model.positions.unknowns)), np.zeros(len(model.row_names))
@@ -106,7 +106,7 @@ def at_rest(model: Model) -> State:
 
 
 def posed(model: Model, source: Equilibrium) -> State:
-    """An equilibrium of the same members as a state of another model, which may be held otherwise."""
+    """An equilibrium as a state of another model of the same members, which may have other supports."""
     state, origin = at_rest(model), source.model
     q, moved = state.q.copy(), np.zeros((len(model.segments.places), 3))
     for name, ends in model.rotations.ends.items():
@@ -159,14 +159,15 @@ def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
 
 
 def velocities(system: StageEquations, equations: Equations, state: State) -> tuple[Array, tuple[str, ...]]:
-    """Rates of all unknowns at the begin, and notes.
+    """Initial rates of all unknowns (unknowns,), dimensionless, and notes.
 
-    What is given holds; what is left open follows from the joints with the least rates of bending, then of turning.
+    Velocities that are given are kept.  Those left open follow from the joints, with the least rates of bending, then
+    of rotation and translation.
 
     Raises
     ------
     SceneError
-        What is given contradicts the joints, or itself.
+        The given velocities contradict the joints or each other.
     """
     model = equations.model
     rows, wanted, names = _given(system, equations)
@@ -211,16 +212,16 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
 
 
 TURNING, MOVING = 1e-4, 1e-8
-"""Roots of the weights of turning and moving as such beside that of bending, in the units of the model.
+"""Square roots of the weights of rotation and translation beside bending, in model units, where velocities are open.
 
-What is thrown at one node only flies on without turning, what nothing is given of stays where it is.
+With them a body that is thrown at one node only flies without rotation, and a part without any velocity stays at rest.
 """
 
 CONTRADICTION = 1e-3
-"""Share of the largest velocity up to which initial velocities are projected onto what joints allow."""
+"""Share of the largest velocity up to which given velocities are projected onto those that the joints allow."""
 
 TOLD = 1e-9
-"""The same from which the change is told."""
+"""Share of the largest velocity from which on a note reports such a projection."""
 
 
 def _open_row(model: Model, gaps: Array) -> str:

@@ -1,6 +1,6 @@
 """Buckling factors: a linear estimate of the loads at which an unloaded structure buckles.
 
-With ``H`` the Newton matrix with its rows at factor 0 and ``H'`` its derivative along the path of equilibria there,
+With ``H`` the Newton matrix, constraints included, at factor 0 and ``H'`` its derivative along the path there,
 
     (H + f H') x = 0.
 
@@ -35,20 +35,22 @@ FAR = 1e-7
 to grow, are what differencing leaves: linear theory does not reach so far."""
 
 BOTH_SIDES = 2
-"""Times so many factors are looked for: those below zero belong to loads turned round, and come last."""
+"""Factors looked for over those asked for, since negative ones (reversed loads) come in between."""
 
 
 def buckling_factors(prepared: Prepared, count: int) -> Array:
-    """The lowest factors of a linear estimate, those above zero first, each kind by size.
+    """The lowest linear buckling factors (n,) of the loads, dimensionless: positive ones first, each sign by rising
+    size.
 
-    Empty where the path of equilibria does not begin at factor 0, as of a mechanism that only its loads hold.
+    There are at most ``count``; none where there is no equilibrium at factor 0, as of a mechanism stabilised by its
+    loads.
 
     Raises
     ------
     SceneError, SolveError
-        There is no equilibrium to begin from.
+        The equilibrium at factor 0 could not be found.
     numpy.linalg.LinAlgError
-        The pencil cannot be solved.
+        The eigenvalue problem could not be solved.
     """
     curve, start, _ = begin_path(prepared, (0.0, 1.0))
     if start.factor != 0.0 or start.tangent.factor == 0.0:

@@ -40,7 +40,7 @@ __all__ = ["Conserving"]
 
 @final
 class Conserving(Method):
-    """Keeps energy, linear and angular momentum; order 2, no damping of its own."""
+    """Energy-momentum scheme: conserves energy, linear and angular momentum; order 2, no numerical damping."""
 
     name, order, kept = "conserving", 2, 1
     places = np.array([1.0])
@@ -48,12 +48,12 @@ class Conserving(Method):
     polished = True
 
     def iteration(self, system: StageEquations) -> ca.Function:
-        """One for the end of the step; constants are the begin, h, and the loads in the middle and at the end.
+        """One Newton iteration for the end of a step, as of :meth:`Method.iteration`.
 
         Raises
         ------
         SceneError
-            A load follows what it acts on: it has no energy to keep; or the axes turn.
+            There is a follower load, which has no energy to conserve, or the axes rotate.
         """
         model = system.model
         if any(group.follows for group in model.groups.values()):
@@ -80,11 +80,11 @@ class Conserving(Method):
         return ca.Function("middle", [q, y, lam, *constants], [there, y + shift, lam + more, size])
 
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
-        """The begin, h and the loads."""
+        """The state at the begin of the step, its length h, and the factors of loads in the middle and at the end."""
         return [begin.q, begin.y, begin.x, begin.rates, begin.near, h, factors]
 
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
-        """The velocity at the end: its mean with that at the begin is the mean velocity."""
+        """The velocity at the end: its mean with the velocity at the begin is the mean velocity of the step."""
         return 2.0 * moved / h - rates
 
 

@@ -1,8 +1,8 @@
 """IDAS (SUNDIALS) on the equations of index 1: backward differentiation with order and steps by the error.
 
-Closings differentiated twice hold themselves up to what steps lose: norms, closings and their rates drift.  At every
-time of an answer they are met again by the smallest change, and what was missing before is told as violation; every
-few answers, and wherever a history goes over into another polynomial, IDAS begins afresh from what was projected.
+Since the constraints are differentiated twice, norms of quaternions, constraints and their rates drift.  At every time
+of the answer state and rates are projected back onto them by the smallest change, and the drift before is reported as
+``violation``.  Every few answers, and at each knot of a history, IDAS is restarted from the projected state.
 
 Source: Hindmarsh et al. 2005 (SUNDIALS, doi 10.1145/1089014.1089020); Eich 1993 (projection, doi 10.1137/0730076).
 """
@@ -97,10 +97,18 @@ class _Piece:
 
 @final
 class Idas(Integrator):
-    """CasADi's interface to IDAS."""
+    """Integration by IDAS (variable-order backward differentiation formulas) through CasADi."""
 
     def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
-        """States as IDAS has them, projected."""
+        """States at the times of the answer, projected onto the constraints; as of :meth:`Integrator.samples`.
+
+        Raises
+        ------
+        SceneError
+            Something rotates or moves without inertia, which equations of index 1 exclude.
+        SolveError
+            IDAS cannot go on; the states before have been given.
+        """
         pieces = self._pieces(course)
         degree = max(len(terms) for piece in pieces for terms in piece.terms) - 1
         one = IndexOne(self.system, degree)

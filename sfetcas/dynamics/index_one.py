@@ -1,9 +1,9 @@
-"""The equations of motion with closings differentiated twice, for integrators that take index 1 only.
+"""The equations of motion with constraints differentiated twice (index 1), for integrators that need this form.
 
 Differential unknowns are rotations that may change (quaternions or angles), displacements, the rates of both (angular
 velocities about the fixed axes) and the angles that count turns; algebraic ones are accelerations and multipliers.
-Of inertia and statics everything is that of :mod:`~sfetcas.dynamics.stages`; rates of quantities and of closings are
-those along the curve that the state goes,
+Inertia and static forces are those of :mod:`~sfetcas.dynamics.stages`; rates of quantities and of constraints are
+derivatives along the trajectory,
 
     q' = 1/2 (0, omega) q,      q'' = 1/2 (0, omega') q - 1/4 |omega|^2 q,
 
@@ -29,17 +29,17 @@ __all__ = ["LINEAR", "IndexOne"]
 
 
 class IndexOne:
-    """Index-1 form of the equations of a system.
+    """Index-1 form of the equations of motion of a system.
 
     Parameters
     ----------
     system : StageEquations
     degree : int
-        Of the polynomials of time that the factors of loads and motions are.
+        Degree of the polynomials in time by which the factors of loads and motions are given.
 
     Attributes
     ----------
-    turning : ndarray
+    turning : ndarray of int
         Numbers of the rotations that may change.
     """
 
@@ -91,7 +91,12 @@ class IndexOne:
 
     @functools.cached_property
     def balance(self) -> ca.Function:
-        """(q, y, w, near, a, lam, f, f1, f2) -> what is out of balance, then accelerations of the closings."""
+        """``(q, y, w, near, a, lam, f, f1, f2) ->`` residual of the equations of motion, then accelerations of the
+        constraints.
+
+        q rotations, y displacements, w their rates, near the angles that count turns, a accelerations, lam multipliers,
+        f, f1, f2 the factors of the loads and their rates; dimensionless.
+        """
         system = self.system
         names = ["q", "y", "w", "near", "a", "lam", "f", "f1", "f2"]
         sizes = [*self.states, *self.algebraic, *[system.layout.factors] * 3]
@@ -153,7 +158,7 @@ class IndexOne:
     # -- in time --------------------------------------------------------------------------------------
 
     def factors(self, s: ca.MX, p: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Factors of loads and motions and their rates at the fraction s of an interval, from its parameters."""
+        """Factors of loads and motions and their first two rates at fraction s of an interval with parameters p."""
         count = self.system.layout.factors
         length, terms = p[0], ca.reshape(p[1:], count, self.degree + 1)
         value, first, second = (ca.MX.zeros(count) for _ in range(3))
@@ -165,7 +170,7 @@ class IndexOne:
 
     @functools.cached_property
     def problem(self) -> dict[str, ca.MX]:
-        """The equations over the fraction of an interval: x, z, p, t, ode, alg."""
+        """The DAE over the fraction of an interval, as :func:`casadi.integrator` takes it: x, z, p, t, ode, alg."""
         x, z = ca.MX.sym("x", sum(self.states)), ca.MX.sym("z", sum(self.algebraic))
         s, p = ca.MX.sym("s"), ca.MX.sym("p", self.parameters)
         q, y, w, near = ca.vertsplit(x, np.cumsum([0, *self.states]).tolist())
@@ -195,7 +200,7 @@ class IndexOne:
 
     @functools.cached_property
     def answers(self) -> ca.Function:
-        """(x, s, p) -> z, quantities, rates, accelerations, and rates at which closings open."""
+        """``(x, s, p) ->`` z, quantities, their rates and accelerations, and the rates of the constraints."""
         x, s, p = ca.MX.sym("x", sum(self.states)), ca.MX.sym("s"), ca.MX.sym("p", self.parameters)
         n = self.system.layout
         q, y, w, near = ca.vertsplit(x, np.cumsum([0, *self.states]).tolist())
@@ -215,7 +220,7 @@ class IndexOne:
 
     @functools.cached_property
     def matrix(self) -> ca.Function:
-        """(x, s, p) -> matrix of accelerations and multipliers: masses and closings."""
+        """``(x, s, p) ->`` matrix of the accelerations and multipliers, ``[M G^T; G 0]``."""
         problem = self.problem
         matrix = ca.jacobian(problem["alg"], problem["z"])
         still = ca.substitute(matrix, problem["z"], ca.MX.zeros(problem["z"].shape))

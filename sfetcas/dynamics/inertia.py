@@ -1,4 +1,4 @@
-"""Inertia and damping in numbers: forces, kinetic energy, momentum, and the loads that they are to statics."""
+"""Inertia and damping evaluated numerically: forces, kinetic energy, momenta, and loads by d'Alembert's principle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ __all__ = ["Inertia"]
 
 
 class Inertia:
-    """Masses and dampers of one model, applied to rates of its quantities (dimensionless)."""
+    """Masses and dampers of one model, applied to the rates of its quantities (:mod:`~sfetcas.mechanics.observed`).
+
+    Everything is dimensionless; velocities and accelerations are arrays (quantities,).
+    """
 
     def __init__(self, system: StageEquations) -> None:
         self.system, self._masses = system, system.masses
@@ -72,13 +75,13 @@ class Inertia:
         return linear, [rates[begin:end] for begin, end in system.ranges]
 
     def momenta(self, velocity: Array) -> tuple[Array, list[Array]]:
-        """Weights times velocities: of positions (positions, axes), of each group of observables."""
+        """Mass times velocity: of the positions (positions, axes), and of each group of further quantities."""
         linear, others = self._split(velocity)
         groups = [group.mass.ravel() * rate for group, rate in zip(self._masses.observables, others, strict=True)]
         return self._linear(self._masses.places, self._inner, linear), groups
 
     def forces(self, velocity: Array, acceleration: Array) -> Array:
-        """What inertia and damping ask for, (quantities,)."""
+        """Inertia and damping forces, (quantities,): mass times acceleration plus damping times velocity."""
         system = self.system
         at_places = np.arange(system.places)
         drag = SparseMap(at_places, at_places, self._masses.place_drag, (system.places, system.places))
@@ -90,7 +93,7 @@ class Inertia:
         return forces if self._coriolis is None else forces + self._coriolis @ velocity
 
     def kinetic(self, velocity: Array) -> float:
-        """Kinetic energy."""
+        """Kinetic energy for velocities (quantities,), dimensionless."""
         linear, groups = self.momenta(velocity)
         rates, others = self._split(velocity)
         return 0.5 * float((linear * rates).sum() + sum(float(a @ b) for a, b in zip(groups, others, strict=True)))
@@ -121,7 +124,7 @@ class Inertia:
     # -- as loads ---------------------------------------------------------------------------------------
 
     def loading(self, equations: Equations, state: State, loading: Loading, forces: Array) -> Loading:
-        """Loads at a state with inertia and damping forces among them (d'Alembert)."""
+        """The loads at a state with the reversed inertia and damping forces (quantities,) added (d'Alembert)."""
         system, model = self.system, self._model
         linear = -forces[: system.linear].reshape(-1, system.axes)
         on_places, inner = linear[: system.places], linear[system.places :]

@@ -1,4 +1,4 @@
-"""What turns or moves without inertia: integrators of index 1 cannot take it, others not if nothing resists either."""
+"""Checks for unknowns without inertia: index-1 integrators cannot treat them, others need stiffness against them."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ OTHERS = "radau-3, radau-2, generalised-alpha or conserving"
 
 
 def check_inertia(equations: Equations, matrix: Array) -> None:
-    """Refuse what leaves accelerations or multipliers open.
+    """Refuse a model whose accelerations or multipliers are not determined.
 
     Parameters
     ----------
     matrix : ndarray (total, total)
-        Masses and closings, ``[M G^T; G 0]``.
+        Mass and constraint matrices, ``[M G^T; G 0]``, dimensionless.
 
     Raises
     ------
     SceneError
-        Names sections, nodes or members without inertia, or closings that depend on each other.
+        Names sections, nodes or members without inertia, or constraints that depend on each other.
     """
     null = _null(matrix)
     if null is None:
@@ -48,12 +48,12 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
 
 
 def check_resisted(equations: Equations, matrix: Array) -> None:
-    """Refuse what has neither inertia nor stiffness, so that nothing says how it moves.
+    """Refuse a model with motions that have neither inertia nor stiffness, so that they are not determined.
 
     Parameters
     ----------
     matrix : ndarray (total, total)
-        Stiffness, masses and closings, ``[K + M G^T; G 0]``.
+        Stiffness, mass and constraint matrices, ``[K + M G^T; G 0]``, dimensionless.
 
     Raises
     ------

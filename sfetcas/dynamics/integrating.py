@@ -1,4 +1,4 @@
-"""Steps one after the other: fixed or by the error, with a fresh start wherever loads or motions have a kink."""
+"""Time stepping: fixed steps or error control, with a restart at each kink of loads or prescribed motions."""
 
 from __future__ import annotations
 
@@ -22,23 +22,25 @@ __all__ = ["Memory", "Stepper", "Taken", "integrate"]
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What goes from step to step, dimensionless.
+    """The state that is passed from step to step, dimensionless.
 
     Attributes
     ----------
     t : float
     q : ndarray (rotations, components)
+        Quaternions or angles.
     y, lam : ndarray
-        Displacements kept as unknowns, multipliers.
+        Displacement unknowns, multipliers.
     x : ndarray (quantities,)
+        The quantities that carry mass or are damped, see :mod:`~sfetcas.mechanics.observed`.
     rates : ndarray (kept, quantities)
-        Velocities first.
+        Their rates that the method keeps, velocities first.
     near : ndarray
-        Angles that count turns.
+        Values of the angles that count turns.
     origin : tuple of ndarray
-        What ``y`` and ``x`` are counted from: of what flies far the places near it, so that no digit is lost.
+        Offsets of ``y`` and ``x``, moved along with a structure that flies far, so that no digits are lost.
     last : Taken or None
-        The step before; None where the motion begins afresh.
+        The step before; None after a restart.
     """
 
     t: float
@@ -53,34 +55,37 @@ class Memory:
 
     @property
     def position(self) -> Array:
-        """The quantities from where the motion began."""
+        """The quantities without the offset of ``origin``, (quantities,)."""
         return self.x + self.origin[1]
 
     def moved(self, y: Array, x: Array) -> Memory:
-        """The same state counted from an origin that is further by y and x."""
+        """The same state with the offsets of displacements and quantities increased by ``y`` and ``x``."""
         return replace(self, y=self.y - y, x=self.x - x, origin=(self.origin[0] + y, self.origin[1] + x))
 
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """A step.
+    """A time step that was taken, dimensionless.
 
     Attributes
     ----------
     begin, after : Memory
+        The state before and after it.
     h : float
+        Its length.
     places : ndarray (stages,)
-        Of the stages in it, the last of them 1.
+        Positions of the stages in the step, as fractions of h; the last one is 1.
     turns : ndarray (stages, rotations, turns)
         Rotation vectors since its begin.
     shifts : ndarray (stages, displacements)
+        Changes of the displacements since its begin.
     x : ndarray (stages, quantities)
     lam : ndarray (stages, multipliers)
     size : float
-        Last change of Newton's method.
+        Largest change in the last Newton iteration.
     iterations : int
     gap : float
-        What closings miss at its end.
+        Largest gap of the constraints at its end.
     """
 
     begin: Memory
@@ -97,7 +102,7 @@ class Taken:
 
     @property
     def converged(self) -> bool:
-        """Whether Newton's method has."""
+        """Whether Newton's method has converged in this step."""
         return self.size <= LAST_CHANGE
 
 
@@ -110,7 +115,7 @@ def _arms(group: Observables) -> Array:
 
 
 class Stepper:
-    """Steps of one method for one system.
+    """Takes time steps of one system by one method.
 
     Parameters
     ----------
@@ -127,7 +132,7 @@ class Stepper:
         self.count = 0
 
     def step(self, memory: Memory, h: float) -> Taken:
-        """A step of length h."""
+        """The step of length h, dimensionless, from a state; see :attr:`Taken.converged`."""
         system, method, n = self.system, self.method, self.system.layout
         stages, last = method.stages, memory.last
         # What jumps at the end of the step does so after it.
@@ -167,7 +172,7 @@ class Stepper:
         return replace(near, after=replace(after, last=near))
 
     def predicted(self, memory: Memory, h: float) -> Array:
-        """Quantities after a step as the one before goes on."""
+        """Quantities (quantities,) after a step of length h, extrapolated from the step before, dimensionless."""
         last = memory.last
         assert last is not None
         if self.method.stages == 1:
@@ -180,7 +185,7 @@ class Stepper:
         return np.asarray(row @ np.vstack([last.begin.x, last.x]))
 
     def refreshed(self, memory: Memory, h: float) -> Memory:
-        """A memory at which the motion begins afresh; accelerations, where the method keeps any, are those after it."""
+        """The state for a restart: accelerations, where the method keeps them, are those just after the kink."""
         fresh = replace(memory, last=None)
         if self.method.kept == 1:
             return fresh
@@ -220,17 +225,17 @@ def integrate(
     first: float | None = None,
     beyond: float = 0.0,
 ) -> Iterator[Taken]:
-    """Steps up to the last of the breaks, which all are ends of steps, and a few beyond it.
+    """Integrate up to the last of the breaks; every break is the end of a step.
 
-    Those beyond make the last answers as accurate as all others, which have steps on both sides.
+    A few further steps make the last answers, which are interpolated, as accurate as all others.
 
     Parameters
     ----------
-    breaks : rising times, dimensionless
+    breaks : (n,), rising times at which loads or motions have kinks, then the end; all times are dimensionless
     step : fixed length; the steps between two breaks are equal and no longer
-    tolerance : or by the error of a step, relative to the unit of length
-    first : step that is tried first
-    beyond : time up to which all goes on smoothly after the last break
+    tolerance : instead of ``step``: permitted error of a step, over the unit of length
+    first : length of the first step that is tried
+    beyond : time after the last break up to which loads and motions are smooth
 
     Raises
     ------

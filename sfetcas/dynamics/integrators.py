@@ -1,4 +1,4 @@
-"""What brings a motion from its begin to its end: integrators, one class each behind one interface."""
+"""Integrators: each takes a system from its initial state through the times of the answer, behind one interface."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ It dies away from step to step then; of a tenth of this step it is much of what 
 
 @dataclass(frozen=True, eq=False)
 class InitialState:
-    """Where a motion begins, dimensionless.
+    """The initial state of a motion, dimensionless.
 
     Attributes
     ----------
     state : State
     rates : ndarray (unknowns,)
-        Angular velocities about the fixed axes, velocities of displacements.
+        Angular velocities about the fixed axes, rates of the displacement unknowns.
     x, v : ndarray (quantities,)
-        Quantities and their rates.
+        Quantities that carry mass or are damped, and their rates.
     """
 
     state: State
@@ -47,24 +47,24 @@ class InitialState:
 
 @dataclass(frozen=True, eq=False)
 class TimeGrid:
-    """What is asked for; times are dimensionless.
+    """Times and accuracy of an integration; times are dimensionless.
 
     Attributes
     ----------
-    times : ndarray
-        Of the answers, rising, the last of them the end.
+    times : ndarray (n,)
+        Times of the answer, rising; the last one is the end.
     breaks : list of float
-        Where loads or motions have a kink, and the end.
+        Times at which loads or motions have a kink, and the end.
     beyond : float
-        Time up to which all goes on smoothly after the end.
+        Time after the end up to which loads and motions are smooth.
     accuracy : float
         Wanted error of the positions over the size of the scene.
     rounds : int
-        How many coarser runs went before.
+        Number of coarser runs before this one.
     size : float
-        Of the scene, over the unit of length.
+        Size of the scene over the unit of length.
     step : float or None
-        Prescribed length of steps.
+        Prescribed step; None for error control.
     """
 
     times: Array
@@ -77,25 +77,25 @@ class TimeGrid:
 
     @property
     def end(self) -> float:
-        """Of the motion."""
+        """The time at which the motion ends, dimensionless."""
         return self.breaks[-1]
 
 
 class Integrator(abc.ABC):
-    """An integrator of one system.
+    """Base class of integrators; a subclass gives :meth:`samples`.
 
     Parameters
     ----------
     system : StageEquations
     progress : callable or None
-        Told the time reached, s.
+        Called with the time reached, s.
 
     Attributes
     ----------
     count : int
-        Steps so far.
+        Number of steps so far.
     gap, norm : float
-        Largest by which closings and norms were off at what the integrator reached.
+        Largest error so far of the constraints, and of the unit norms of quaternions.
     """
 
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
@@ -104,29 +104,29 @@ class Integrator(abc.ABC):
 
     @abc.abstractmethod
     def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
-        """States at the times of the answers, as soon as they are known.
+        """Yields the states at the times of the answer, each as soon as it is known.
 
         Raises
         ------
         SceneError
-            The integrator cannot take the scene.
+            The integrator cannot treat the scene.
         SolveError
-            It does not get on; the states before have been given.
+            It cannot go on; the states before have been given.
         """
 
     def rest(self) -> Iterator[Sample]:
-        """What is known of further states where the motion ended before its time."""
+        """Further states that are known where the motion was ended early."""
         return iter(())
 
     def told(self, t: float) -> None:
-        """A time has been reached."""
+        """Report to ``progress`` that a dimensionless time has been reached."""
         if self._progress is not None:
             self._progress(t * self.system.masses.time)
 
 
 @final
 class Stages(Integrator):
-    """Steps of a method with stages."""
+    """Integration by a method with stages (:class:`~sfetcas.dynamics.methods.Method`)."""
 
     def __init__(
         self, system: StageEquations, progress: Callable[[float], Any] | None = None, *, method: Method
@@ -135,7 +135,7 @@ class Stages(Integrator):
         self._stepper, self._sampler = Stepper(system, method), Sampler([], method.stages)
 
     def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
-        """Polynomials through the stages."""
+        """States interpolated by polynomials through ends of steps; as of :meth:`Integrator.samples`."""
         stepper, method, state = self._stepper, self._stepper.method, begun.state
         rates = np.zeros((method.kept, len(begun.x)))
         rates[0] = begun.v
@@ -160,7 +160,7 @@ class Stages(Integrator):
         yield from self.rest()
 
     def rest(self) -> Iterator[Sample]:
-        """Samples of the last steps."""
+        """Samples of the last steps, where there are no further ones to interpolate with."""
         return self._sampler.close()
 
     def _judge(self, taken: Taken) -> None:

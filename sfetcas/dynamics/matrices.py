@@ -23,14 +23,14 @@ __all__ = ["Matrices", "matrices_of"]
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
-    """Matrices of one small motion.
+    """Matrices of the linearised equations of motion, in SI units.
 
     Attributes
     ----------
     parts : mapping of str to SparseMap
         ``mass``, ``damping``, ``gyroscopic``, ``stiffness`` (unknowns, unknowns), ``constraint`` (rows, unknowns).
     unknowns, rows : tuple of str
-        What each unknown and each row is.
+        A description of each unknown and each row.
     """
 
     parts: Mapping[str, SparseMap]
@@ -68,7 +68,7 @@ def _market(matrix: SparseMap) -> str:
 
 
 def matrices_of(motion: SmallMotion) -> Matrices:
-    """The matrices of a small motion."""
+    """The matrices of a small motion in SI units."""
     model, equations, masses = motion.model, motion.equations, motion.masses
     length, moment = model.scales.length, model.scales.moment
     # Displacements are in units of length.

@@ -1,7 +1,7 @@
-"""Methods of integration with stages: how rates at the stages of a step depend on the quantities there.
+"""Time integration methods with stages: how rates at the stages of a step depend on the quantities there.
 
-A method is data and two formulas; everything else of a step is the same for all, see :mod:`~sfetcas.dynamics.steps`.
-All take the equations of index 3 as they are: closings hold at every stage, internal forces are their multipliers.
+A method is data and two formulas; a step is put together from them by :mod:`~sfetcas.dynamics.steps`.  All methods take
+the equations in their index-3 form: constraints hold at every stage, and internal forces are their multipliers.
 
 Source: Chung and Hulbert 1993, Arnold and Bruls 2007 (generalised-alpha of index 3, doi 10.1007/s11044-007-9084-0);
 Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5 and VII (Radau IIA).
@@ -26,7 +26,8 @@ __all__ = ["RADAU", "Begin", "GeneralisedAlpha", "Method", "Radau", "Relations",
 
 @dataclass(frozen=True)
 class Relations:
-    """Rates at the stages by the quantities there: ``X' = (X - X_0) C^T + v``, ``X'' = (X - X_0) B^T + a``.
+    """Rates at the stages as functions of the quantities there: ``X' = (X - X_0) C^T + v``, ``X'' = (X - X_0) B^T +
+    a``.
 
     Attributes
     ----------
@@ -41,24 +42,24 @@ class Relations:
 
 
 class Method(abc.ABC):
-    """What a method of integration gives; a step of any is put together by :mod:`~sfetcas.dynamics.steps`.
+    """Base class of integration methods; :mod:`~sfetcas.dynamics.steps` makes a time step of it.
 
     Attributes
     ----------
     name : str
     order : int
-        Of the positions.
+        Order of convergence of the positions.
     places : ndarray (stages,)
-        Of the stages in the step, the last of them 1.
+        Positions of the stages in the step, as fractions of its length; the last one is 1.
     loaded : ndarray
-        Places in the step at which it asks for loads and motions, the last so many of them those of the stages.
+        Fractions of the step at which loads and motions are evaluated; those of the stages come last.
     kept : int
-        Rates that go from step to step: the velocity first.
+        Number of rates that are passed from step to step: the velocity first.
     gain : float
         Steps chosen by the error of ``(gain accuracy)**(order of that error / order)`` give some three times the
         accuracy at the end (measured): what a finer run, which follows, confirms.
     polished : bool
-        Whether one more iteration follows when Newton's method has converged: what keeps energy needs every digit.
+        Whether one more iteration follows when Newton's method has converged, as conservation of energy needs.
     """
 
     name: str
@@ -71,20 +72,20 @@ class Method(abc.ABC):
 
     @property
     def stages(self) -> int:
-        """Their number."""
+        """Number of stages."""
         return len(self.places)
 
     @abc.abstractmethod
     def iteration(self, system: StageEquations) -> ca.Function:
-        """One iteration of Newton's method, ``(q, y, lam, constants...) -> (q, y, lam, size)``.
+        """One Newton iteration as a function ``(q, y, lam, constants...) -> (q, y, lam, size)``.
 
-        q (components, rotations * stages), y and lam with a column a stage; ``size`` is the largest rotation or
+        q (components, rotations * stages), y and lam with a column for each stage; ``size`` is the largest rotation or
         displacement by which anything changed.
         """
 
     @abc.abstractmethod
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
-        """What the iterations of a step of length h share; factors (groups, loaded) of the loads."""
+        """The further arguments of :meth:`iteration`; h is the step, factors (groups, loaded) multiply the loads."""
 
     @abc.abstractmethod
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
@@ -93,7 +94,7 @@ class Method(abc.ABC):
 
 @dataclass(frozen=True)
 class Begin:
-    """The begin of a step: rotations, displacements, quantities, rates (quantities, kept), and counted angles."""
+    """State at the begin of a step: rotations, displacements, quantities, rates (quantities, kept), angles."""
 
     q: ca.MX
     y: ca.MX
@@ -103,25 +104,25 @@ class Begin:
 
 
 class StageMethod(Method):
-    """A method that is nothing but relations of rates and quantities at its stages."""
+    """A method that is given by its :class:`Relations` alone."""
 
     @abc.abstractmethod
     def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
-        """The relations of a step of length h after rates (quantities, kept)."""
+        """The relations in a step of length h after rates (quantities, kept)."""
 
     def iteration(self, system: StageEquations) -> ca.Function:
-        """That of the equations at the stages."""
+        """The Newton iteration of the stage equations, as of :meth:`Method.iteration`."""
         return system.iteration(self.stages)
 
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
-        """The relations and the loads."""
+        """The relations, and the factors of the loads."""
         given = self.relations(h, begin.rates)
         return [begin.x, given.v, given.a, given.C, given.B, factors, begin.near]
 
 
 @final
 class Radau(StageMethod):
-    """Radau IIA collocation of two or three stages: order 3 or 5; damps what a step cannot resolve."""
+    """Radau IIA collocation with two or three stages: order 3 or 5, L-stable."""
 
     kept = 1
 
@@ -136,7 +137,7 @@ class Radau(StageMethod):
         return np.asarray(np.linalg.inv(integration(self.places, self.places)))
 
     def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
-        """Rates are the derivatives of the collocation polynomials."""
+        """Derivatives of the collocation polynomials at the stages."""
         slopes = ca.DM(self._inverse)
         ones = ca.DM.ones(1, self.stages)
         first = ca.DM(self._inverse.sum(axis=1))
@@ -162,7 +163,7 @@ RADAU = {
 
 @final
 class GeneralisedAlpha(StageMethod):
-    """Generalised-alpha: order 2, one stage; ``damping`` is the spectral radius at infinite frequency, 0 to 1."""
+    """Generalised-alpha: order 2, one stage; ``damping`` is the spectral radius at infinite frequency, from 0 to 1."""
 
     kept = 3
     order = 2
@@ -175,7 +176,7 @@ class GeneralisedAlpha(StageMethod):
         self.beta = 0.25 * (self.gamma + 0.5) ** 2
 
     def relations(self, h: ca.MX, rates: ca.MX) -> Relations:
-        """Newmark's formulas with an acceleration that lags behind the true one."""
+        """Newmark's formulas with the auxiliary, acceleration-like variable of the method."""
         velocity, lagging, true = ca.horzsplit(rates)
         first = -velocity / (self.beta * h) - (0.5 / self.beta - 1.0) * lagging
         share = (1.0 - self.of_mass) / (1.0 - self.of_force)
@@ -188,7 +189,7 @@ class GeneralisedAlpha(StageMethod):
         )
 
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
-        """Velocity, lagging and true acceleration."""
+        """Velocity, auxiliary acceleration-like variable, and true acceleration."""
         velocity, lagging, _ = ca.horzsplit(rates)
         now = self.relations(h, rates)
         true = now.B * moved + now.a

@@ -1,8 +1,9 @@
-"""Modes: frequencies and shapes of small motions about the equilibrium of a scene, to the accuracy asked for.
+"""Modal analysis: frequencies and mode shapes of small vibrations about the equilibrium of a scene.
 
-1. The equilibrium of the loads is that of statics; a scene without loads is at rest undeformed, supported or not.
-2. It is put on a mesh with a place at every cut, which masses need, and corrected there by Newton's method.
-3. All elements are halved until the frequencies change by less than the accuracy, relative to themselves.
+1. The equilibrium of the loads is found by statics; a scene without loads is undeformed, supported or not.
+2. It is transferred to a mesh on which every end of an element has a displacement, as masses need it, and corrected
+   there by Newton's method.
+3. All elements are halved until the relative changes of the frequencies are less than the accuracy.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ __all__ = [
 ]
 
 ORDER = 6
-"""Order of the elements: the error of a frequency falls by 2 to the power of twice this at each halving."""
+"""Polynomial order p of the elements: each halving divides the error of a frequency by about 2^(2 p)."""
 
 HALVINGS = 7
 """Halvings of the mesh at most."""
@@ -61,28 +62,29 @@ MOST_ELEMENTS = 4000
 """A mesh that is halved does not grow beyond this."""
 
 STEP = 1e-5
-"""Step of the central difference that gives shapes: its square is left out."""
+"""Step of the central difference that turns eigenvectors into displacements; its relative error is the step squared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One mode, its largest displacement 1 (m), or its largest rotation (rad) where nothing is displaced.
+    """One mode shape, normalised to a largest displacement of 1 m, or a largest rotation of 1 rad where nothing moves.
 
-    Of displacements that differ by less than a thousandth the first counts as the largest, in the order of the names of
-    nodes, then members.
+    Of displacements that differ by less than a thousandth, the first in the alphabetical order of nodes, then members,
+    counts as the largest.
 
     Attributes
     ----------
     omega : float
         Angular frequency, rad/s.
     damping : float
-        Damping ratio; below zero for motions that grow.
+        Damping ratio; negative for motions that grow.
     mass : float
-        Modal mass, kg: twice the kinetic energy at a velocity of 1 m/s of what moves most.
+        Modal mass, kg: twice the kinetic energy at a modal velocity of 1/s.
     nodes : mapping
-        ``position`` (3,) m and, where a node turns, ``rotation`` (3,) rad by name; complex with damping.
+        For each node the displacement, called ``position``, (3,) m and, where it has a rotation of its own,
+        ``rotation`` (3,) rad, both in the fixed axes; complex with damping.
     members : mapping
-        ``s`` and ``position`` (n, 3) along each member.
+        For each member fractions of its length ``s`` (n,) and the displacement ``position`` (n, 3) m there.
     """
 
     omega: float
@@ -92,7 +94,7 @@ class Mode:
     members: Mapping[str, Mapping[str, Array]] = field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """As an entry of ``shapes`` in the JSON answer."""
+        """The shape as an entry of ``shapes`` in the JSON answer; imaginary parts have keys of their own."""
         answer: dict[str, Any] = {"mass": self.mass}
         for kind, table in (("nodes", self.nodes), ("members", self.members)):
             answer[kind] = {name: _plain(entry) for name, entry in table.items()}
@@ -115,26 +117,27 @@ class Modes:
 
     Attributes
     ----------
+    scene : Scene
     status : Status
-        SOLVED, or SHORT where the frequencies are not as accurate as was asked for.
+        SOLVED, or SHORT where the frequencies do not have the accuracy that was asked for.
     last : Equilibrium
-        About which the motions are.
+        The equilibrium about which the structure vibrates.
     modes : tuple of Mode
-        By rising frequency; rigid motions are left out.
+        By rising frequency, without rigid-body modes.
     rigid : int
-        Motions with mass that nothing resists.
+        Number of rigid-body modes: motions with mass that no stiffness resists.
     growing : tuple of float
-        Rates, 1/s, of motions that leave an unstable equilibrium without oscillating.
+        Growth rates, 1/s, of motions that leave an unstable equilibrium without oscillating.
     error_estimate : float
         Largest estimated relative error of the frequencies.
     motion : SmallMotion
-        Matrices, dimensionless.
-    buckling : ndarray
-        Factors of the loads at which the structure buckles, a linear estimate from factor 0: those above zero rising,
-        then those below it by size.  Empty for loads without potential, and without loads.
+        The linearised equations of motion, dimensionless.
+    buckling : ndarray (factors,)
+        Buckling factors of the loads by linear analysis from factor 0: positive ones rising, then negative ones by
+        size.  Empty without loads, and for loads without potential.
     notes : tuple of str
     seconds : mapping
-        Time spent on models and on solving.
+        Wall time of assembling and of solving, s.
     """
 
     scene: Scene = field(repr=False)
@@ -151,7 +154,7 @@ class Modes:
 
     @property
     def steps(self) -> tuple[Equilibrium, ...]:
-        """The equilibrium, as the one entry of a list."""
+        """The equilibrium as a tuple of one, so that all answers have ``steps``."""
         return (self.last,)
 
     @property
@@ -161,15 +164,15 @@ class Modes:
 
     @property
     def damped(self) -> bool:
-        """Whether motions fade or grow."""
+        """Whether anything depends on velocities, or a mode has a damping ratio other than zero."""
         return not self.motion.plain or any(mode.damping for mode in self.modes)
 
     def matrices(self) -> Matrices:
-        """Mass, damping, stiffness and constraints of the small motions, by name and in SI units."""
+        """Mass, damping, gyroscopic, stiffness and constraint matrices of the small motions, in SI units."""
         return matrices_of(self.motion)
 
     def values(self) -> dict[str, Any]:
-        """What the answer says under ``modes``, but shapes."""
+        """The quantities under ``modes`` in the JSON answer, without the shapes."""
         answer: dict[str, Any] = {"omega": self.omega.tolist(), "rigid": self.rigid}
         if self.damped:
             answer["damping"] = [mode.damping for mode in self.modes]
@@ -188,20 +191,26 @@ class Modes:
 
 @single_threaded
 def find_modes(scene: Scene, settings: Settings) -> Modes:
-    """The modes of a scene.
+    """Modal analysis of a scene.
 
     Raises
     ------
     SceneError
         The scene asks for what cannot be modelled.
     SolveError
-        Its equilibrium, or the frequencies, could not be found.
+        The equilibrium or the frequencies could not be found.
     """
     return ModalAnalysis(scene, settings).modes()
 
 
 class ModalAnalysis:
-    """A modal analysis: the equilibrium, then finer and finer meshes."""
+    """A modal analysis: the static equilibrium, then eigenvalues on meshes that are halved until the frequencies agree.
+
+    Raises
+    ------
+    SceneError
+        Gauss integration is asked for; masses need integration at the nodes of the elements.
+    """
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
         if settings.gauss:
@@ -233,7 +242,13 @@ class ModalAnalysis:
         return replace(mesh, order=mesh.order if named else ORDER, places=True)
 
     def modes(self) -> Modes:
-        """Frequencies on finer and finer meshes."""
+        """The modes on the finest mesh that was needed, with their estimated error.
+
+        Raises
+        ------
+        SolveError
+            The equilibrium could not be transferred to a mesh, or the eigenvalue problem could not be solved.
+        """
         begin = time.perf_counter()
         fixed, mesh = self.meshing.fixed, self._mesh()
         flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
@@ -322,17 +337,17 @@ def _difference(coarse: Eigenmotions, fine: Eigenmotions) -> float:
 
 
 def prepared_for_motion(scene: Scene, mesh: Mesh) -> Prepared:
-    """A model with a place at every cut."""
+    """The assembled model of a scene with a displacement at every end of an element, as masses need it."""
     return Prepared(assemble(scene, replace(mesh, places=True), assembly="nodal"))
 
 
 def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared, Corrected, Loading]:
-    """An equilibrium, or the undeformed scene (None), on a mesh with a place at every cut.
+    """An equilibrium, or the undeformed scene (None), transferred to a mesh for masses and corrected there.
 
     Raises
     ------
     SolveError
-        It is none there.
+        Newton's method does not converge there.
     """
     prepared = prepared_for_motion(scene, mesh)
     loading = prepared.model.loading(1.0 if rest is None else rest.factor)
@@ -347,7 +362,7 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
 
 
 def carried(equations: Equations, state: State, loading: Loading) -> State:
-    """The state with displacements that close the members, and multipliers that balance it as far as these can."""
+    """The state with displacements that meet the loop closures, and multipliers that balance it in least squares."""
     positions, unknowns = equations.model.positions, equations.unknowns
     state = equations.holding(state, loading)
     if len(positions.rows):

@@ -1,4 +1,4 @@
-"""What a motion gives by name: histories of positions, rotations, reactions, energies and momenta."""
+"""Answers of dynamic analyses by name: states at the times of the answer, with velocities, energies and momenta."""
 
 from __future__ import annotations
 
@@ -28,14 +28,17 @@ __all__ = ["MotionState", "Mover", "Trajectory"]
 
 
 class Mover:
-    """What makes instants of samples: one model with its equations and masses."""
+    """Turns samples of an integrator into states by name: the equations of one model, its masses and its unit of time.
+
+    ``factors`` gives the factors of the groups of loads at a dimensionless time; ``time`` is the unit of time, s.
+    """
 
     def __init__(self, equations: Equations, inertia: Inertia, time: float, factors: Callable[[float], Array]) -> None:
         self.equations, self.inertia, self.time, self.factors = equations, inertia, time, factors
         self.model: Model = equations.model
 
     def instant(self, sample: Sample) -> MotionState:
-        """A sample by name."""
+        """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
         model, equations = self.model, self.equations
         loading = self.inertia.system.loading(self.factors(sample.t))
         free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.near)
@@ -70,14 +73,16 @@ class Mover:
 
 @dataclass(frozen=True, eq=False)
 class MotionState(Configuration):
-    """The state of a motion at a time; section forces and reactions are those with inertia and damping.
+    """The state of a motion at one time; section forces and reactions include inertia and damping.
 
     Attributes
     ----------
     time : float
         s; also its ``factor``.
     sample : Sample
-        Rotations, quantities and their rates, dimensionless.
+        Rotations, displacements and their rates, dimensionless.
+    energies : tuple of float
+        Kinetic energy, elastic energy, potential of the loads, dimensionless; :attr:`energy` has them in N m.
     """
 
     where: ClassVar[str] = MOTION
@@ -95,7 +100,7 @@ class MotionState(Configuration):
         return three(rate) * self.model.scales.length / self.mover.time
 
     def angular_velocity(self, node: str) -> Array | None:
-        """Angular velocity of a node about the fixed axes, (3,) rad/s; None where it has no rotation of its own."""
+        """Angular velocity of a node about the fixed axes, (3,) rad/s; None for a node without its own rotation."""
         number = self.model.rotations.node_turn[self._known(node, self.model.nodes, "node")]
         if number is None:
             return None
@@ -104,9 +109,9 @@ class MotionState(Configuration):
         return found
 
     def along(self, member: str, at: Any) -> dict[str, Array]:
-        """As of :meth:`Configuration.along`; also ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
+        """As :meth:`Configuration.along`, with ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
 
-        Not of small members, whose inside is not followed in time.
+        Small members have no velocities along them: their interior is not integrated in time.
         """
         found, model = super().along(member, at), self.model
         if member in model.members:
@@ -119,22 +124,22 @@ class MotionState(Configuration):
 
     @property
     def energy(self) -> dict[str, float]:
-        """Kinetic and elastic energy, potential of the loads as they are now, and their sum, N m.
+        """``kinetic`` and ``elastic`` energy, potential of the present ``loads``, and their sum ``total``, N m.
 
-        ``loads`` is minus the present forces times displacements, so that the sum changes where the loads do, too.
+        ``loads`` is minus the present forces times displacements, so that the sum also changes while loads change.
         """
         kinetic, elastic, loads = (part * self.model.scales.moment for part in self.energies)
         return {"kinetic": kinetic, "elastic": elastic, "loads": loads, "total": kinetic + elastic + loads}
 
     @functools.cached_property
     def momentum(self) -> dict[str, Array]:
-        """Linear momentum, (3,) kg m/s, and angular momentum about the centre of mass, (3,) kg m2/s."""
+        """``linear`` momentum, (3,) kg m/s, and ``angular`` momentum about the centre of mass, (3,) kg m2/s."""
         linear, angular = self.mover.inertia.momentum(self.sample.x, self.sample.v)
         time, scales = self.mover.time, self.model.scales
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As of :meth:`Configuration.table`; also energies and momenta."""
+        """As :meth:`Configuration.table`; also for the kinds ``energy`` and ``momentum``."""
         if kind == "momentum":
             return dict(self.momentum)
         return self.energy if kind == "energy" else super().table(kind, name)
@@ -145,33 +150,38 @@ class MotionState(Configuration):
         return found if turning is None else {**found, "angular_velocity": turning}
 
     def to_dict(self) -> dict[str, Any]:
-        """Values of this time, as leaves of the JSON answer."""
+        """The quantities of this time as nested dictionaries, of which :meth:`Trajectory.to_dict` makes lists."""
         tables = self.tables("nodes", "reactions", "springs", "motions")
         return {**tables, "energy": self.energy, "momentum": self.momentum}
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """The motion of a scene, made by :func:`sfetcas.solve`.
+    """The answer of a dynamic analysis: the motion of a scene in time.
 
     Attributes
     ----------
+    scene : Scene
     status : Status
     steps : tuple of MotionState
         One for each time of the answer.
     seconds : mapping
-        Time spent on the model, on building and on compiling the step, and on solving.
+        Wall time of assembling, of building and compiling the time step, and of integrating, s.
+    integrator : str
+        Name of the integrator, as in ``analysis.integrator``.
     count : int
-        Steps in time of the last run.
+        Number of time steps of the last run.
     error_estimate : float or None
-        Of the positions over the size of the scene, largest over the times; None where step and mesh are prescribed.
+        Largest estimated error of the positions at any time, over the size of the scene; None where step and mesh are
+        prescribed.
     error_of : str
-        The quantity that this is of instead, over its largest value; empty: the positions.
+        Name of the quantity that the estimate refers to instead, relative to its largest value; empty: the positions.
     violation : mapping
-        Largest that ``norms`` of quaternions and ``closings`` (over the unit of length) were off at the ends of steps.
+        Largest error at the ends of steps of the unit ``norms`` of quaternions, and of the ``closings``: gaps of loop
+        closures and joints over the unit of length.
     notes : tuple of str
     failure : str
-        Where it ended before its time, why.
+        Why the motion ended early; empty where it did not.
     """
 
     scene: Any = field(repr=False)
@@ -197,7 +207,7 @@ class Trajectory:
         return np.array([step.time for step in self.steps])
 
     def at(self, time: float) -> MotionState:
-        """The instant of the answer nearest to a time."""
+        """The state of the answer whose time is nearest to a time in s; nothing is interpolated."""
         return self.steps[int(np.abs(self.times - time).argmin())]
 
     def positions(self, node: str) -> Array:
@@ -209,15 +219,15 @@ class Trajectory:
         return np.array([step.velocity(node) for step in self.steps])
 
     def angular_velocities(self, node: str) -> Array:
-        """Angular velocities of a node with a rotation of its own over the times, (times, 3) rad/s."""
+        """Angular velocities of a node over the times, (times, 3) rad/s; nan for a node without its own rotation."""
         return np.array([step.angular_velocity(node) for step in self.steps], dtype=float)
 
     def energies(self, kind: str = "total") -> Array:
-        """Energies over the times, (times,) N m: kinetic, elastic, loads or total."""
+        """Energies over the times, (times,) N m; ``kind`` is kinetic, elastic, loads or total."""
         return np.array([step.energy[kind] for step in self.steps])
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON answer: every leaf is a list over ``times``."""
+        """The JSON answer as nested dictionaries; each quantity is a list over ``times``."""
         return {
             **heading(self, self.last.model, self.failure),
             "integrator": self.integrator,

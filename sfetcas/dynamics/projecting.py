@@ -1,4 +1,4 @@
-"""States and rates brought back to what joints and closings allow, by the smallest change."""
+"""Projection of states and rates onto the constraints, by the smallest change."""
 
 from __future__ import annotations
 
@@ -16,20 +16,23 @@ ROUNDS = 8
 
 
 def factor_closings(equations: Equations, point: Point) -> None:
-    """Factor ``[1 G^T; G 0]`` with the derivative G of the closings at a point."""
+    """Factor ``[1 G^T; G 0]``, with the Jacobian G of the constraints at a point, in the solver of the equations."""
     entries = equations.of_rows(point.entries)
     equations.solver.factor(equations.regularised(entries, np.ones(equations.unknowns), tolerances.DUAL))
 
 
 def shortest(equations: Equations, gaps: Array) -> Array:
-    """The smallest change of the unknowns by which closings move by ``-gaps``; factored before."""
+    """The smallest change (unknowns,) that reduces the gaps (rows,) of the constraints to zero, dimensionless.
+
+    The matrix must have been factored by :func:`factor_closings`.
+    """
     n = equations.unknowns
     step = equations.solver.solve(np.concatenate([np.zeros(n), -gaps]))
     return np.asarray(step[:n])
 
 
 def of_unit_length(q: Array) -> tuple[Array, float]:
-    """Rotations (n, components) of unit length, and the largest by which their squares were off."""
+    """Quaternions (n, 4) normalised, or angles (n, 1) as they are, and the largest error of the squared norms."""
     if q.shape[1] == 1 or not len(q):
         return q, 0.0
     square = np.einsum("ij,ij->i", q, q)
@@ -37,7 +40,7 @@ def of_unit_length(q: Array) -> tuple[Array, float]:
 
 
 def closed(equations: Equations, state: State, loading: Loading) -> tuple[State, float]:
-    """A state with its closings met, and the largest gap before; the matrix is factored there."""
+    """A state projected onto the constraints, and the largest gap before; leaves the factored matrix in the solver."""
     n = equations.unknowns
     if not equations.rows:
         return state, 0.0

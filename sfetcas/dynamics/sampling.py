@@ -1,9 +1,9 @@
-"""States between and at the ends of steps: polynomials through the ends of neighbouring steps.
+"""States at given times: interpolation by polynomials through the ends of neighbouring time steps.
 
-Positions at the ends of steps are of the full order of a method; those at the stages within, and its own velocities and
-internal forces of index 3, are not.  Derivatives of polynomials through the ends nearly are, and serve instead.  Where
-fewer steps hang together, after a kink and before the next, or where so many steps are too long for one polynomial, the
-stages within have to do.
+Positions at the ends of steps have the full order of the method; those at the stages within, and the velocities and
+internal forces of the index-3 form, do not.  Derivatives of polynomials through the ends nearly do, and replace them.
+Where too few steps are connected, between two kinks, or many steps are too long for one polynomial, the stages within
+are interpolated instead.
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ class Sample:
     ----------
     t : float
     q : ndarray (rotations, components)
-    y : ndarray
+        Quaternions or angles.
+    y : ndarray (displacement unknowns,)
     x, v, a : ndarray (quantities,)
-        Quantities and their rates.
+        Quantities that carry mass or are damped, and their first and second rates.
     spin : ndarray (rotations, turns)
         Angular velocities about the fixed axes.
     near : ndarray
@@ -56,13 +57,13 @@ class Sample:
 
 
 class Sampler:
-    """Samples of a motion at rising times, as soon as the steps around them are there.
+    """Interpolates samples of a motion at rising times, each as soon as the steps around it are known.
 
     Parameters
     ----------
-    times : rising, dimensionless
+    times : (n,), rising, dimensionless
     stages : int
-        Stages of a step.
+        Number of stages of a step.
     """
 
     def __init__(self, times: Sequence[float] | Array, stages: int) -> None:
@@ -71,7 +72,7 @@ class Sampler:
         self._stages = stages
 
     def feed(self, taken: Taken) -> Iterator[Sample]:
-        """Samples that a further step makes possible."""
+        """Yields the samples that become possible with a further step."""
         if taken.begin.last is None:
             yield from self.close()
         self._steps.append(taken)

@@ -1,4 +1,4 @@
-"""The motion of a scene: model, beginning, steps, answers, and the check of the error by a finer run."""
+"""Dynamic analysis: model, initial state, time integration, and error estimates by runs on finer discretisations."""
 
 from __future__ import annotations
 
@@ -39,46 +39,46 @@ from .watching import Watch, finer
 __all__ = ["INTEGRATORS", "Simulation", "left", "simulate"]
 
 USUAL = "radau-3"
-"""Integrator where none is asked for: of all it needs the least time for an accuracy of 1e-2 or finer (measured)."""
+"""Default integrator: of all it needs the least time for an accuracy of 1e-2 or finer (measured)."""
 
 INTEGRATORS: dict[str, Callable[[StageEquations, Callable[[float], Any] | None], Integrator]] = {
     **{m.name: partial(Stages, method=m) for m in (Radau(3), Radau(2), GeneralisedAlpha(), Conserving())},
     "idas": Idas,
 }
-"""What integrates a system, by name; the second argument is told the time reached, s."""
+"""Integrators by name: (system, progress) -> Integrator; ``progress`` is called with the time reached, s."""
 
 USUAL_STEPS, CALLS = 100, 6
-"""Steps of a first run, and calls of a kernel in a step, for the choice whether compiling pays."""
+"""Expected number of steps of a first run, and of calls of a kernel in a step, to decide whether compiling pays."""
 
 OUTPUTS = 100
-"""Answers where no spacing is asked for."""
+"""Number of spacings of the answers by default."""
 
 GAINED = 3.0
-"""A finer run is taken to be more accurate than it differs from the coarser one by this: 2^order - 1 of order 2."""
+"""Difference of two runs over the assumed error of the finer one: 2^order - 1 for order 2."""
 
 UNSUPPORTED = 3.0
-"""Times the last difference that the error is told as where runs do not come nearer to each other, at most."""
+"""Largest ratio of the error estimate to the last difference of runs where the differences do not converge."""
 
 SENSITIVE = (
     "runs of finer and finer steps do not come nearer to each other: so sensitive a motion cannot be told for so long"
 )
-"""What is said where the last two differences support no estimate."""
+"""A note where the differences of runs support no error estimate."""
 
 RESCUES = 2
-"""Finer meshes that are tried where the first run fails."""
+"""Number of finer meshes that are tried where the first run fails."""
 
 ROUNDS = 6
-"""Finer runs at most."""
+"""Largest number of finer runs."""
 
 
 @single_threaded
 def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] | None = None) -> Trajectory:
-    """The motion of a scene.
+    """Dynamic analysis of a scene.
 
     Parameters
     ----------
     progress : callable, optional
-        Told the time reached, s, after each step.
+        Called with the time reached, s, after each time step.
 
     Raises
     ------
@@ -92,7 +92,9 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 
 @dataclass
 class MeshRun:
-    """What one run on one mesh gave."""
+    """The result of one run on one mesh: states, number of steps, largest errors of constraints and norms, notes,
+    times.
+    """
 
     instants: list[MotionState]
     count: int
@@ -105,7 +107,7 @@ class MeshRun:
 
 
 class Simulation:
-    """A motion: its runs on finer and finer meshes."""
+    """The dynamic analysis of a scene: its runs on finer and finer discretisations."""
 
     def __init__(self, scene: Scene, settings: Settings, progress: Callable[[float], Any] | None = None) -> None:
         self.given, self.settings, self.progress = scene, settings, progress
@@ -125,7 +127,7 @@ class Simulation:
 
     @property
     def times(self) -> Array:
-        """Times of the answers, s: the regular ones, and those of expectations."""
+        """Times of the answer (n,), s, rising: evenly spaced ones, and those of expectations."""
         analysis = self.scene.analysis
         end = analysis.duration
         spacing = analysis.output or end / OUTPUTS
@@ -223,7 +225,7 @@ class Simulation:
 
     @property
     def before(self) -> Equilibrium:
-        """The equilibrium before the motion, found once."""
+        """The equilibrium from which the motion starts, computed once."""
         if self._before is None:
             self._before = equilibrium_before(
                 self.given, replace(self.settings, accuracy=0.1 * self.accuracy, accuracy_of=None)
@@ -235,7 +237,7 @@ class Simulation:
     # -- all --------------------------------------------------------------------------------------------
 
     def motion(self) -> Trajectory:
-        """Runs until two agree."""
+        """The answer: runs on finer and finer discretisations until two agree to the accuracy."""
         analysis = self.scene.analysis
         mesh, error = self.mesh, None
         apart: float | None = None
@@ -366,19 +368,20 @@ class Simulation:
 
 
 def left(apart: float, before: float | None, accuracy: float) -> float:
-    """Estimated error of the finest of some runs, relative.
+    """Estimated relative error of the finest of several runs.
 
-    That it gained by the order of the integrator is believed where two runs agree to the accuracy itself, or where
-    differences fall as they then would; what further runs would change is the sum of their series.  Runs that have
-    lost each other, as those of a chaotic motion do, tell nothing of how differences fall.
+    Convergence by the order of the integrator is assumed where two runs agree to the accuracy itself, or where the
+    differences fall accordingly; the error is then the sum of the geometric series of further differences.  Runs that
+    have diverged from each other, as those of a chaotic motion do, say nothing about convergence.
 
     Parameters
     ----------
     apart : float
-        How far it is from the run before.
+        Relative difference of the last two runs.
     before : float, optional
-        How far that is from its own.
+        Relative difference of the two runs before.
     accuracy : float
+        Wanted relative error.
 
     Example
     -------

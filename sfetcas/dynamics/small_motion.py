@@ -46,13 +46,16 @@ Rounding leaves a sixtieth of it; the slowest of the reference cases has 1e8 tim
 """
 
 DOUBLE = 1e-12
-"""The same of exponents that are zero twice, of which rounding leaves the root."""
+"""As :data:`RIGID`, for exponents that are double zeros, which rounding perturbs by its square root."""
 
 NEARER = 0.5
 """Share of the lowest square of a frequency by which the last shift lies below zero."""
 
 FARTHER = 1e-5
-"""The same of the highest that is wanted: at a critical point the lowest vanishes and would drown all others."""
+"""Least distance of the shift below zero, as a share of the highest square of a frequency that is wanted.
+
+At a critical point the lowest frequency vanishes, and a shift near it would drown all others.
+"""
 
 ATTEMPTS = 6
 """Spaces at most: one to find the size of what is looked for, one with rigid motions beside it, one at the end."""
@@ -81,18 +84,18 @@ ONE_MOTION = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Eigenmotions:
-    """Solutions ``x exp(lambda t)`` of the equations of small motion, dimensionless.
+    """Eigensolutions ``x exp(lambda t)`` of the linearised equations of motion, dimensionless.
 
     Attributes
     ----------
     exponents : ndarray (n,) complex
-        lambda, those that oscillate, by rising imaginary part.
+        The eigenvalues lambda of motions that oscillate, by rising imaginary part.
     shapes : ndarray (unknowns, n)
-        Real where there is neither damping nor turning and all loads have a potential.
+        Eigenvectors; real where there is neither damping nor rotation of the axes and all loads have a potential.
     rigid : int
-        Motions with mass that nothing resists.
-    growing : ndarray
-        Real exponents above zero: about an unstable equilibrium.
+        Number of rigid-body modes: motions with mass that no stiffness resists.
+    growing : ndarray (k,)
+        Positive real eigenvalues, of motions that leave an unstable equilibrium.
     """
 
     exponents: Array
@@ -102,16 +105,17 @@ class Eigenmotions:
 
     @property
     def omega(self) -> Array:
-        """Angular frequencies."""
+        """Angular frequencies (n,), dimensionless: imaginary parts of the exponents."""
         return np.asarray(self.exponents.imag)
 
 
 class SmallMotion:
-    """The equations of small motion about one equilibrium of a model with a place at every cut.
+    """The linearised equations of motion about an equilibrium, dimensionless.
 
     Parameters
     ----------
     equations : Equations
+        Of a model with a displacement at every end of an element, see :func:`~sfetcas.dynamics.modes.put_on`.
     state, loading, point
         The equilibrium.
 
@@ -136,22 +140,22 @@ class SmallMotion:
 
     @property
     def symmetric(self) -> bool:
-        """Whether all loads have a potential."""
+        """Whether the stiffness matrix is symmetric: all loads have a potential."""
         return self.model.has_potential
 
     @property
     def plain(self) -> bool:
-        """Whether squares of frequencies are eigenvalues: nothing depends on velocities."""
+        """Whether the eigenvalues are squares of frequencies: there is no damping and no Coriolis force."""
         return not len(self.damping.value) and not len(self.gyroscopic.value)
 
     @functools.cached_property
     def stiffness(self) -> SparseMap:
-        """The Newton matrix of the unknowns alone."""
+        """Tangent stiffness matrix (unknowns, unknowns), without the constraints."""
         return self._part(slice(0, self.unknowns))
 
     @functools.cached_property
     def constraints(self) -> SparseMap:
-        """The rows: what they say of a change of the unknowns."""
+        """Jacobian of the constraints, (rows, unknowns)."""
         return self._part(slice(self.unknowns, self.equations.total))
 
     def _part(self, rows: slice) -> SparseMap:
@@ -215,13 +219,14 @@ class SmallMotion:
 
         Parameters
         ----------
+        count : int
         unstable : int
-            Motions that grow without oscillating, to be looked for beside these.
+            Number of non-oscillating growing motions that are to be found as well.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            The pencil cannot be solved.
+            The eigenvalue problem could not be solved.
         """
         if not self.plain:
             return self._quadratic(count, unstable)

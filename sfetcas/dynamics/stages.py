@@ -33,7 +33,7 @@ __all__ = ["StageEquations"]
 
 
 class StageEquations(System):
-    """The equations of motion at stages, and Newton's method for them."""
+    """The equations of motion at the stages of a time step, and Newton's method for them."""
 
     def iteration(self, stages: int) -> ca.Function:
         """One Newton iteration of all stages of a step.
@@ -67,10 +67,11 @@ class StageEquations(System):
         return ca.Function(f"iteration_{stages}", arguments, results, names, ["q_next", "y_next", "lam_next", "size"])
 
     def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX) -> ca.MX:
-        """Newton's step of all stages, (total, stages), for entries in the order of their places.
+        """The Newton step of all stages, (total, stages), for matrix entries in the order of their positions.
 
-        ``inertia`` is what accelerations of each stage are multiplied by: beside the masses over it closings are
-        slightly soft in the matrix, not in the equations, so that some may depend on each other.
+        ``inertia`` multiplies the accelerations in each stage.  Relative to the masses so weighted, the constraint rows
+        of the matrix (not of the equations) get a small diagonal, so that dependent constraints do not make it
+        singular.
         """
         stages = residual.shape[1]
         system = self._system(stages)
@@ -92,15 +93,15 @@ class StageEquations(System):
         return there, step[turning:unknowns, :], step[unknowns:, :], size
 
     def stage(self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, factors: ca.MX, near: ca.MX) -> _Stage:
-        """Residual and entries at given inertia and damping forces."""
+        """Residual and matrix entries of a stage for given inertia and damping forces."""
         return _Stage(self, q, y, lam, forces, self.given(factors), near)
 
     def static_matrix(self, stage: _Stage) -> ca.MX:
-        """Derivative of a stage's residual by its unknowns at given inertia and damping forces, (total, total)."""
+        """Derivative (total, total) of a stage's residual by its unknowns for given inertia and damping forces."""
         return summed((self.total,) * 2, self.tables.tied(self._probe.static), stage.entries)
 
     def coupling_matrix(self, stage: _Stage, c: float, b: float) -> ca.MX:
-        """Its derivative by rates (c) and accelerations (b) of the unknowns, (total, total)."""
+        """Its derivative (total, total) where rates are multiplied by c and accelerations by b: ``c D + b M``."""
         return summed((self.total,) * 2, self._probe.coupled.places, stage.coupled(stage, ca.MX(c), ca.MX(b)))
 
     @functools.cached_property
@@ -139,7 +140,7 @@ SOFT_CLOSINGS = 1e-10
 
 
 class StagePlaces:
-    """Where the entries of a stage and of a pair of stages go, in the order in which :class:`_Stage` gives them."""
+    """Rows and columns of the matrix entries of a stage, and of a pair of stages, in the order of :class:`_Stage`."""
 
     def __init__(self, system: StageEquations) -> None:
         tables = system.tables

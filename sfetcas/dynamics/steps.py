@@ -20,7 +20,7 @@ ITERATIONS = 10
 """Iterations of Newton's method at most."""
 
 LAST_CHANGE = 1e-8
-"""Change, rad or lengths, below which it ends: convergence is quadratic, so the next one would be below rounding."""
+"""Change, rad or unit of length, at which the iteration ends: convergence is quadratic, the next change is rounding."""
 
 
 def step_function(system: StageEquations, method: Method) -> ca.Function:
@@ -28,10 +28,10 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
 
     ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, near) -> (q, y, lam, turns, shifts, x, rates, size,
     iterations, gap)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
-    quantities x and their rates (quantities, kept); of its stages turns (turns, rotations * stages) since its begin and
-    shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a fresh start;
-    factors (groups, loaded) of the loads.  It has converged when ``size`` is at most :data:`LAST_CHANGE`; ``gap`` is
-    what closings miss.
+    quantities x and their rates (quantities, kept); of its stages rotation vectors turns (turns, rotations * stages)
+    since its begin and shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a
+    restart; factors (groups, loaded) of the loads.  It has converged when ``size`` is at most :data:`LAST_CHANGE`;
+    ``gap`` is the largest gap of the constraints.  Everything is dimensionless.
     """
     n, s = system.layout, method.stages
     q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
@@ -101,7 +101,7 @@ def _newton(iteration: ca.Function, *, polished: bool) -> ca.Function:
 
 
 LOST = 1e3
-"""Change, rad or lengths, beyond which Newton's method is lost."""
+"""Change, rad or unit of length, at which Newton's method is given up."""
 
 
 @functools.cache

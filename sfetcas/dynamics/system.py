@@ -1,4 +1,9 @@
-"""A model in motion as CasADi expressions: its quantities, and the forces of inertia and damping."""
+"""A model in motion as CasADi expressions: the quantities X that carry mass or are damped, and their forces.
+
+The quantities are those of :mod:`~sfetcas.mechanics.observed`: first positions, of the places (points whose
+displacements the model knows) and of inner nodes of elements, then groups of observables such as section axes and
+strains.  Everything is dimensionless.
+"""
 
 from __future__ import annotations
 
@@ -31,21 +36,23 @@ __all__ = ["Layout", "System"]
 
 @dataclass(frozen=True)
 class Layout(expressions.Layout):
-    """Numbers of a model in motion: ``x`` quantities, beside those of the model."""
+    """Sizes of a model in motion: ``x`` is the number of quantities, the others are those of the model."""
 
     x: int
 
 
 class System(Expressions):
-    """Everything of a model that stages of any method need; made once, Functions on demand.
+    """Expressions of a model in motion that all integration methods use; Functions are built on demand.
 
     Parameters
     ----------
     equations : Equations
-        Numbers the unknowns.
+        They number the unknowns.
     masses : Masses
     kernels : str
-        Compiled or interpreted element functions.
+        ``compiled``, ``interpreted`` or ``auto`` element functions.
+    calls : float
+        Expected number of calls, by which ``auto`` decides.
     """
 
     layout: Layout
@@ -130,16 +137,16 @@ class System(Expressions):
         return ca.Function("rates", [q, y, factors, near, step], rate)
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
-        """Quantities at a state, and their rates where the unknowns have the rates ``step``."""
+        """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
         full = np.concatenate([step, np.zeros(self.equations.rows)])
         x, v = self.interpreted._rates(state.q.T, state.y, factors, state.wound, full)
         return np.array(x).ravel(), np.array(v).ravel()
 
     @functools.cached_property
     def floating(self) -> tuple[Array, Array] | None:
-        """What all displacements (y, axes) and quantities (x, axes) gain when everything moves by one along each axis.
+        """Changes of displacement unknowns (y, axes) and quantities (x, axes) in a unit translation along each axis.
 
-        None where the ground holds anything, or the place matters as in turning axes.
+        None where the ground restrains anything, or where the position matters, as in rotating axes.
         """
         positions, axes = self.model.positions, self.axes
         grounded = any((group.places < 0).any() for group in self.model.connections) or self.model.spinning is not None
@@ -160,39 +167,42 @@ class System(Expressions):
 
     @functools.cached_property
     def interpreted(self) -> Self:
-        """The same of which nothing is compiled: compiled functions have no derivatives."""
+        """This system with interpreted kernels: compiled functions cannot be differentiated by CasADi."""
         return self if self._kernels == "interpreted" else type(self)(self.equations, self.masses, "interpreted")
 
     @functools.cached_property
     def histories(self) -> tuple[History | None, ...]:
-        """Of the groups of loads; None of one whose factor is one."""
+        """For each group of loads its history; None for a group whose factor is constantly 1."""
         known = self.model.scene.histories
         own = [None if name is None else known[name] for name in self.model.groups]
         return (*own, *([None] * (len(self.loadings) - len(own))))
 
     def factors(self, t: float) -> Array:
-        """Factors of the groups of loads at a time, dimensionless."""
+        """Factors (groups,) of the groups of loads at a dimensionless time."""
         seconds = t * self.masses.time
         return np.array([1.0 if history is None else history.factor(seconds) for history in self.histories])
 
     def loading(self, factors: Array) -> Loading:
-        """Loads and motions at factors of their groups."""
+        """Loads and prescribed motions for factors (groups,) of their groups, dimensionless."""
         groups = [loading.scaled(float(f)) for loading, f in zip(self.loadings, factors, strict=True)]
         return functools.reduce(Loading.plus, groups)
 
     def paired(self, rows: int, width: int, n: int) -> ca.Function:
-        """(A, B, w) -> A^T diag(w) B of n groups of rows."""
+        """A function (A, B, w) -> A^T diag(w) B for each of n blocks of ``rows`` rows and ``width`` columns."""
         return self.many(weighted_product(rows, width), n)
 
     def hung(self, mine: ca.MX, its: ca.MX, c: ca.MX, b: ca.MX) -> list[ca.MX]:
-        """Entries of masses and drags within elements: on their rotations, and with their first places."""
+        """Matrix entries of masses (times b) and drags (times c) of inner nodes of elements.
+
+        An inner node hangs on the first place of its element: entries on the rotations, and coupled with that place.
+        """
         shares = b * ca.DM(self.inner[0]) + c * ca.DM(self.inner[1])
         first = b * ca.DM(self.firsts[0]) + c * ca.DM(self.firsts[1])
         blocks = self.many(arms_product(self.axes, self.turns, self.points), len(self.massive))
         return [ca.vec(blocks(mine, its, shares)), ca.vec(mine) * first, ca.vec(its) * first]
 
     def quantities(self, q: ca.MX, places: ca.MX, given: Given, near: ca.MX) -> ca.MX:
-        """All quantities X."""
+        """All quantities X (quantities,) from rotations and displacements of the places."""
         parts = [times(self.by_place, places)]
         if self.elements:
             parts[0] += times(self.by_tangent, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
@@ -203,23 +213,23 @@ class System(Expressions):
         return ca.vertcat(*parts)
 
     def moving(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> ca.MX:
-        """All quantities X of rotations and displacements."""
+        """All quantities X (quantities,) from rotations and displacement unknowns."""
         return self.quantities(q, self.displacements(q, y, given), given, near)
 
     def angles_of(self, group: Observables) -> Index | None:
-        """Which counted angles stand last in the data of observables; None where none does."""
+        """Numbers of the turn-counting angles that belong to a group of observables; None where it has none."""
         part = None if group.spring is None else self.model.winding.parts[group.spring]
         return None if part is None or group.numbers is None else part.start + group.numbers
 
     def seen_data(self, group: Observables, near: ca.MX) -> ca.MX:
-        """Data of observables; the last of those that count turns is the value near which they do."""
+        """Data of a group of observables; of those that count turns the last row is the value near which they do."""
         data, counted = ca.MX(ca.DM(group.data.T)), self.angles_of(group)
         return data if counted is None else ca.vertcat(data[:-1, :], near[counted.tolist()].T)
 
     # -- one Newton iteration ---------------------------------------------------------------------------
 
     def forces(self, rates: ca.MX, accelerations: ca.MX) -> ca.MX:
-        """Inertia and damping forces of all quantities."""
+        """Inertia, damping and Coriolis forces (quantities, columns) for rates and accelerations of that shape."""
         linear = times(self.mass, accelerations[: self.linear, :]) + times(self.drag, rates[: self.linear, :])
         parts = [linear]
         for group, (begin, end) in zip(self.masses.observables, self.ranges, strict=True):
@@ -232,14 +242,14 @@ class System(Expressions):
 
     @functools.cached_property
     def crossing(self) -> Array | None:
-        """Matrix (axes, axes) of ``2 Omega x`` of turning axes; None where they do not turn."""
+        """Matrix (axes, axes) of ``2 Omega x``, dimensionless, in rotating axes; None in fixed ones."""
         if self.model.spinning is None:
             return None
         return cross_matrix(2.0 * self.model.spinning.omega)[: self.axes, : self.axes]
 
     @functools.cached_property
     def coriolis(self) -> ca.DM | None:
-        """Coriolis forces on the quantities by their rates."""
+        """Matrix that gives the Coriolis forces from the rates, (quantities, quantities); None in fixed axes."""
         if self.crossing is None:
             return None
         weights, crosses = [self.mass], [ca.kron(ca.DM.eye(self.linear // self.axes), ca.DM(self.crossing))]
@@ -249,7 +259,7 @@ class System(Expressions):
         return ca.sparsify(ca.mtimes(ca.diagcat(*weights), ca.diagcat(*crosses)))
 
     def turned_rows(self, group: Observables) -> Array:
-        """``2 Omega x`` on the rows of a quantity: on the vectors that they begin with; numbers behind do not turn."""
+        """``2 Omega x`` on the rows of an observable, (rows, rows): on its leading vectors, not on later scalars."""
         assert self.crossing is not None
         found, count = np.zeros((group.kind.sizes[2],) * 2), group.kind.vectors
         found[: self.axes * count, : self.axes * count] = np.kron(np.eye(count), self.crossing)
@@ -257,7 +267,7 @@ class System(Expressions):
 
     @functools.cached_property
     def place_weights(self) -> tuple[Index, Index, Array]:
-        """Row, column and mass of each pair of places, inner nodes hanging on the first place of their element."""
+        """Row, column and mass (dimensionless) of pairs of places; inner nodes hang on the first of their element."""
         mass = mapped(self.place_mass)
         first = mass.row % self.axes == 0
         return mass.row[first] // self.axes, mass.column[first] // self.axes, mass.value[first]

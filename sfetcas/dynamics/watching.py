@@ -18,7 +18,7 @@ __all__ = ["Watch", "finer"]
 
 
 class Watch:
-    """Looks for the end of a motion: the first time at which a quantity passes a value."""
+    """Finds when a motion ends by ``until``: the first time at which a quantity passes a value."""
 
     def __init__(self, until: Until, mover: Mover) -> None:
         self._until, self._mover = until, mover
@@ -27,7 +27,7 @@ class Watch:
         self.ended = False
 
     def passed(self, instants: Sequence[MotionState]) -> bool:
-        """Whether the quantity has passed its value, and enough is known beyond it to say when."""
+        """Whether the quantity has passed its value, with enough states beyond to interpolate the time."""
         while len(self._values) < len(instants):
             self._values.append(self._excess(instants[len(self._values)]))
         if self._last is None and self._values[-1] >= 0.0:
@@ -48,7 +48,7 @@ class Watch:
         return number - until.above if until.above is not None else float(until.below or 0.0) - number
 
     def up_to_end(self, instants: list[MotionState], times: Array) -> list[MotionState]:
-        """The instants at the times of the answer, and that of the end where it was met."""
+        """The states at the times (n,) of the answer, s, up to the end, and the interpolated state at the end."""
         wanted = [
             instant for instant in instants if np.isclose(instant.time, times, rtol=tolerances.DECIMAL, atol=0.0).any()
         ]
@@ -58,7 +58,7 @@ class Watch:
         return [*(instant for instant in wanted if instant.time < end.time), end]
 
     def told(self, instants: Sequence[MotionState]) -> str:
-        """How it ended, in words."""
+        """A sentence on how the motion ended."""
         until = self._until
         beyond = f"above {until.above:g}" if until.above is not None else f"below {until.below:g}"
         if self._last is None:
@@ -92,6 +92,6 @@ FINER = 8
 
 
 def finer(times: Array) -> Array:
-    """Times with further ones between them."""
+    """Times (n,), s, with :data:`FINER` parts to each spacing."""
     parts = np.arange(FINER) / FINER
     return np.append((times[:-1, None] + np.diff(times)[:, None] * parts).ravel(), times[-1])

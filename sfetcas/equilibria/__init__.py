@@ -1,1 +1,1 @@
-"""The whole way from a scene to certified equilibria by name: meshes that answer errors, branches, several states."""
+"""Static analysis: from a scene to certified equilibria, with mesh refinement, branch choice and search for several."""

@@ -1,4 +1,4 @@
-"""The meshes of a run of statics, chosen or asked for, and an equilibrium on one of them."""
+"""The meshes of a static analysis, chosen or prescribed, and an equilibrium together with the mesh it was found on."""
 
 from __future__ import annotations
 
@@ -33,10 +33,21 @@ PILOT_ORDER = 4
 
 @dataclass
 class Found:
-    """An equilibrium on the way: where it stands and what was said about it; one that is ``kept`` is no other.
+    """An equilibrium in the course of an analysis, with the model that it belongs to.
 
-    ``drifts`` counts finer meshes on which it was not the same; ``way`` names how it was found, see
-    :data:`~sfetcas.equilibria.ways.WAYS`.
+    Attributes
+    ----------
+    prepared, corrected, stability
+        Model, state and result of the stability test.
+    notes : tuple of str
+    iterations : int
+        Iterations of IPOPT.
+    kept : bool
+        Not to be replaced by another equilibrium on finer meshes.
+    drifts : int
+        Number of finer meshes on which the same equilibrium was not found.
+    way : tuple of str
+        Strategies that found it, see :data:`~sfetcas.equilibria.ways.WAYS`.
     """
 
     prepared: Prepared
@@ -51,22 +62,22 @@ class Found:
 
 
 class Meshing:
-    """A scene with its settings, and the meshes to solve it on: the pilot and the one that is asked for.
+    """A scene with its settings, and the meshes of a static analysis.
 
     Attributes
     ----------
     scene, settings, stops
         As given to :func:`~sfetcas.equilibria.statics.solve`.
     accuracy : float
-        Wanted error; ``asked`` says whether to be short of it matters.
+        Wanted relative error; ``asked`` says whether missing it matters.
     quantity : Quantity or None
-        What it is of; None: the positions.
+        The quantity that the accuracy refers to; None for the positions.
     seconds : dict
-        Time spent on models and on solving.
+        Wall time of assembling and solving, s.
     target, pilot_mesh : Mesh
-        Where to arrive, and where to begin.
+        The mesh wanted, and the one on which the first equilibrium is found.
     fixed : set of str
-        Members whose number of elements is asked for.
+        Members whose number of elements is prescribed.
     leave, small : bool
         Whether unstable equilibria are left for stable ones; whether there are small members.
     """
@@ -114,16 +125,16 @@ class Meshing:
 
     @property
     def prescribed(self) -> bool:
-        """Whether the meshes of all flexible members are asked for."""
+        """Whether the number of elements is prescribed for all flexible members."""
         return self.fixed == {n for n, m in self.scene.members.items() if m.type == "flexible"}
 
     @property
     def error_of(self) -> str:
-        """Name of the quantity, empty for the positions."""
+        """Name of the quantity that the accuracy refers to; empty for the positions."""
         return "" if self.quantity is None else self.quantity.text
 
     def judged(self, coarse: Equilibrium, fine: Equilibrium) -> tuple[float, float]:
-        """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one.
+        """Relative difference of two answers in the quantity of the accuracy, and estimated error of the finer one.
 
         Raises
         ------
@@ -139,7 +150,7 @@ class Meshing:
         return difference, remaining(difference, gained(coarse.fields, fine.fields, positions=self.quantity.positions))
 
     def prepared(self, mesh: Mesh) -> Prepared:
-        """The model on a mesh, ready to be solved."""
+        """The assembled model on a mesh, ready to be solved."""
         begin = time.perf_counter()
         # A state goes from mesh to mesh with its multipliers: all meshes share the assembly of the first.
         self.model = assemble(self.scene, mesh, assembly=self.assembly, like=self.model)

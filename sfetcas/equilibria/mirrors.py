@@ -1,8 +1,8 @@
-"""Mirror images of states: a scene whose centre lines are symmetric maps equilibria to candidates for others.
+"""Mirror images of states: symmetries of the undeformed centre lines map equilibria to candidates for further ones.
 
 A reflection or half turn ``S`` of the undeformed centre lines onto themselves carries a member's places to those
-of its image; a rotation vector ``r`` there becomes ``det(S) S r``.  Whether supports, stiffness and loads are
-symmetric too does not matter: images are places to start from, not answers.
+of its image; a rotation vector ``r`` there becomes ``det(S) S r``.  Supports, stiffness and loads need not be
+symmetric: images are starting points for Newton's method, not answers.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Mirror:
     Attributes
     ----------
     matrix : ndarray (3, 3)
-        Orthogonal map of positions relative to the middle of the scene.
+        Orthogonal map of positions relative to the centre of the scene, dimensionless.
     images : mapping of str to (str, bool)
-        The member that each member's image is the image of, and whether it runs against it.
+        For each member the member that is mapped onto it, and whether the two run in opposite directions.
     """
 
     matrix: Array
@@ -45,7 +45,7 @@ class Mirror:
 
 
 def mirrors(model: Model) -> tuple[Mirror, ...]:
-    """All symmetries about the fixed axes and the principal axes of the scene, the identity left out."""
+    """All symmetries of the undeformed centre lines about fixed axes and principal axes, without the identity."""
     x = np.linspace(0.0, 1.0, 9)
     places = {name: model.scene.center_lines[name].positions(x) for name in model.members}
     if not places:
@@ -69,7 +69,7 @@ def mirrors(model: Model) -> tuple[Mirror, ...]:
 
 
 def has_twin(prepared: Prepared, found: Corrected, loading: Loading) -> bool:
-    """Whether a mirror image of an equilibrium, another state, is an equilibrium of the same energy."""
+    """Whether a mirror image of an equilibrium is another equilibrium with the same energy."""
     for mirror in mirrors(prepared.model):
         image = prepared.equations.holding(mirrored(prepared.model, found.state, mirror), loading)
         if prepared.distance(image, found.state) < OTHER_STATE:
@@ -93,7 +93,7 @@ def _images(places: dict[str, Array], middle: Array, matrix: Array, near: float)
 
 
 def mirrored(model: Model, state: State, mirror: Mirror) -> State:
-    """The rotations of a state mirrored; held rotations and multipliers are left to the equations."""
+    """The mirror image of a state's rotations; prescribed rotations and multipliers are not mapped."""
     sign = float(np.linalg.det(mirror.matrix))
     q = state.q.copy()
     for name, (source, backwards) in mirror.images.items():

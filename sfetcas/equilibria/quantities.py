@@ -26,12 +26,15 @@ WHERE = ("analysis", "accuracy_of")
 
 
 def value_of(step: Configuration, name: str | AnswerName, at: float | None = None) -> Any:
-    """A quantity by its name in the answer, as ``nodes.B.position`` or ``members.beam.moment at 0.5``.
+    """The value of a quantity by its name in the answer, as ``nodes.B.position`` or ``members.beam.moment at 0.5``.
 
     Parameters
     ----------
+    step : Configuration
+        The equilibrium or the state of a motion.
+    name : str or AnswerName
     at : float, optional
-        Fraction of the length, where the name has none; needed for quantities along members.
+        Fraction of the member's length, for a quantity along a member whose name does not give one.
 
     Raises
     ------
@@ -50,12 +53,12 @@ def value_of(step: Configuration, name: str | AnswerName, at: float | None = Non
 
 
 def component_in(value: Any, name: AnswerName) -> Any:
-    """The component of a value that a name asks for; the value itself where it asks for none.
+    """The component of a vector that a name asks for; the value itself where the name asks for none.
 
     Raises
     ------
     SceneError
-        It is a single number here.
+        The value is a single number, which has no components.
     """
     if name.component is None:
         return value
@@ -65,12 +68,12 @@ def component_in(value: Any, name: AnswerName) -> Any:
 
 
 def entry_of(table: dict[str, Any], key: str) -> Any:
-    """What a table has under a key.
+    """The entry of a table under a key.
 
     Raises
     ------
     SceneError
-        Nothing; the nearest key is told.
+        There is no such key; the message proposes the most similar one.
     """
     if key not in table:
         raise SceneError(f"found {key!r}; {nearest(key, table)}")
@@ -79,24 +82,24 @@ def entry_of(table: dict[str, Any], key: str) -> Any:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity whose accuracy matters.
+    """A quantity that the accuracy of an analysis refers to, instead of the positions.
 
     Attributes
     ----------
     name : AnswerName
-        Along members with a place.
+        With a fraction of the length where it is a quantity along a member.
     """
 
     name: AnswerName
 
     @classmethod
     def named(cls, text: str, scene: Scene) -> Quantity:
-        """From its name, along members with a place: ``members.beam.moment at 0.5``.
+        """The quantity of a name; along members with a place: ``members.beam.moment at 0.5``.
 
         Raises
         ------
         SceneError
-            No such quantity, or no place along a member.
+            There is no such quantity, or it is one along a member and the place is missing.
         """
         name = answer_name(text, *WHERE)
         try:
@@ -113,16 +116,16 @@ class Quantity:
 
     @property
     def text(self) -> str:
-        """The name with its place."""
+        """The name, with its place along the member."""
         return self.name.text
 
     def value(self, step: Configuration) -> Array:
-        """What an answer says, as numbers, (n,).
+        """The value in an answer as an array (n,), in the unit of the quantity.
 
         Raises
         ------
         SceneError
-            It has no such quantity, or this is not made of numbers.
+            The answer has no such quantity, or it does not consist of numbers.
         """
         found = value_of(step, self.name)
         try:
@@ -135,14 +138,14 @@ class Quantity:
 
     @property
     def positions(self) -> bool:
-        """Whether it is of the order of positions."""
+        """Whether it is a position, whose discretisation error has a known order."""
         return self.name.kind.key == "position"
 
     def unit(self, step: Configuration, values: Iterable[Array]) -> float:
-        """What differences are relative to.
+        """The reference value by which differences are divided.
 
-        Lengths count over the size of the scene, rotations in rad, all else over itself, along members over the
-        largest there, but at least over a millionth of its unit in the model or of the loads.
+        Lengths are divided by the size of the scene, rotations by 1 rad, all else by its own value (along members by
+        its largest value there), but by no less than a millionth of its unit in the model or of the loads.
         """
         kind, scales, loading = self.name.kind, step.model.scales, step.loading
         if kind.unit == "m":
@@ -166,13 +169,13 @@ class Quantity:
         return max(largest)
 
     def difference(self, one: Configuration, other: Configuration) -> float:
-        """How far it is apart in two answers, see :meth:`unit`; infinite where one has more numbers than the other."""
+        """Relative difference of its values in two answers, see :meth:`unit`; infinite where their lengths differ."""
         a, b = self.value(one), self.value(other)
         if a.shape != b.shape:
             return np.inf
         return self.apart(a, b) / self.unit(other, [b])
 
     def apart(self, a: Array, b: Array) -> float:
-        """Distance of two values, of quaternions whichever signs they have."""
+        """Largest absolute difference of two values (n,); quaternions of opposite sign are the same rotation."""
         opposite = self.name.kind.key == "quaternion" and self.name.component is None and a @ b < 0.0
         return float(np.linalg.norm(a + b if opposite else a - b))

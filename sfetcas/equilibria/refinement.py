@@ -1,4 +1,4 @@
-"""From the pilot to an answer: finer meshes, the estimate of the error, and what makes an answer unique."""
+"""Mesh refinement: from an equilibrium on the pilot mesh to an answer of the wanted accuracy, and its error."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ STALLED = 3
 """Halvings of all elements in a row that leave more than half of the error: what is left is rounding."""
 
 MOST_FURTHER = 300
-"""The same for what a search found: what needs more is seldom an equilibrium of a beam."""
+"""Elements at most for what a search found: an equilibrium that needs more is seldom one of a beam."""
 
 DRIFT = 1.0
-"""An equilibrium that turns by more than this from a mesh to a finer one, rad, is not the same."""
+"""Largest rotation, rad, from an equilibrium on a mesh to one on a finer mesh with which the two count as the same."""
 
 ELSEWHERE = (
     "on a finer mesh the equilibrium is not near that of a coarser one, on which the loads were followed from zero: "
@@ -54,7 +54,7 @@ ELSEWHERE = (
 )
 
 DRIFTS = 3
-"""So many finer meshes on which it is not the same show that there is none: one too coarse to begin with may happen."""
+"""So many finer meshes without the same equilibrium show that there is none; one alone may be too coarse."""
 
 MOST_ELEMENTS = 20_000
 """A mesh that the library chooses does not grow beyond this."""
@@ -91,18 +91,25 @@ TWIN = (
 
 
 class Refinement:
-    """The way from the pilot to the accuracy asked for.
+    """Refines meshes from the pilot until the estimated error meets the accuracy asked for.
 
     Parameters
     ----------
     meshes : Meshing
+        The scene with its settings and meshes.
     """
 
     def __init__(self, meshes: Meshing) -> None:
         self.meshes = meshes
 
     def onto(self, mesh: Mesh, source: Found, factor: float) -> Found:
-        """The same equilibrium on another mesh."""
+        """The equilibrium carried over to another mesh and corrected there by Newton's method.
+
+        Raises
+        ------
+        SolveError
+            Newton's method does not converge there.
+        """
         if mesh.same(source.prepared.model.mesh):
             # Without flexible members nothing is halved.
             return source
@@ -194,7 +201,7 @@ class Refinement:
         return sum(self._difference(now, self.onto(now.prepared.model.mesh.refined(), now, factor), factor))
 
     def halved(self, now: Found) -> Mesh:
-        """The mesh with all elements halved but those that are prescribed."""
+        """The mesh with all elements halved, but those of members whose number of elements is prescribed."""
         cuts = now.prepared.model.mesh.cuts
         marks = {n: np.full(len(c) - 1, n not in self.meshes.fixed) for n, c in cuts.items()}
         return now.prepared.model.mesh.refined(marks)

@@ -5,7 +5,7 @@ From the free end, where the moment is known too, the angle there gives the whol
 wants, an angle or no moment, is an equation for that one angle, which need only be scanned over one turn.  The
 derivative is integrated beside, and the scan is halved until between neighbours what it finds is what a cubic
 expects, extrema included: between these the function is monotone, and every root is bracketed.  So the scan is
-complete, but for pairs of roots that nearly meet at an extremum, which is told.
+complete, but for pairs of roots that nearly coincide at an extremum; a note reports these.
 """
 
 from __future__ import annotations
@@ -70,16 +70,17 @@ FROM_THE_ROOT = 0.3
 
 @dataclass(eq=False)
 class Scan:
-    """What the scan found, as a :class:`~sfetcas.equilibria.several.Search` is told.
+    """Result of a scan; it has the interface of :class:`~sfetcas.equilibria.several.Search`.
 
     Attributes
     ----------
+    prepared : Prepared
     found : list of Corrected
-        Distinct equilibria; the first is the one that it began with.
+        Distinct equilibria; the first is the one that the scan was given.
     roots : int
         Number of equilibria that the scan counts.
     grazing : int
-        Extrema that touch a root, or nearly.
+        Extrema of the shooting function that are zero, or nearly.
     """
 
     prepared: Prepared
@@ -88,7 +89,7 @@ class Scan:
     grazing: int
 
     def sentence(self) -> str:
-        """How complete this is, for a reader."""
+        """A sentence on how complete the scan is, for the notes of the answer."""
         told = counted(self.roots, "equilibrium", "equilibria")
         text = f"a scan of the angle at the free end over one turn has {told}, and there are no others"
         if self.grazing:
@@ -100,17 +101,20 @@ class Scan:
         return text
 
     def family_note(self, number: int) -> tuple[str, ...]:
-        """Nothing: one number has no families."""
+        """Empty: a scan of one unknown finds no continuous families of equilibria."""
         return ()
 
     def missing(self, answers: list[Equilibrium]) -> str:
-        """What is said of equilibria that finer meshes do not have."""
+        """A remark on equilibria that were counted but not found on finer meshes; empty where there are none."""
         lost = self.roots - len(answers)
         return f"; {counted(lost, 'equilibrium', 'equilibria')} of the scan could not be refined" if lost > 0 else ""
 
 
 def scan(prepared: Prepared, loading: Loading, first: Corrected) -> Scan | None:
-    """All equilibria under the loads of a known one; None where not one number gives them, or rounding hides it."""
+    """All equilibria under the loads of a known one, by shooting over the angle at the free end.
+
+    None where the problem does not have a single unknown, or rounding errors spoil the scan.
+    """
     member = _member(prepared)
     if member is None:
         return None

@@ -1,4 +1,4 @@
-"""How to solve: what a run of statics may be told."""
+"""Settings of :func:`sfetcas.solve`: accuracy, mesh, solver."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ __all__ = ["Settings"]
 
 @dataclass(frozen=True)
 class Settings:
-    """How to solve; everything has a default that suits.
+    """Settings of a solve; each has a default.
 
     Attributes
     ----------
     accuracy : float or None
         Wanted error of the positions over the size of the scene; None takes that of the scene.
     accuracy_of : str or None
-        A quantity that this is meant of instead of the positions, as ``reactions.A.moment`` or
+        Name of the quantity that the accuracy refers to instead of the positions, as ``reactions.A.moment`` or
         ``members.beam.moment at 0.5``; None takes that of the scene.
     element, elements : str, int or None
-        Element of all members and number of elements of each; None takes those of the members, or chooses.
+        Element type of all flexible members, ``SFET2`` to ``SFET9``, and number of elements of each; None takes those
+        of the members, or chooses by the accuracy.
     gauss : bool
-        Gauss integration with the norm divided out instead of integration at the nodes.
+        Integrate at Gauss points of the normalised interpolation instead of at the nodes of the elements.
     assembly : str
-        ``auto``, ``closing`` or ``nodal``.
+        ``closing`` (unknowns are rotations), ``nodal`` (and displacements of nodes), or ``auto``.
     branch : bool
-        Check the branch by following the loads from zero.
+        Follow the loads from zero, so that the answer is on the branch that they lead to.
     solver : str
-        ``ipopt``, or ``newton``: Newton's method from afar, which is faster, and IPOPT where that finds nothing.
+        ``ipopt``; or ``newton``: globalised Newton's method, which is faster, and IPOPT where that fails.
     kernels : str
-        Element functions: ``auto`` compiles them where that pays in one run, ``compiled``, ``interpreted``.
+        Element functions: ``compiled`` to C, ``interpreted`` by CasADi, or ``auto``: compiled where that pays.
     runs : int or None
-        Newton runs at most in a search for several equilibria, for each factor; None takes what suits the size.
+        Largest number of Newton runs of a search for several equilibria, for each factor; None chooses by the size.
     """
 
     accuracy: float | None = None

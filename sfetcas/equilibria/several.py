@@ -78,24 +78,24 @@ KINDS = ("carried", "returned", "given", "mirrored", "downhill", "nudged", "bent
 
 @dataclass(eq=False)
 class Search:
-    """What was found, and how.
+    """A search for several equilibria under the same loads, with its results and its statistics.
 
     Attributes
     ----------
     found : list of Corrected
-        Distinct equilibria; the first is the one that the search began with.
+        Distinct equilibria; the first is the one that the search was given.
     counts : dict
-        Newton runs by the kind of their start.
+        Number of Newton runs for each kind of start.
     deflated, arrived : int
-        Runs with deflation, and runs that ended in an equilibrium, known or not.
+        Number of runs with deflation, and of runs that converged, to a new equilibrium or a known one.
     family : set of int
-        Numbers of the equilibria that stand for a continuous family.
+        Indices in ``found`` of the equilibria that stand for a continuous family.
     exhausted : bool
-        Whether the runs were used up before the starts.
+        Whether the permitted number of runs was used up before all starts were tried.
     smaller : int
-        Runs under smaller loads that were done before.
+        Number of runs under smaller loads before.
     waiting : dict
-        Starts still to be tried, by kind.
+        Starts still to be tried, for each kind.
     """
 
     prepared: Prepared
@@ -114,7 +114,7 @@ class Search:
     )
 
     def sentence(self) -> str:
-        """How the search was done, for a reader."""
+        """A sentence on what the search did, for the notes of the answer."""
         kinds = ", ".join(f"{n} {kind}" for kind, n in self.counts.items())
         end = "stopped at its largest number of runs" if self.exhausted else "went through all its starts"
         return (
@@ -124,7 +124,7 @@ class Search:
         )
 
     def family_note(self, number: int) -> tuple[str, ...]:
-        """What to say of an equilibrium that stands for others."""
+        """Notes for an equilibrium that stands for a continuous family; empty for others."""
         return (FAMILY,) if number in self.family else ()
 
     def missing(self, answers: Sequence[Equilibrium]) -> str:
@@ -134,7 +134,7 @@ class Search:
     # -- one run --------------------------------------------------------------------------------
 
     def run(self, kind: str, start: State, *, deflate: bool) -> bool:
-        """One Newton run from a start; whether it found a new equilibrium."""
+        """Run Newton's method from a start, with or without deflation; True where it finds a new equilibrium."""
         self.counts[kind] = self.counts.get(kind, 0) + 1
         self.deflated += deflate
         there = deflated(self.prepared, start, self.loading, [f.state for f in self.found] if deflate else ())
@@ -196,11 +196,11 @@ class Search:
 
     @functools.cached_property
     def begin(self) -> State:
-        """The undeformed scene with its closings restored."""
+        """The undeformed state, corrected so that prescribed displacements and constraints are met."""
         return self.closed(self.prepared.equations.start(self.loading))
 
     def closed(self, state: State) -> State:
-        """The state with motions and closings restored."""
+        """A state corrected so that prescribed displacements and constraints are met."""
         equations = self.prepared.equations
         state = equations.holding(state, self.loading)
         if not equations.rows:
@@ -209,7 +209,7 @@ class Search:
         return replace(restore(equations, state, self.loading, self.prepared.weight)[0], lam=lam)
 
     def moved(self, state: State, shape: Array) -> State:
-        """The state moved along a shape of the turning unknowns, closings restored."""
+        """A state displaced along a shape (rotation unknowns,), rad, then corrected to meet the constraints."""
         step = np.zeros(self.prepared.equations.total)
         step[: len(shape)] = shape
         return self.closed(self.prepared.equations.moved(state, step))
@@ -228,11 +228,11 @@ class Search:
         return self.prepared.spectrum(found, count)[1]
 
     def offer(self, kind: str, *starts: Callable[[], State], deflate: bool) -> None:
-        """Put starts, made when their turn comes, to the others of their kind."""
+        """Add starts of a kind to the queue; each is a function that makes the state when its turn comes."""
         self.waiting[kind].extend((start, deflate) for start in starts)
 
     def offer_bent(self) -> None:
-        """The undeformed scene moved along its lowest shapes."""
+        """Add starts: the undeformed state displaced along its softest modes."""
         unloaded = self.loading.scaled(0.0)
         rest = self.prepared.correct(self.prepared.equations.start(unloaded), unloaded, iterations=0)
         shapes = self._shapes(rest, SHAPES)
@@ -240,7 +240,7 @@ class Search:
         self.offer("bent", *starts, deflate=False)
 
     def offer_around(self, found: Corrected) -> None:
-        """What a new equilibrium gives: mirror images, nudges, and places half-way to those found before."""
+        """Add starts from a new equilibrium: mirror images, steps along its softest modes, midpoints to known ones."""
         equations, state = self.prepared.equations, found.state
         for image in self.images:
             self.offer("mirrored", partial(self._mirrored, state, image), deflate=False)
@@ -257,7 +257,7 @@ class Search:
                 self.offer("half-way", partial(self.moved, state, half), deflate=True)
 
     def look(self) -> None:
-        """Begin at the undeformed scene and go on until there is no start or no run left."""
+        """Run the search: begin at the undeformed state, go on until no starts or no permitted runs are left."""
         for deflate in (False, True):
             self.offer("given", partial(self.closed, self.begin), deflate=deflate)
         self.offer_bent()
@@ -266,11 +266,11 @@ class Search:
 
     @property
     def total(self) -> int:
-        """Runs done."""
+        """Number of runs done."""
         return sum(self.counts.values())
 
     def go_on(self) -> bool:
-        """Try the next start; whether there was one and a run left for it."""
+        """Try the next start; False where there is none, or no permitted run is left."""
         kind = next((kind for kind, queue in self.waiting.items() if queue), None)
         if kind is None:
             return False
@@ -351,9 +351,10 @@ def _there_and_back(prepared: Prepared, loading: Loading, more: Loading, state: 
 
 
 def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dict[str, Array]:
-    """Elements within which a beam under these loads may turn over, to be halved for the search, by member.
+    """For each member a boolean array (elements,): elements so long that a beam under these loads may fold within one.
 
-    Where it is only straight at first a search finds it curled anywhere, not just at its ends.
+    These are halved for the search: an unstable straight member has equilibria that are curled anywhere, not just at
+    its ends.
     """
     model, equations = prepared.model, prepared.equations
     pulls = np.abs(equations.segment_pulls(found.state.lam, loading)).max(initial=0.0)
@@ -371,7 +372,7 @@ def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dic
 
 
 def same(one: Equilibrium, other: Equilibrium) -> bool:
-    """Whether two answers, on whatever meshes, differ by no more than their errors and have the same ways out."""
+    """Whether two answers, on any meshes, agree within their estimated errors and have as many negative eigenvalues."""
     if one.certificate.negative != other.certificate.negative:
         return False
     errors = (one.certificate.error_estimate or 0.0) + (other.certificate.error_estimate or 0.0)
@@ -379,10 +380,10 @@ def same(one: Equilibrium, other: Equilibrium) -> bool:
 
 
 def missing(answers: Sequence[Equilibrium]) -> str:
-    """What the numbers of ways out tell about equilibria that were not found; empty where they tell nothing.
+    """A remark on equilibria that were not found, concluded from the numbers of negative eigenvalues; may be empty.
 
-    Angles of an open chain that is held somewhere form a space without holes, in which the energy grows to all
-    sides: equilibria with even numbers of ways out are one more than those with odd numbers (Morse).
+    Rotations of an open chain that is held somewhere form a contractible space, on which the energy grows to all sides:
+    equilibria with even numbers of negative eigenvalues are one more than those with odd numbers (Morse).
     """
     model = answers[0].model
     neutral = any(answer.certificate.stable == "neutral" for answer in answers)

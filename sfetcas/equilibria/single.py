@@ -1,4 +1,4 @@
-"""One equilibrium of a prepared model on its own mesh: from a start guess, or from a near answer."""
+"""One equilibrium of an assembled model on its own mesh: from a start guess, or from a nearby equilibrium."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ SolverName = Literal["ipopt", "newton"]
 def solve_model(
     model: Any, factor: float = 1.0, *, start: Equilibrium | None = None, solver: SolverName = "ipopt"
 ) -> Equilibrium:
-    """One equilibrium of a prepared model: from the start guess, or by Newton's method from a near answer.
+    """One equilibrium of an assembled model: from the start guess, or by Newton's method from a nearby equilibrium.
 
     Parameters
     ----------
     model : Model or Prepared
-        Pass the same :class:`Prepared` for repeated solves: nothing is built again.
+        Pass the same :class:`Prepared` for repeated solves, so that its functions and factorisations are reused.
     factor : float
-        Factor of loads and motions.
+        Factor of loads and prescribed displacements.
     start : Equilibrium, optional
-        Answer of the same model for a near factor.
+        An equilibrium of the same model for a similar factor.
     solver : str
-        From the start guess: ``ipopt``, or ``newton`` and IPOPT where that finds nothing.
+        From the start guess: ``ipopt``, or ``newton`` and IPOPT where that fails.
 
     Raises
     ------
     SceneError
-        The scene has contacts or stops of springs, which only :func:`solve` looks for.
+        The scene has contacts or springs with stops, which only :func:`solve` can treat.
     SolveError
         No equilibrium was found.
     """
@@ -61,12 +61,14 @@ def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected
 
 
 def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> tuple[Corrected, int, str]:
-    """The equilibrium from the start guess, the iterations and the way: what cannot be minimised is followed from zero.
+    """The equilibrium from the start guess, with the number of iterations and the name of the strategy.
+
+    Models whose loads have no potential cannot be minimised: their loads are followed from zero instead.
 
     Raises
     ------
     SolveError
-        None was found.
+        No equilibrium was found.
     """
     if solver == "newton":
         found, iterations = prepared.globalised(loading)
@@ -95,7 +97,7 @@ UNJUDGED = Stability("not defined", 0, np.nan, np.zeros(0), np.zeros(0))
 
 
 def unjudged(prepared: Prepared, found: Corrected, loading: Loading, factor: float) -> Equilibrium:
-    """A state on the way by name, without a test of its stability."""
+    """A state as an :class:`Equilibrium` without a stability test."""
     return finished(prepared, found, loading, factor, UNJUDGED)
 
 
@@ -120,7 +122,7 @@ def finished(
     iterations: int = 0,
     way: tuple[str, ...] = (),
 ) -> Equilibrium:
-    """The equilibrium with its name, certificate and notes."""
+    """A corrected state as an :class:`Equilibrium` with its certificate and notes."""
     notes = (*notes, HIDDEN) if stability.hidden else notes
     return equilibrium(
         prepared.equations,

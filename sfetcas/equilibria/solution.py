@@ -1,4 +1,4 @@
-"""Equilibria by name: positions, reactions, section forces, energies and the certificate."""
+"""Answers of static analyses by the names of the scene: positions, reactions, section forces, energies, certificate."""
 
 from __future__ import annotations
 
@@ -35,31 +35,33 @@ __all__ = [
 ]
 
 MOST_PLACES = 400
-"""Places listed along a member at most; with more elements only their ends, thinned out."""
+"""Largest number of places listed along a member; with more, only ends of elements are listed, evenly thinned out."""
 
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What proves an answer, all recomputed from the state and not taken from a solver.
+    """Evidence that a state is an equilibrium, and whether it is stable; all of it is recomputed from the state.
 
     Attributes
     ----------
     residual : float
-        Largest out-of-balance force or moment over the largest that was added up, or gap over the length scale.
+        Largest of the ratios of out-of-balance forces and moments to the magnitudes that are summed there, and of the
+        gaps of loop closures and joints to the length scale of the model.
     stable : bool, "neutral", or "not defined" for loads without potential
-        Inertia of the energy on the closings.
+        Whether the second variation of the energy is positive on the tangent space of the constraints.
     negative : int
-        Its negative eigenvalues.
+        Number of negative eigenvalues of the second variation there: independent directions in which energy falls.
     smallest : float
-        Its smallest eigenvalue, N: second variation by a rotation field over the integral of its square.
+        Its smallest eigenvalue, N: second variation along a field of rotations over the integral of its square.
     error_estimate : float or None
-        Estimated discretisation error of the positions over the size of the scene.
+        Estimated discretisation error of the positions, over the size of the scene.
     halved : float or None
-        How far, in the same measure, the answer on half the elements was from this.
+        Difference, in the same measure, from the answer on a mesh with half as many elements.
     error_of : str
-        The quantity that these two are of; empty: the positions.
+        Name of the quantity that ``error_estimate`` and ``halved`` are about; empty for the positions.
     escape : mapping
-        Escape shape by member: rotations about the fixed axes, largest 1, at the places of ``Equilibrium.places``.
+        Eigenvector of ``smallest`` (the unstable mode, or the softest), for each member: components of rotation about
+        the fixed axes, largest 1, at the nodes of its elements.
     """
 
     residual: float
@@ -72,7 +74,7 @@ class Certificate:
     escape: Mapping[str, Array] = field(repr=False, default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """As in the JSON answer."""
+        """The certificate as it stands in the JSON answer; undefined values are None."""
         smallest = self.smallest if np.isfinite(self.smallest) else None
         negative = None if self.stable == "not defined" else self.negative
         answer = {"residual": self.residual, "stable": self.stable, "negative": negative, "smallest": smallest}
@@ -82,16 +84,22 @@ class Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Configuration:
-    """A state of a model by name: positions, section forces, reactions.
+    """A state of a model, with its positions, section forces and reactions by the names of the scene.
+
+    All results are in SI units and fixed axes.
 
     Attributes
     ----------
     factor : float
-        Factor of the loads and motions.
+        Factor that multiplies the loads and prescribed displacements; of a :class:`MotionState` the time, s.
     model : Model
-        Discretisation that the state is on.
-    state, loading
-        Unknowns and loads, dimensionless.
+        The discretised scene.
+    state : State
+        Unknowns and multipliers, dimensionless.
+    loading : Loading
+        Loads and prescribed displacements, dimensionless.
+    fields : Fields
+        Evaluates the state.
     """
 
     where: ClassVar[str] = STATICS
@@ -103,35 +111,66 @@ class Configuration:
     fields: Fields = field(repr=False)
 
     def position(self, node: str) -> Array:
-        """Position of a node, (3,) m."""
+        """Position of a node, (3,) m; SceneError where the scene has no such node."""
         return self.fields.position(self._known(node, self.model.nodes, "node"))
 
     def quaternion(self, node: str) -> Array | None:
-        """Rotation of a node since the undeformed scene, (4,); None where it has no rotation of its own."""
+        """Rotation of a node since the undeformed scene as a unit quaternion (4,), scalar first.
+
+        None for a node that is only a point: where all members are hinged to it, it has no rotation of its own.
+        """
         rotation = self.fields.rotation(self._known(node, self.model.nodes, "node"))
         return None if rotation is None else self._as_quaternions(rotation[None, :])[0]
 
     def angle(self, node: str) -> float | None:
-        """Rotation about z since the undeformed scene, rad, counting turns; in the plane only."""
+        """Rotation of a node about z since the undeformed scene, rad, full turns counted.
+
+        None in space, and for a node without a rotation of its own.
+        """
         rotation = self.fields.rotation(self._known(node, self.model.nodes, "node"))
         return None if rotation is None or self.model.space else float(rotation[0])
 
     def reaction(self, node: str) -> tuple[Array, Array]:
-        """Force (3,) N and moment about the node (3,) N m that the ground exerts on the structure."""
+        """Force (3,) N and moment about the node (3,) N m that the ground exerts on the structure at a support.
+
+        Raises
+        ------
+        SceneError
+            There is no such node, or it has no support.
+        """
         if self.model.scene.nodes[self._known(node, self.model.nodes, "node")].support == "free":
             raise SceneError(f"node {node!r} is free: no ground acts on it")
         return self.fields.reaction(node)
 
     def spring(self, name: str) -> SpringState:
-        """A spring: angle (rad) and moment (N m) on its second party, or travel (m) and force (N)."""
+        """State of a spring: angle (rad) and moment (N m) on its second party, or travel (m) and force (N)."""
         return self.fields.spring(self._known(name, tuple(self.model.scene.springs), "spring"))
 
     def motion(self, name: str) -> dict[str, Any]:
-        """What makes a motion: ``moment`` with a rotation, ``force`` with a displacement, see :meth:`Fields.drive`."""
+        """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`Fields.drive`."""
         return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
 
     def along(self, member: str, at: Any) -> dict[str, Array]:
-        """Fields of a member at fractions of its length, see :meth:`Fields.along`; quaternions added."""
+        """Fields of a member at fractions of its length, from 0 at its first node to 1.
+
+        Parameters
+        ----------
+        member : str
+        at : float or (n,)
+
+        Returns
+        -------
+        dict of ndarray
+            ``position`` (n, 3) m, ``force`` (n, 3) N, ``moment`` (n, 3) N m, ``curvature`` (n, 3) 1/m as of
+            :meth:`Fields.along`; ``quaternion`` (n, 4) of the rotation since the undeformed scene; in the plane also
+            ``angle`` (n,) rad; of a flexible member whose section has a shape the largest ``bending_strain`` (n,) and
+            ``bending_stress`` (n,) N/m2 of its fibres.
+
+        Raises
+        ------
+        SceneError
+            There is no such member, or a fraction is not between 0 and 1.
+        """
         name, places = self._known(member, tuple(self.model.scene.members), "member"), np.atleast_1d(at)
         outside = [place for place in places if not 0.0 <= place <= 1.0]
         if outside or not len(places):
@@ -147,7 +186,7 @@ class Configuration:
         return found
 
     def places(self, member: str) -> Array:
-        """Fractions of the length that the answer lists: nodes of the elements, or fewer."""
+        """Fractions of a member's length, rising from 0 to 1, at which the answer lists fields."""
         if self.model.scene.members[member].type != "flexible":
             return np.array([0.0, 1.0])
         places = self.model.along(member)
@@ -158,27 +197,28 @@ class Configuration:
 
     @functools.cached_property
     def contacts(self) -> dict[str, dict[str, Any]]:
-        """Of each obstacle ``force`` (3,) N on the member, ``at``, ``gap`` m, ``member``; lists where several touch.
+        """For each obstacle of the scene: ``force`` (3,) N on the member, ``at``, ``gap`` in m, ``member``.
 
-        ``at`` is a fraction of the length, or [from, to] of a stretch whose whole force is given; None, with the
-        smallest gap, where nothing touches.
+        The entries are lists where an obstacle touches at several places.  ``at`` is a fraction of the member's length,
+        or [from, to] of a stretch, with its resultant force; it is None where nothing touches, with the smallest gap.
         """
         return answers(self.fields) if self.model.scene.contacts else {}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """What is told of one thing, under the keys of the JSON answer.
+        """The quantities of one node, member, spring, ..., under the keys of the JSON answer.
 
         Parameters
         ----------
         kind : str
-            A table of the answer, as ``nodes``; empty for what stands in none.
+            A table of the answer: ``nodes``, ``reactions``, ``members``, ``springs``, ``motions`` or ``contacts``;
+            empty for the quantities of the whole state.
         name : str
-            Of the node, member, ...; of a member what it has once, not that of its places, see :meth:`along`.
+            Name of the record.  Of a member only integral and largest values; :meth:`along` has its fields.
 
         Raises
         ------
         SceneError
-            There is no such thing.
+            The scene has no record of this name.
         """
         tables: dict[str, Callable[[], dict[str, Any]]] = {
             "": lambda: {"factor": self.factor},
@@ -212,7 +252,7 @@ class Configuration:
         return found
 
     def tables(self, *kinds: str) -> dict[str, dict[str, Any]]:
-        """For each kind the tables of all of it that there are; kinds of which there is nothing are left out."""
+        """The tables of several kinds, each by the names of its records; empty kinds are left out."""
         scene = self.model.scene
         names = {"nodes": self.model.nodes, "reactions": [n for n, r in scene.nodes.items() if r.support != "free"]}
         names |= {kind: list(getattr(scene, kind)) for kind in kinds if kind not in names}
@@ -235,17 +275,19 @@ class Configuration:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium(Configuration):
-    """One equilibrium, made by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
+    """One equilibrium of a scene, as returned by :func:`sfetcas.solve` and :func:`sfetcas.solve_model`.
 
     Attributes
     ----------
     certificate : Certificate
     notes : tuple of str
-        What a reader should know: an unstable state that was left, reactions that are not unique.
+        Remarks for the reader, as: an unstable equilibrium was left, reactions are not unique.
     iterations : int
         Iterations of IPOPT.
+    strain, potential : float
+        Elastic energy, and its sum with the potential of the loads, dimensionless; :attr:`energy` has them in N m.
     way : tuple of str
-        How it was found, one way after the other, see :data:`~sfetcas.equilibria.ways.WAYS`.
+        The solution strategies that led to it, in their order, see :data:`~sfetcas.equilibria.ways.WAYS`.
     """
 
     certificate: Certificate
@@ -257,13 +299,13 @@ class Equilibrium(Configuration):
 
     @functools.cached_property
     def energy(self) -> dict[str, float]:
-        """Elastic energy, potential of the loads, and their sum, N m; zero for the undeformed scene."""
+        """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene."""
         unit = self.model.scales.moment
         elastic, total = self.strain * unit, self.potential * unit
         return {"elastic": elastic, "loads": total - elastic, "total": total}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As of :meth:`Configuration.table`; also energies and the certificate."""
+        """As :meth:`Configuration.table`; also for the kinds ``energy`` and ``certificate``."""
         if kind == "certificate":
             return self.certificate.to_dict()
         if kind == "energy":
@@ -271,7 +313,7 @@ class Equilibrium(Configuration):
         return super().table(kind, name)
 
     def to_dict(self) -> dict[str, Any]:
-        """As an entry of ``steps`` in the JSON answer."""
+        """The equilibrium as an entry of ``steps`` in the JSON answer."""
         tables = self.tables("nodes", "reactions", "members", "springs", "motions", "contacts")
         for name, found in tables["members"].items():
             places = self.places(name)
@@ -282,18 +324,21 @@ class Equilibrium(Configuration):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The answer of a scene: one equilibrium a load factor.
+    """The answer of a static analysis: an equilibrium for each load factor of ``analysis.steps``.
+
+    Where all equilibria are searched for, ``steps`` has several for a factor, the default one first.
 
     Attributes
     ----------
+    scene : Scene
     status : Status
-        SOLVED, or SHORT where an accuracy that was asked for is not reached on the mesh that was asked for; of the
-        steps that a :class:`SolveError` reached, why the next one failed.
+        SOLVED, or SHORT where a requested accuracy is not reached on a requested mesh.  In the partial solution of a
+        :class:`SolveError`: why the next load step failed.
     steps : tuple of Equilibrium
-    seconds : dict
-        Time spent on models and on solving.
+    seconds : mapping
+        Wall time of assembling (``model``) and of solving (``solve``), s.
     failure : str
-        Where a step failed: which, and what was tried.
+        Where a load step failed: which one, and what was tried.
     """
 
     scene: Any = field(repr=False)
@@ -304,16 +349,16 @@ class Solution:
 
     @property
     def last(self) -> Equilibrium:
-        """The equilibrium of the last factor."""
+        """The last of the steps: the equilibrium at the last load factor."""
         return self.steps[-1]
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON answer."""
+        """The JSON answer as nested dictionaries."""
         return {**heading(self, self.last.model, self.failure), "steps": [step.to_dict() for step in self.steps]}
 
 
 def heading(answer: Any, model: Model, failure: str = "") -> dict[str, Any]:
-    """What every JSON answer begins with: how it ended, of which scene it is, its size and what it cost."""
+    """What each JSON answer begins with: status, title, dimension, number of unknowns and wall time."""
     return {
         "status": answer.status.value,
         **({"failure": failure} if failure else {}),
@@ -327,7 +372,7 @@ def heading(answer: Any, model: Model, failure: str = "") -> dict[str, Any]:
 def at_factor(
     error: SolveError, scene: Any, factor: float, steps: Sequence[Equilibrium], seconds: Mapping[str, float]
 ) -> SolveError:
-    """The error of one of several steps: with its factor, and with the steps before it."""
+    """The error of one of several load steps, with its factor in the message and ``reached``: the steps before it."""
     if len(scene.analysis.steps) == 1:
         return error
     detail = f"at factor {factor:.10g}" + (f": {error.detail}" if error.detail else "")
@@ -355,12 +400,21 @@ def equilibrium(
     iterations: int = 0,
     way: tuple[str, ...] = (),
 ) -> Equilibrium:
-    """Put an equilibrium together; dimensionless in, by name and in SI out.
+    """The :class:`Equilibrium` of a dimensionless state, with its certificate in SI units.
+
+    Parameters
+    ----------
+    residual, error_estimate, halved : float
+        As in :class:`Certificate`.
+    point : Point
+        The energies, evaluated at the state.
+    stability : Stability
+        Result of the stability test, dimensionless.
 
     Raises
     ------
     SolveError
-        The angle of a spring cannot be told.
+        The number of turns in the angle of a spring or a driven joint is not determined by the state.
     """
     model, notes = equations.model, tuple(dict.fromkeys(notes))
     doubt = model.winding.doubt(state.q, state.wound, loading)
@@ -395,19 +449,19 @@ def equilibrium(
 
 
 SMALL = 0.1
-"""Displacement over size, and rotation in rad, up to which a small member is one: what is left out is of order 1 %."""
+"""Displacement over length, or rotation in rad, of a small member beyond which a note is given: errors of some 1 %."""
 
 SMALL_PULL = 0.1
-"""Axial force over ``12 EI / L^2`` up to which a small member is one: by as much it is too soft or too stiff across."""
+"""Axial force of a small member over ``12 EI / L^2`` beyond which a note is given: geometric stiffness left out."""
 
 
 def refuse_large(fields: Fields) -> None:
-    """Refuse a small member that bends so far that its linear elasticity tells nothing.
+    """Refuse a state in which a small member is deformed so far that linear elasticity has no meaning.
 
     Raises
     ------
     SolveError
-        Naming the one that bends most.
+        Names the small member with the largest deformation.
     """
     told = fields.too_large()
     if told:
@@ -415,7 +469,7 @@ def refuse_large(fields: Fields) -> None:
 
 
 def not_small(fields: Fields) -> tuple[str, ...]:
-    """Notes where small members bend or are pulled beyond linear elasticity, which no error estimate sees."""
+    """Notes on small members beyond linear elasticity by deformation or axial force; error estimates do not see it."""
     small = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
     told = "the error estimate does not tell"
     notes = []

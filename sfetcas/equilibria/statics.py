@@ -45,7 +45,7 @@ __all__ = ["LoadSteps", "Settings", "pilot_of", "solve", "solve_model"]
 def solve(
     scene: Scene, settings: Settings | None = None, *, stops: tuple[tuple[str, str], ...] = (), **changes: Any
 ) -> Solution:
-    """Equilibria of a scene for the load factors of its analysis.
+    """Static analysis: equilibria of a scene for the load factors ``analysis.steps``.
 
     Parameters
     ----------
@@ -53,7 +53,8 @@ def solve(
     settings : Settings, optional
         Further keywords replace single settings: ``solve(scene, accuracy=1e-8)``.
     stops : tuple of (str, str)
-        Springs that stand at a stop, ``low`` or ``high``; others pass theirs (see :mod:`~sfetcas.equilibria.stops`).
+        Springs held at a stop: name, and ``low`` or ``high``; stops of other springs are ignored.  Which stops act is
+        found by :mod:`~sfetcas.equilibria.stops`.
 
     Raises
     ------
@@ -72,16 +73,16 @@ def solve(
 
 
 def pilot_of(scene: Scene, settings: Settings | None = None) -> Mesh:
-    """The mesh that :func:`solve` begins with."""
+    """The mesh of :func:`solve` before any refinement: chosen by the library, or prescribed."""
     return Meshing(scene, settings or Settings()).target
 
 
 FINER = 2
-"""Halvings of the mesh of the search at most for equilibria of a scan that it does not have."""
+"""How often the mesh of a scan is halved, at most, where it lacks equilibria that the scan counted."""
 
 
 class LoadSteps:
-    """The equilibria of a scene at the load factors of its analysis, one after the other.
+    """The static analysis of a scene: its equilibria at the load factors of ``analysis.steps``, one after the other.
 
     Parameters
     ----------
@@ -95,7 +96,15 @@ class LoadSteps:
         self.others: list[tuple[Model, State]] = []
 
     def solution(self) -> Solution:
-        """All steps."""
+        """Solve all load steps.
+
+        Raises
+        ------
+        SceneError
+            A search for all equilibria is asked for and the energy is not defined, or not evaluated.
+        SolveError
+            A load step has no equilibrium that could be found; its ``reached`` has the steps before.
+        """
         begin = time.perf_counter()
         pilot = self.meshes.prepared(self.meshes.pilot_mesh)
         if self.scene.analysis.equilibria == "all":

@@ -1,8 +1,8 @@
-"""Statics where springs may stand at their stops.
+"""Statics where springs may be held at their stops, by an active-set method.
 
-Each load factor is solved by itself: of the stops that pull the one that pulls most is left, else the one that is
-passed by most is taken, until all that are taken push and none is passed.  A stop that is taken is a row, and its
-multiplier is what the stop does.
+Each load factor is solved by itself.  Of the active stops whose reaction has the wrong sign the worst is released;
+where there is none, of the stops that are violated the worst is activated; until no reaction has the wrong sign and no
+stop is violated.  An active stop is a constraint, and its multiplier is the reaction of the stop.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def solve_stopped(scene: Scene, settings: Settings) -> Solution:
     SceneError
         All equilibria are asked for.
     SolveError
-        No choice of stops holds, or a factor has no equilibrium that could be found.
+        The active-set iteration repeats itself, or a load factor has no equilibrium that could be found.
     """
     if scene.analysis.equilibria == "all":
         message = "found 'all' with stops of springs, accepted: 'one'"

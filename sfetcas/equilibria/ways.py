@@ -1,4 +1,4 @@
-"""The ways to an equilibrium, in the order in which they are tried: by IPOPT in one go, and as the loads grow."""
+"""Strategies to find an equilibrium on the pilot mesh, in their order: IPOPT at full load, or growing the loads."""
 
 from __future__ import annotations
 
@@ -104,11 +104,12 @@ Allowed = Callable[[State, Loading, State, Loading], bool]
 
 
 class Ways:
-    """The ways to an equilibrium on the pilot mesh, tried one after the other.
+    """The solution strategies on the pilot mesh, tried one after the other.
 
     Parameters
     ----------
     meshes : Meshing
+        The scene with its settings and meshes.
     """
 
     def __init__(self, meshes: Meshing) -> None:
@@ -118,7 +119,20 @@ class Ways:
     # -- the order ------------------------------------------------------------------------------------
 
     def found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
-        """The answer on the pilot, or on one with a quarter of its element lengths where that has none."""
+        """The equilibrium on the pilot mesh, or on one with elements a quarter as long where the pilot mesh has none.
+
+        Parameters
+        ----------
+        factor : float
+            Factor of the loads.
+        last : (factor, Found) or None
+            The load step before.
+
+        Raises
+        ------
+        SolveError
+            No strategy finds an equilibrium.
+        """
         try:
             return _with_change_point(self.on_pilot(pilot, factor, last))
         except SolveError as error:
@@ -131,10 +145,10 @@ class Ways:
                 raise error from None
 
     def on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
-        """The answer on the pilot.
+        """The equilibrium on the pilot mesh; parameters and errors as of :meth:`found`.
 
-        What the growing loads lead to is the answer; a minimum under the whole loads is where they cannot be followed,
-        where the branch does not matter, or where start places choose it.
+        It is the one that the loads lead to as they grow from zero.  It is a minimum of the energy under the full loads
+        where growing loads cannot be followed, where the branch does not matter, or where start positions choose it.
         """
         loading = pilot.model.loading(factor)
         if not pilot.model.minimisable:
@@ -197,7 +211,7 @@ class Ways:
         return grown
 
     def named(self, pilot: Prepared, error: SolveError) -> SolveError:
-        """The error with the motions that nothing holds, and the members that have no slack, where there are any."""
+        """The error with the names of unrestrained mechanisms, and of members without slack, where there are any."""
         try:
             free, taut = pilot.diagnosis, pilot.lacks_slack
         except np.linalg.LinAlgError:
@@ -265,7 +279,7 @@ class Ways:
         return self._through(pilot, last[0], factor, last[1].corrected.state)
 
     def grown_from_zero(self, pilot: Prepared, factor: float, allowed: Allowed | None = None) -> Found | None:
-        """The state that the loads lead to from zero, by steps that are ``allowed``."""
+        """The state that the loads lead to from zero, by steps that ``allowed`` accepts; None where that fails."""
         model = pilot.model
         zero = self._unloaded(pilot)
         if pilot.lacks_slack:

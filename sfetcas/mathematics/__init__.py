@@ -1,1 +1,1 @@
-"""Mathematics that knows no mechanics: quaternions, interpolation, curves, sparse matrices, kernels, programs."""
+"""Mathematics independent of mechanics: quaternions, interpolation, curves, sparse matrices, kernels, programs."""

@@ -1,9 +1,9 @@
-"""Arrays of numbers that know how they depend on parameters: active variables, as automatic differentiation has them.
+"""Arrays that carry a CasADi expression with their values: active variables of automatic differentiation.
 
-Code that is written for NumPy takes them in the place of arrays: universal functions and most of what reshapes, joins
-and sums arrays work on them (NEP 13 and NEP 18).  Whatever decides (comparisons, signs, roundings, largest entries)
-goes by the values, so that what comes out holds as long as the decisions do.  What would lose the dependence on the
-way, as an array of plain floats that is to take an active number, raises TypeError or ValueError.
+Code that is written for NumPy accepts them as arrays: universal functions and most functions that reshape, join and sum
+arrays work on them (NEP 13 and NEP 18).  Decisions (comparisons, signs, roundings, largest entries) use the values, so
+that an expression is valid as long as the decisions are.  Operations that would lose the dependence on parameters, as
+assigning an active number to an array of plain floats, raise TypeError or ValueError.
 
 Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 6 (operator overloading).
 """
@@ -24,14 +24,14 @@ __all__ = ["Active", "applied", "gathered"]
 
 
 class Active(NDArrayOperatorsMixin):
-    """An array of numbers with their dependence on symbols.
+    """An array of numbers that depend on symbols.
 
     Parameters
     ----------
-    values : array
-        What they are at the values of the symbols.
+    values : ndarray (...)
+        The numbers at the values of the symbols; in any unit.
     expression : SX (size, 1)
-        The same as expressions, in the order of ``values.ravel()``.
+        The numbers as expressions, in the order of ``values.ravel()``.
     """
 
     __slots__ = ("expression", "values")
@@ -43,7 +43,7 @@ class Active(NDArrayOperatorsMixin):
 
     @classmethod
     def of(cls, value: Any) -> Active:
-        """Numbers as active ones; lists may have both kinds in them."""
+        """An array of numbers, active or not, as an active one; nested lists may mix both."""
         if isinstance(value, Active):
             return value
         if isinstance(value, np.ndarray) and value.dtype == object:
@@ -58,22 +58,22 @@ class Active(NDArrayOperatorsMixin):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """As of an array."""
+        """As :attr:`numpy.ndarray.shape`."""
         return self.values.shape
 
     @property
     def ndim(self) -> int:
-        """As of an array."""
+        """As :attr:`numpy.ndarray.ndim`."""
         return self.values.ndim
 
     @property
     def size(self) -> int:
-        """As of an array."""
+        """As :attr:`numpy.ndarray.size`."""
         return self.values.size
 
     @property
     def dtype(self) -> Any:
-        """That of the values."""
+        """The type of the values."""
         return self.values.dtype
 
     @property
@@ -133,16 +133,16 @@ class Active(NDArrayOperatorsMixin):
 
     @property
     def places(self) -> Array:
-        """Places in the expression, in the shape of the array."""
+        """Indices of the entries in the expression, in the shape of the array."""
         return np.arange(self.size).reshape(self.shape)
 
     def picked(self, places: Array) -> Active:
-        """Entries by their places in the expression, in the shape of these."""
+        """Entries by their indices in the expression, in the shape of ``places``."""
         places = np.asarray(places)
         return Active(self.values.ravel()[places], self.expression[places.ravel().tolist(), 0])
 
     def spread(self, shape: tuple[int, ...]) -> ca.SX:
-        """The expression where the array is broadcast to a shape."""
+        """The expression of the array broadcast to a shape."""
         if shape == self.shape:
             return self.expression
         return self.expression[np.broadcast_to(self.places, shape).ravel().tolist(), 0]
@@ -158,48 +158,48 @@ class Active(NDArrayOperatorsMixin):
     # -- methods of arrays ----------------------------------------------------------------------------
 
     def reshape(self, *shape: Any) -> Active:
-        """As of an array."""
+        """As :meth:`numpy.ndarray.reshape`."""
         return Active(self.values.reshape(*shape), self.expression)
 
     def ravel(self) -> Active:
-        """As of an array."""
+        """As :meth:`numpy.ndarray.ravel`."""
         return self.reshape(-1)
 
     def copy(self) -> Active:
-        """As of an array."""
+        """As :meth:`numpy.ndarray.copy`."""
         return Active(self.values, ca.SX(self.expression))
 
     def transpose(self, *axes: Any) -> Active:
-        """As of an array."""
+        """As :meth:`numpy.ndarray.transpose`."""
         return self.picked(self.places.transpose(*axes))
 
     def sum(self, axis: Any = None, keepdims: bool = False) -> Active:
-        """As of an array."""
+        """As :meth:`numpy.ndarray.sum`."""
         return _sum(self, axis, keepdims)
 
     def mean(self, axis: Any = None, keepdims: bool = False) -> Active:
-        """As of an array."""
+        """As :meth:`numpy.ndarray.mean`."""
         total = _sum(self, axis, keepdims)
         return total * (total.size / self.size)
 
     def max(self, axis: Any = None, initial: float = -np.inf) -> Active:
-        """The entry that is the largest at the values."""
+        """As :meth:`numpy.ndarray.max`: the entry whose value is largest."""
         return _extreme(self, np.argmax, axis, initial)
 
     def min(self, axis: Any = None, initial: float = np.inf) -> Active:
-        """The entry that is the least at the values."""
+        """As :meth:`numpy.ndarray.min`: the entry whose value is smallest."""
         return _extreme(self, np.argmin, axis, initial)
 
     def any(self, axis: Any = None) -> Any:
-        """Whether any entry is not zero at the values."""
+        """Whether any value is not zero."""
         return self.values.any(axis=axis)
 
     def all(self, axis: Any = None) -> Any:
-        """Whether no entry is zero at the values."""
+        """Whether no value is zero."""
         return self.values.all(axis=axis)
 
     def tolist(self) -> Any:
-        """The entries by themselves, in lists."""
+        """The entries as active scalars, in nested lists."""
         return [each.tolist() for each in self] if self.ndim else self
 
 
@@ -210,7 +210,7 @@ def applied(matrix: ca.DM, vector: Any) -> Any:
 
 
 def gathered(parts: Sequence[Any]) -> Active:
-    """Arrays one after the other, flat."""
+    """Arrays flattened and concatenated into one active array (n,)."""
     every = [Active.of(part) for part in parts]
     values = np.concatenate([np.zeros(0), *(each.values.ravel() for each in every)])
     return Active(values, ca.vertcat(ca.SX(0, 1), *(each.expression for each in every)))

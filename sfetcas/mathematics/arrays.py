@@ -1,4 +1,4 @@
-"""Types of arrays; shapes, units and frames stand in the docstrings."""
+"""Types and small functions of arrays; shapes, units and frames are given in docstrings."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ TINY = 1e-300
 
 
 def first_of_largest(values: Array, alike: float | None = None) -> int:
-    """Place of the entry of largest size; of those that miss it by less than the share ``alike`` the first.
+    """Index of the first entry (n,) whose magnitude is largest up to the relative difference ``alike``.
 
-    Without one the share is :data:`~sfetcas.tolerances.ALIKE`.  Entries that a symmetry makes the same differ by
-    rounding, which chooses nothing then.
+    By default that is :data:`~sfetcas.tolerances.ALIKE`: entries that are equal by symmetry differ by rounding, which
+    then does not decide.
     """
     sizes, alike = np.abs(values), tolerances.ALIKE if alike is None else alike
     return int(np.argmax(sizes >= (1.0 - alike) * sizes.max()))
 
 
 def fixed(array: Array) -> Array:
-    """The array itself, read-only from now on."""
+    """The array (...) itself, made read-only; in any unit."""
     if isinstance(array, np.ndarray):
         array.setflags(write=False)
     return array
 
 
 def numbers(values: Any) -> Array:
-    """An array of floats, or where some depend on parameters of these (:mod:`~sfetcas.mathematics.active`).
+    """Values as an array (...) of floats, in their unit; an active one where some depend on parameters.
 
     Raises
     ------
@@ -85,8 +85,10 @@ def _depending(values: Any) -> Any:
 
 
 def plus(array: Array, key: Any, value: Any) -> Array:
-    """The array after a value has been added to its entries at a key: the array itself, or one that depends on
-    parameters where the value does."""
+    """The array (...) with a value of the same unit added to its entries at ``key``.
+
+    It is modified in place, unless the value is active: then the result is a new active array.
+    """
     if hasattr(value, "expression"):
         array = type(value).of(array)
     array[key] = array[key] + value
@@ -94,7 +96,7 @@ def plus(array: Array, key: Any, value: Any) -> Array:
 
 
 def scattered(count: int, index: Index, rows: Array) -> Array:
-    """Sums (count, n) of the rows (m, n) that have the same index (m,)."""
+    """Sums (count, n) of the rows (m, n) with the same index (m,)."""
     if hasattr(rows, "expression"):
         return numbers((np.arange(count)[:, None] == index) @ rows)
     found = np.zeros((count, rows.shape[1]))
@@ -103,20 +105,20 @@ def scattered(count: int, index: Index, rows: Array) -> Array:
 
 
 def values_of(value: Any) -> Any:
-    """What numbers are at the values of the parameters that they depend on; anything else as it is, also in lists."""
+    """The values of active numbers, also in lists; anything else unchanged."""
     if type(value) in (list, tuple):
         return type(value)(values_of(each) for each in value)
     return getattr(value, "values", value) if hasattr(value, "expression") else value
 
 
 def unit(vectors: object) -> Array:
-    """Vectors (..., n), anything that NumPy makes an array of, divided by their lengths."""
+    """Unit vectors of vectors (..., n), given as anything that NumPy makes an array of."""
     v = numbers(vectors)
     return numbers(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
 def length_of(vector: Array) -> Any:
-    """Length of a vector, also where squares of its components are no numbers of the machine."""
+    """Length of a vector (n,), in its unit, also where squares of components overflow or underflow."""
     return math.hypot(*vector) if isinstance(vector, np.ndarray) else np.linalg.norm(vector)
 
 

@@ -1,4 +1,4 @@
-"""Constant sparse matrices in CasADi expressions."""
+"""Constant sparse matrices as factors in CasADi expressions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["by_axes", "constant", "hanging", "mapped", "picked", "sparse", "time
 
 
 def constant(matrix: SparseMap) -> ca.DM:
-    """A constant sparse matrix."""
+    """A :class:`SparseMap` as a CasADi matrix."""
     order = np.lexsort((matrix.row, matrix.column))
     row, column = matrix.row[order], matrix.column[order]
     starts = np.searchsorted(column, np.arange(matrix.shape[1] + 1))
@@ -20,33 +20,33 @@ def constant(matrix: SparseMap) -> ca.DM:
 
 
 def sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> ca.DM:
-    """The same from its entries, which may stand at one place more than once."""
+    """A sparse CasADi matrix from rows, columns and values (n,) of entries; repeated entries are added."""
     row, column = np.broadcast_arrays(np.asarray(row, np.intp), column)
     return constant(SparseMap(row.ravel(), column.ravel(), np.ravel(value), shape))
 
 
 def mapped(matrix: ca.DM) -> SparseMap:
-    """A constant matrix for NumPy."""
+    """A CasADi matrix as a :class:`SparseMap`."""
     return SparseMap(*places_of(matrix.sparsity()), np.array(matrix.nonzeros()), matrix.shape)
 
 
 def by_axes(matrix: SparseMap, axes: int) -> SparseMap:
-    """A matrix of scalars that acts on every component of vectors."""
+    """A matrix for scalars as one for vectors with ``axes`` components: its Kronecker product with the identity."""
     each = np.arange(axes)
     row, column = ((part[:, None] * axes + each).ravel() for part in (matrix.row, matrix.column))
     return SparseMap(row, column, np.repeat(matrix.value, axes), (matrix.shape[0] * axes, matrix.shape[1] * axes))
 
 
 def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
-    """A product that leaves out what is not there."""
+    """Matrix times vector; a zero vector where the matrix has no entries."""
     return ca.densify(ca.mtimes(matrix, vector)) if matrix.nnz() else ca.MX.zeros(matrix.shape[0], vector.shape[1])
 
 
 def picked(vector: ca.MX, entries: Array) -> ca.MX:
-    """Entries of a column, also none of them."""
+    """Entries of a column vector by their indices (n,), possibly none."""
     return vector[entries.tolist()] if len(entries) else ca.MX(0, 1)
 
 
 def hanging(onto: ca.DM, matrix: ca.DM) -> ca.DM:
-    """A matrix of positions in the displacements of places."""
+    """``onto^T matrix onto``: a matrix of positions as one of the displacements of places."""
     return ca.mtimes(onto.T, ca.mtimes(matrix, onto))

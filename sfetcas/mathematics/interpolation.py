@@ -31,14 +31,14 @@ __all__ = [
 
 @functools.cache
 def gauss(n: int) -> tuple[Array, Array]:
-    """The n Gauss points of [0, 1] and their weights (sum 1); exact to degree 2n - 1."""
+    """The n Gauss points of [0, 1] and their weights (sum 1), (n,) each; exact to degree 2n - 1."""
     x, w = legendre.leggauss(n)
     return fixed(0.5 * (x + 1.0)), fixed(0.5 * w)
 
 
 @functools.cache
 def lobatto(n: int) -> tuple[Array, Array]:
-    """The n >= 2 Gauss-Lobatto points of [0, 1], both ends among them, and their weights; degree 2n - 3."""
+    """The n >= 2 Gauss-Lobatto points of [0, 1], both ends included, and their weights, (n,) each; degree 2n - 3."""
     top = np.zeros(n)
     top[-1] = 1.0
     slope = legendre.legder(top)
@@ -96,7 +96,7 @@ def integration(nodes: Array, x: ArrayLike) -> Array:
 
 
 def power_series(x: Array, terms: Sequence[Any]) -> Array:
-    """c0 + c1 x + c2 x^2 + ... at x (...)."""
+    """``c0 + c1 x + c2 x^2 + ...`` at x (...), in the unit of the coefficients."""
     total = terms[-1] + 0.0 * x
     for term in reversed(terms[:-1]):
         total = term + total * x

@@ -1,4 +1,4 @@
-"""Answers that are kept as long as what they are of, and no longer."""
+"""A cache of results that lives as long as the object that they belong to."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ R = TypeVar("R")
 
 
 def kept(most: int) -> Callable[[Callable[Concatenate[T, P], R]], Callable[Concatenate[T, P], R]]:
-    """A function whose answers its first argument keeps, of the other ones those that were last asked for.
+    """Decorator for methods whose results are cached in the object, the least recently used ones being dropped.
 
-    A cache of the module, as ``functools.cache`` makes it of a method too, would keep every object that was ever
-    asked, with its model and all that was compiled for that.
+    ``functools.cache`` of a method would instead keep every object alive, with its model and its compiled functions.
 
     Parameters
     ----------
     most : int
-        Answers of one object at most.
+        Largest number of results that an object keeps.
     """
 
     def decorated(function: Callable[Concatenate[T, P], R]) -> Callable[Concatenate[T, P], R]:

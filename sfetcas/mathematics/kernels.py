@@ -66,7 +66,7 @@ LOADED = 256
 
 
 def cache_folder() -> Path | None:
-    """Where compiled kernels are kept: $SFETCAS_CACHE, else a folder of the user's cache; None where there is none."""
+    """Folder of compiled kernels: $SFETCAS_CACHE, else one in the user's cache; None where there is no safe folder."""
     given = os.environ.get("SFETCAS_CACHE")
     if given:
         return Path(given)
@@ -141,7 +141,7 @@ def _load(function: ca.Function, folder: Path | None) -> ca.Function | None:
 
 
 def compiled(function: ca.Function) -> ca.Function:
-    """The function as machine code from the cache, compiled first if need be; itself without a compiler."""
+    """The function compiled to machine code, from the cache or compiled now; itself where there is no compiler."""
     folder = cache_folder()
     return _load(function, folder) or (_compile(function, folder) and _load(function, folder)) or function
 
@@ -197,7 +197,7 @@ _INTERPRETED = contextvars.ContextVar("interpreted", default=False)
 
 @contextlib.contextmanager
 def interpreted() -> Iterator[None]:
-    """Within this nothing is compiled, and nothing that was compiled is loaded."""
+    """Context manager within which nothing is compiled and no compiled function is loaded."""
     token = _INTERPRETED.set(True)
     try:
         yield
@@ -206,13 +206,13 @@ def interpreted() -> Iterator[None]:
 
 
 def chosen(function: ca.Function, calls: float, kernels: Kernels = "auto") -> ca.Function:
-    """The function interpreted or compiled, as asked or as it pays.
+    """The function interpreted or compiled, as requested or as it pays.
 
     Parameters
     ----------
     calls : float
-        How often it will be called: ``auto`` compiles where that takes longer than compiling, and takes what is
-        in the cache where it is worth looking.  $SFETCAS_KERNELS changes what ``auto`` means to one of the others.
+        Expected number of calls.  ``auto`` compiles where interpreting would take longer than compiling, and loads a
+        cached library where that is worth it; $SFETCAS_KERNELS replaces ``auto`` by ``compiled`` or ``interpreted``.
     """
     way = os.environ.get("SFETCAS_KERNELS", "auto") if kernels == "auto" else kernels
     if way == "interpreted" or _INTERPRETED.get():
@@ -247,7 +247,7 @@ class Batch:
             self._buffer.set_res(i, array.data)
 
     def set(self, i: int, values: Array) -> None:
-        """Give argument i, any shape with n first."""
+        """Set argument i for all n sets: an array (n, ...)."""
         self._arguments[i][...] = values.reshape(self._arguments[i].shape)
 
     def __call__(self) -> list[Array]:

@@ -24,12 +24,12 @@ DENSE = 150
 
 
 class SparseMap:
-    """A constant matrix by its entries that are not zero; products by ``@``.
+    """A constant sparse matrix by its entries; products by ``@``.
 
     Attributes
     ----------
-    row, column, value : ndarray
-        The entries, each place once, sorted by rows.
+    row, column, value : ndarray (n,)
+        The entries, without repetitions, sorted by rows.
     shape : (int, int)
     """
 
@@ -66,13 +66,13 @@ class SparseMap:
         return found
 
     def full(self) -> Array:
-        """The matrix with its zeros."""
+        """The dense matrix, an array of :attr:`shape`."""
         matrix = np.zeros(self.shape)
         matrix[self.row, self.column] = self.value
         return matrix
 
     def rows(self, chosen: Array) -> SparseMap:
-        """The chosen rows, in their order."""
+        """The matrix of some rows, given by their indices (n,), in that order."""
         chosen = np.asarray(chosen, dtype=np.intp)
         begin, end = np.searchsorted(self.row, chosen), np.searchsorted(self.row, chosen, side="right")
         taken = np.concatenate([np.zeros(0, np.intp), *(np.arange(a, b) for a, b in zip(begin, end, strict=True))])
@@ -87,20 +87,20 @@ FULL = 20_000
 class SparseSolver:
     """Solutions of ``A x = b`` for matrices of one pattern.
 
-    Few rows of constraints are eliminated last, with pivots.  Symmetric matrices with many are factorised without
-    pivots, all diagonals very slightly soft, and the softness is taken back by iterative refinement; what does not
-    converge so is solved with pivots and refined as well.
+    A few constraint rows are eliminated last, with pivoting.  Symmetric matrices with many of them are factorised
+    without pivoting after a slight regularisation of the diagonal, whose effect iterative refinement removes; where
+    that does not converge the system is solved with pivoting, and refined as well.
 
     Parameters
     ----------
     n : int
         Size of the matrix.
     row, column : ndarray
-        Places of the entries, column by column, the whole diagonal among them.
+        Positions of the entries, column by column, with the whole diagonal.
     rows : int
-        How many of the last unknowns are multipliers of constraints, zero or negative on the diagonal.
+        Number of multipliers of constraints, the last unknowns, with zero or negative diagonal.
     symmetric : bool
-        Whether the matrices are.
+        Whether the matrices are symmetric.
 
     Source: Vanderbei 1995 (symmetric quasidefinite matrices have factors in any order).
     """
@@ -112,7 +112,7 @@ class SparseSolver:
         self._sides = np.repeat([tolerances.SOFT, -tolerances.SOFT], [n - rows, rows])
 
     def factor(self, entries: Array) -> None:
-        """Take a matrix; it is factorised when it is solved with (CasADi does so at each call anyway)."""
+        """Set the entries of the matrix; it is factorised by the next :meth:`solve`."""
         if self._small:
             self._matrix: Array = np.zeros((self.n, self.n))
             self._matrix[self._row, self._column] = entries
@@ -120,7 +120,7 @@ class SparseSolver:
             self._matrix = entries
 
     def solve(self, b: Array) -> Array:
-        """Solution for the matrix given last, not finite where that is singular and large; b (n,) or (n, k).
+        """Solution for the matrix set last and right sides b, (n,) or (n, k); not finite for large singular matrices.
 
         Raises
         ------
@@ -260,25 +260,25 @@ ROUNDS = 8
 """Rounds of refinement at most; usual are three."""
 
 NOTHING_TO_GAIN = 1e-16
-"""Residual, relative to matrix times solution, at which there is nothing left to gain."""
+"""Residual, relative to matrix times solution, at which refinement ends."""
 
 SOLVED = 1e-13
-"""The same that is taken for a solution."""
+"""Residual, relative to matrix times solution, up to which a solution is accepted."""
 
 
 def pattern(n: int, row: Array, column: Array) -> ca.Sparsity:
-    """Sparsity of a square matrix by the places of its entries, column by column."""
+    """CasADi sparsity of an (n, n) matrix from rows and columns of its entries, column by column."""
     return ca.Sparsity(n, n, np.searchsorted(column, np.arange(n + 1)).tolist(), row.tolist())
 
 
 def places_of(sparsity: ca.Sparsity) -> tuple[Index, Index]:
-    """Rows and columns of the entries of a sparsity, column by column."""
+    """Rows and columns (entries,) of a CasADi sparsity, column by column."""
     row, column = sparsity.get_triplet()
     return np.array(row, dtype=np.intp), np.array(column, dtype=np.intp)
 
 
 def blurred(row: Array, column: Array, entries: Array, vectors: Array) -> Array:
-    """What rounding of the entries of a square matrix may leave of ``x A x``, of columns x (n, k): (k,)."""
+    """Bounds (k,) on the rounding errors of ``x^T A x`` for columns x (n, k), from rounding of the entries of A."""
     sizes, size = np.abs(vectors), np.abs(entries)
     return np.array([ENTRY * float((size * x[row]) @ x[column]) for x in sizes.T])
 
@@ -290,8 +290,8 @@ ENTRY = 5e-16
 def smallest(rows: SparseMap, right: Array, weights: Array) -> tuple[Array, Array]:
     """Solution x (columns,) of ``rows @ x = right`` with the smallest sum of ``weights * x**2``, and its multipliers.
 
-    Rows may depend on each other if their right sides do so too.  They are taken as slightly soft, which a few rounds
-    of multipliers (rows,) take back (augmented Lagrangian): ``weights * x + rows.T @ multipliers`` is zero.
+    Rows may be linearly dependent if their right sides are consistent.  They are regularised slightly, and a few rounds
+    of an augmented Lagrangian remove the effect: ``weights * x + rows.T @ multipliers`` is zero.
     """
     m, n = rows.shape
     places = np.concatenate([np.arange(n + m), rows.column, n + rows.row])
@@ -325,7 +325,7 @@ class InertiaSolver:
         self._solver.sfact(ca.DM(sparsity, 1.0))
 
     def nfact(self, matrix: ca.DM) -> None:
-        """Factorise a matrix."""
+        """Factorise a matrix; LinAlgError where that breaks down."""
         try:
             with _unsaid():
                 self._solver.nfact(matrix)
@@ -333,11 +333,11 @@ class InertiaSolver:
             raise np.linalg.LinAlgError("no factors without pivots") from None
 
     def neig(self, matrix: ca.DM) -> int:
-        """Number of negative eigenvalues of the matrix factorised last."""
+        """Number of negative eigenvalues of the matrix that was factorised last."""
         return int(self._solver.neig(matrix))
 
     def solve(self, matrix: ca.DM, b: ca.DM) -> ca.DM:
-        """Solution for the matrix factorised last."""
+        """Solution for the matrix that was factorised last; LinAlgError where that is singular."""
         try:
             with _unsaid():
                 return self._solver.solve(matrix, b)

@@ -2,7 +2,7 @@
 
     minimise f(x, p)  over x,   lower <= g(x, p) <= upper,   x_lower <= x <= x_upper
 
-This module knows no mechanics.  Multipliers have the sign of CasADi: ``grad f + J^T lam = 0``.
+This module is independent of mechanics.  Multipliers have the sign of CasADi: ``grad f + J^T lam = 0``.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ __all__ = ["NLP", "Ipopt", "NLPResult", "Solver"]
 
 @dataclass(frozen=True, eq=False)
 class NLP:
-    """A nonlinear program with named rows; terms, rows and bounds are added by making a new one.
+    """A nonlinear program with named constraint rows; its methods return new programs with further terms and rows.
 
     Attributes
     ----------
     x, p, f, g : casadi.MX
-        Unknowns, parameters, objective and rows.
-    lower, upper : ndarray
-        Bounds of the rows.
-    x_lower, x_upper, guess : ndarray
-        Bounds of the unknowns and where to begin.
+        Unknowns (n, 1), parameters, objective, and constraint functions (m, 1).
+    lower, upper : ndarray (m,)
+        Bounds of the constraint functions.
+    x_lower, x_upper, guess : ndarray (n,)
+        Bounds of the unknowns, and the start.
     p_value : ndarray
         Values of the parameters.
     rows : tuple of str
-        Names of the rows.
+        Names of the constraints.
     gradient, jacobian : casadi.MX
-        Derivatives of f and g by x.
+        Derivatives of f (n, 1) and g (m, n) by x.
     hessian : callable
         (lam_f, lam_g) -> Hessian of ``lam_f f + lam_g.g`` by x, full and symmetric.
     """
@@ -59,7 +59,7 @@ class NLP:
     hessian: Callable[[ca.MX, ca.MX], ca.MX]
 
     def with_term(self, term: ca.MX) -> NLP:
-        """The program with a term added to the objective (in the unit of the objective)."""
+        """The program with a term added to the objective, in its unit."""
         old = self.hessian
 
         def hessian(lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
@@ -69,7 +69,7 @@ class NLP:
         return replace(self, f=self.f + term, gradient=gradient, hessian=hessian)
 
     def with_row(self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None) -> NLP:
-        """The program with rows ``lower <= row <= upper`` added (equality with ``lower`` by default)."""
+        """The program with constraints ``lower <= row <= upper`` added; equal to ``lower`` without ``upper``."""
         row = ca.vec(row)
         size = row.numel()
         old, before = self.hessian, self.g.numel()
@@ -94,7 +94,20 @@ class NLP:
 
 @dataclass(frozen=True, eq=False)
 class NLPResult:
-    """What a solver returned; ``status`` says whether it is a solution."""
+    """What a solver returned.
+
+    Attributes
+    ----------
+    status : Status
+        SOLVED, or why it is no solution.
+    x, lam : ndarray (n,), (m,)
+        Unknowns and multipliers of the constraints.
+    f : float
+        Objective.
+    iterations : int
+    message : str
+        The return status in the words of the solver.
+    """
 
     status: Status
     x: Array
@@ -115,7 +128,7 @@ class Solver:
     options : mapping
         Options of nlpsol and of the plugin, as CasADi takes them.
     exact : bool
-        Hand the record's derivatives over where the plugin takes them (IPOPT does); otherwise CasADi
+        Pass the derivatives of the :class:`NLP` to the plugin where it accepts them (IPOPT does); otherwise CasADi
         differentiates the expressions again.
     """
 
@@ -124,7 +137,11 @@ class Solver:
     exact: bool = True
 
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
-        """A function (p, guess, lam, lower, upper) -> NLPResult; each argument defaults to that of the record."""
+        """A function ``(p, guess, lam, lower, upper) -> NLPResult``; each argument defaults to its value in the
+        program.
+
+        It raises SolveError where the plugin fails with an error instead of a result.
+        """
         options = dict(self.options)
         if self.exact and self.plugin == "ipopt":
             options |= _derivatives(nlp)
@@ -196,20 +213,20 @@ def _status(stats: Mapping[str, Any]) -> Status:
 
 @dataclass(frozen=True)
 class Ipopt:
-    """IPOPT with settings that suit equilibria.
+    """IPOPT with options that suit equilibria.
 
     Attributes
     ----------
     tolerance : float
-        Tolerance of IPOPT; the last digits come from a Newton step afterwards.
+        IPOPT's ``tol``; equilibria are corrected by Newton's method afterwards.
     iterations : int
-        Largest number of iterations.
+        IPOPT's ``max_iter``.
     objective_scale : float
-        What IPOPT multiplies the objective by.
+        IPOPT's ``obj_scaling_factor``.
     verbose : bool
         Let IPOPT print.
     extra : mapping
-        Further options of IPOPT by its own names, e.g. ``{"mu_strategy": "adaptive"}``.
+        Further options of IPOPT by its own names, as ``{"mu_strategy": "adaptive"}``.
     """
 
     tolerance: float = 1e-9
@@ -219,7 +236,7 @@ class Ipopt:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def prepare(self, nlp: NLP) -> Callable[..., NLPResult]:
-        """A function (p, guess, lam, lower, upper) -> NLPResult."""
+        """A function ``(p, guess, lam, lower, upper) -> NLPResult``, as of :meth:`Solver.prepare`."""
         ipopt = {
             "tol": self.tolerance,
             "max_iter": self.iterations,

@@ -1,4 +1,4 @@
-"""Nonlinear programs put together of pieces: many small functions of few unknowns each, added up.
+"""Nonlinear programs assembled from pieces: many instances of small functions of few unknowns each.
 
     minimise  sum of costs(w, c),    lower <= rows(w, c) <= upper,    w some of the unknowns, c constants
 
@@ -36,11 +36,11 @@ class Unknown:
     ----------
     name : str
     symbol : MX
-        Stands for it in expressions, in its own unit.
+        Its symbol in expressions, in its own unit.
     index : ndarray of int
-        Where it stands in the program, in the shape of the block.
+        Indices in the vector of all unknowns, in the shape of the block.
     unit : ndarray
-        What each of them is divided by.
+        Unit by which each is divided in the program, in the shape of the block.
     low, high : ndarray
         Bounds, in the shape of the block.
     """
@@ -77,7 +77,9 @@ class _Piece:
 
 
 class Pieces:
-    """A program that grows by unknowns and pieces, then becomes an :class:`~sfetcas.mathematics.nlp.NLP`.
+    """A program to which unknowns and pieces are added, then turned into an :class:`~sfetcas.mathematics.nlp.NLP`.
+
+    Attributes and arguments ``x`` are vectors (n,) of all unknowns over their units.
 
     Parameters
     ----------
@@ -137,38 +139,38 @@ class Pieces:
         unit: ArrayLike = 1.0,
         labels: Sequence[str] = (),
     ) -> None:
-        """Rows ``low <= function(w, c) <= high`` of each instance; equal to ``low`` without ``high``.
+        """Add constraints ``low <= function(w, c) <= high`` for each instance; ``== low`` without ``high``.
 
         Parameters
         ----------
         function : (w, c) -> rows; or (w) -> rows
-        index : (instances, w), places of the unknowns
+        index : (instances, w), indices of the unknowns
         constants : (instances, c)
         low, high, unit : broadcast to (instances, rows)
-        labels : what rows of each instance are called, in place of numbers of the instances
+        labels : names of the instances, instead of their numbers
         """
         self._add(name, function, index, constants, low, low if high is None else high, unit, 0.0, labels)
 
     def add_cost(
         self, name: str, function: ca.Function, index: Index, constants: Array | None = None, weight: float = 1.0
     ) -> None:
-        """A cost ``weight * sum of function(w, c)``."""
+        """Add the cost ``weight * sum of function(w, c)``; index is (instances, w), constants (instances, c)."""
         self._add(name, function, index, constants, 0.0, 0.0, 1.0, weight)
 
     def add_expression(
         self, name: str, expression: ca.MX, low: ArrayLike = 0.0, high: ArrayLike | None = None, unit: ArrayLike = 1.0
     ) -> None:
-        """Rows of an expression in symbols of the unknowns."""
+        """Add constraints on an expression (rows,) in symbols of the unknowns; bounds and units are broadcast to it."""
         function, index = self.function_of(name, expression)
         self.add_rows(name, function, index, None, low, high, unit)
 
     def add_term(self, name: str, expression: ca.MX, weight: float = 1.0) -> None:
-        """A cost that is an expression in symbols of the unknowns."""
+        """Add a cost that is an expression in symbols of the unknowns."""
         function, index = self.function_of(name, expression)
         self.add_cost(name, function, index, weight=weight)
 
     def function_of(self, name: str, expression: ca.MX) -> tuple[ca.Function, Index]:
-        """An expression in symbols of unknowns as a function of these, and their places (1, w).
+        """An expression in symbols of unknowns as a function of these, and their indices (1, w).
 
         Raises
         ------
@@ -216,7 +218,7 @@ class Pieces:
     # -- what may change without the program being made again ----------------------------------------
 
     def set_constants(self, name: str, constants: Array) -> None:
-        """Other constants of the piece of a name, (instances, c)."""
+        """Replace the constants (instances, c) of a piece, given by its name."""
         at = next(i for i, piece in enumerate(self._pieces) if piece.name == name)
         self._pieces[at] = replace(self._pieces[at], constants=np.asarray(constants, dtype=float))
 
@@ -233,31 +235,31 @@ class Pieces:
 
     @property
     def units(self) -> Array:
-        """Of all unknowns."""
+        """Units of all unknowns, (n,)."""
         return self._flat("unit")
 
     @property
     def guess(self) -> Array:
-        """All unknowns to begin with, in their own units."""
+        """Start values of all unknowns, (n,), in their own units."""
         return np.concatenate([np.zeros(0), *self._guesses])
 
     def constants(self) -> Array:
-        """Constants of all pieces: the parameters of the program."""
+        """Constants of all pieces, flat: the parameters of the program."""
         return np.concatenate([np.zeros(0), *(piece.constants.ravel() for piece in self._pieces)])
 
     def value(self, block: Unknown, x: Array) -> Array:
-        """The values of a block in an answer ``x`` of the program, in their own units."""
+        """The values of a block in a solution x of the program, in the shape and units of the block."""
         return np.asarray(x[block.index] * block.unit)
 
     def row_names(self) -> list[str]:
-        """A name for each row."""
+        """A name for each constraint row."""
         names = []
         for _, where, rows in self._instances():
             names += [f"{where}.{k}" for k in range(rows)] if rows > 1 else [where] * rows
         return names
 
     def violated(self, nlp: NLP, x: Array) -> list[tuple[str, float]]:
-        """Rows that ``x`` violates, by the names of their pieces, the worst first, over their units."""
+        """Constraints that x violates: names of their pieces and violations over their units, the worst first."""
         values = np.array(ca.Function("rows", [nlp.x, nlp.p], [nlp.g])(x, nlp.p_value)).ravel()
         off = np.maximum(np.maximum(nlp.lower - values, values - nlp.upper), 0.0)
         off = np.where(np.isfinite(off), off, np.inf)
@@ -268,7 +270,7 @@ class Pieces:
         return sorted(worst.items(), key=lambda item: -item[1])
 
     def row_owners(self) -> list[tuple[str, str]]:
-        """For each row the name of its piece, and what its instance is called."""
+        """For each constraint row the name of its piece and the label of its instance."""
         return [(name, where) for name, where, rows in self._instances() for _ in range(rows)]
 
     def _instances(self) -> Iterator[tuple[str, str, int]]:
@@ -281,7 +283,7 @@ class Pieces:
     # -- the program ----------------------------------------------------------------------------------
 
     def nlp(self) -> NLP:
-        """The program as it stands; unknowns over their units, rows over theirs."""
+        """The nonlinear program, with unknowns and rows over their units."""
         x, p = ca.MX.sym("x", self._size), ca.MX.sym("p", len(self.constants()))
         units, made = self.units, [_Derived(piece, self._kernels) for piece in self._pieces]
         bounds = np.cumsum([0, *(piece.constants.size for piece in self._pieces)]).tolist()

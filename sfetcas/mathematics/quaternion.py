@@ -35,23 +35,23 @@ __all__ = [
 
 
 class Components:
-    """What a thing in the plane or in space counts; a class with a field ``space`` takes these from here."""
+    """Numbers of components in the plane or in space; a base class for classes with a field ``space``."""
 
     space: bool
 
     @property
     def components(self) -> int:
-        """Numbers of a rotation: 4 (quaternion) or 1 (angle)."""
+        """Components of a rotation: 4 of a quaternion, or 1 angle."""
         return 4 if self.space else 1
 
     @property
     def turns(self) -> int:
-        """Independent rotations: 3 or 1."""
+        """Components of a rotation vector: 3, or 1 in the plane."""
         return 3 if self.space else 1
 
     @property
     def axes(self) -> int:
-        """Components of a position: 3 or 2."""
+        """Components of a position: 3, or 2 in the plane."""
         return 3 if self.space else 2
 
 
@@ -66,7 +66,7 @@ def product(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
 
 
 def turned(q: Sequence[Any], v: Sequence[Any]) -> list[Any]:
-    """``R(q) v`` with ``R`` homogeneous of degree two in ``q``: exact for ``|q| = 1``, ``|q|^2 R v`` else."""
+    """``R(q) v`` for ``|q| = 1``; in general ``|q|^2 R v``, since it is homogeneous of degree two in ``q``."""
     pure = product(q, [0.0, *v])
     return product(pure, [q[0], -q[1], -q[2], -q[3]])[1:]
 
@@ -92,17 +92,17 @@ def multiply(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def conjugate(q: ArrayLike) -> Array:
-    """The inverse rotation, shape (..., 4)."""
+    """The inverse of unit quaternions, (..., 4)."""
     return numbers(numbers(q) * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
-    """``R(q) v`` for arrays of shape (..., 4) and (..., 3)."""
+    """``R(q) v``: vectors v (..., 3), in any unit, rotated by unit quaternions q (..., 4)."""
     return _stacked(turned(_components(q), _components(v)))
 
 
 def turned_by(q: Array, v: Array) -> Array:
-    """Vectors (..., axes) turned by rotations: quaternions (..., 4), or angles (..., 1) in the plane."""
+    """Vectors (..., axes) rotated by unit quaternions (..., 4), or in the plane by angles (..., 1)."""
     if q.shape[-1] == 4:
         return rotate(q, v)
     c, s = np.cos(q[..., 0]), np.sin(q[..., 0])
@@ -110,7 +110,7 @@ def turned_by(q: Array, v: Array) -> Array:
 
 
 def matrix(q: ArrayLike) -> Array:
-    """Rotation matrices, shape (..., 3, 3); the columns are the turned unit vectors."""
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); the columns are the rotated unit vectors."""
     q = numbers(q)
     return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
 
@@ -127,7 +127,7 @@ def from_rotation_vector(phi: ArrayLike) -> Array:
 
 
 def angular_velocity(phi: ArrayLike, rate: ArrayLike) -> Array:
-    """Angular velocity about the fixed axes of what has turned by rotation vectors (..., 3) that change at a rate.
+    """Angular velocity (..., 3), fixed axes, of a rotation by rotation vectors phi (..., 3), rad, with given rate.
 
     ``w = phi' + (1 - cos a)/a^2 phi x phi' + (a - sin a)/a^3 phi x (phi x phi')`` with the angle a.
     """
@@ -141,7 +141,7 @@ def angular_velocity(phi: ArrayLike, rate: ArrayLike) -> Array:
 
 
 def cross_matrix(v: ArrayLike) -> Array:
-    """Matrices (..., 3, 3) of the cross product ``v x`` with vectors (..., 3)."""
+    """Matrices (..., 3, 3) of the cross product ``v x`` with vectors v (..., 3), in their unit."""
     return np.cross(np.eye(3), np.asarray(v, dtype=float)[..., None, :])
 
 

@@ -14,7 +14,7 @@ __all__ = ["Relation", "relation"]
 
 @dataclass(frozen=True, eq=False)
 class Relation:
-    """Rows ``low <= expression <= high``.
+    """Constraints ``low <= expression <= high``, in the unit of the expression.
 
     Attributes
     ----------

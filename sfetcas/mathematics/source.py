@@ -1,4 +1,4 @@
-"""CasADi functions as C, to be loaded or static, and tables of constants."""
+"""CasADi functions as C code, loadable or static, and tables of constants in C."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def _written(functions: Sequence[ca.Function], name: str, options: dict[str, Any
 
 
 def loadable(function: ca.Function) -> str:
-    """A function as C that CasADi loads once it is compiled."""
+    """A function as C code that CasADi can load once it is compiled."""
     return _written([function], function.name(), {})
 
 
 def functions_in_c(functions: Sequence[ca.Function], prefix: str, roots: Iterable[str]) -> str:
-    """Functions as static C, with nothing that is not reached from the roots; needs the mathematics of C only.
+    """Functions as static C code without anything unreachable from the roots; it needs only the C math library.
 
     Parameters
     ----------
-    functions : what to write
-    prefix : of all names that CasADi gives
-    roots : names of what is called from outside; of CasADi's own as in ``casadi_ldl``
+    functions : the functions
+    prefix : prefix of all names that CasADi generates
+    roots : names of functions called from outside; also of CasADi's runtime, as ``casadi_ldl``
     """
     head, chunks = _chunks(_written(functions, prefix, {"with_export": False, "casadi_int": "int"}))
     wanted, reached = list(roots), set[str]()
@@ -92,7 +92,7 @@ def _chunks(text: str) -> tuple[str, dict[str, str]]:
 
 
 def sizes_of(functions: Iterable[ca.Function]) -> dict[str, int]:
-    """Work that functions need, one after the other."""
+    """Sizes of the work arrays that functions need when called one after the other."""
     functions = list(functions)
     return {
         "arg": max(3, *(f.sz_arg() for f in functions)),
@@ -103,7 +103,7 @@ def sizes_of(functions: Iterable[ca.Function]) -> dict[str, int]:
 
 
 def table(name: str, values: Array, kind: str = "double") -> str:
-    """A constant array; an empty one has one zero, which C asks for."""
+    """A constant array (...) in C; an empty one has a single zero, since C has no empty arrays."""
     flat = np.asarray(values).ravel()
     texts = [_double(x) if kind == "double" else str(int(x)) for x in flat.tolist()] or ["0"]
     lines, line = [], ""
@@ -122,6 +122,6 @@ def _double(x: float) -> str:
 
 
 def sparsity_table(name: str, sparsity: ca.Sparsity) -> str:
-    """A pattern as the generated functions read it."""
+    """A sparsity pattern in the form that the generated functions read."""
     rows, columns = sparsity.shape
     return table(name, np.array([rows, columns, *sparsity.colind(), *sparsity.row()]), "int")

@@ -25,10 +25,10 @@ EIGENPAIR = 1e-11
 """Residual of an eigenpair over its eigenvalue."""
 
 SYMMETRIC = 1e-8
-"""The same with an inner product in which the operator is symmetric: eigenvalues are then known to its square."""
+"""As :data:`EIGENPAIR` for operators that are symmetric in an inner product: the eigenvalue error is its square."""
 
 NOTHING_TO_GAIN = 1e-14
-"""The same over the largest eigenvalue, at which there is nothing left to gain."""
+"""Residual over the largest eigenvalue at which rounding prevents further progress."""
 
 STALLED = 4
 """Blocks after which a residual that has not become smaller by half is that of rounding, if it is small at all."""
@@ -66,7 +66,7 @@ def largest(
         Multiplies by the matrix of an inner product in which the operator is symmetric; the vectors are then real and
         orthonormal in it.  Left out: the operator is not symmetric, eigenvalues may be complex.
     pick : callable, optional
-        Takes estimates of eigenvalues, falling, and gives the numbers of those that are meant instead of the largest.
+        Estimates of eigenvalues, falling -> indices of those that are wanted instead of the largest.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""What a problem asks for in the words of CasADi: unknowns, relations that have to hold, what shall be least.
+"""Statement of an optimisation problem in CasADi expressions: unknowns, constraints and objective.
 
-Relations are ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.  This module knows no mechanics; what
-numbers and answers of a scene are is known by those who make symbols of them (:meth:`Statement.known`).
+Constraints are ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.  This module is independent of
+mechanics; other modules make symbols for numbers and answers of a scene and register them (:meth:`Statement.known`).
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Free:
-    """Free numbers.
+    """A block of unknowns, in its own unit.
 
     Attributes
     ----------
     name : str
     symbol : MX
-        In expressions, in the shape of the guess.
+        Its symbol in expressions, in the shape of the guess.
     guess, low, high : ndarray
-        All of one shape.
+        Start values and bounds, all of one shape.
     """
 
     name: str
@@ -45,19 +45,19 @@ class Free:
 
 @dataclass(frozen=True, eq=False)
 class Required:
-    """Rows with bounds, and what they are called."""
+    """A constraint, with its name."""
 
     name: str
     relation: Relation
 
 
 def bounds_of(name: str, given: object) -> Bounds:
-    """Least and largest value of what is looked for.
+    """Lower and upper bound of an unknown.
 
     Raises
     ------
     SceneError
-        They are no two numbers, or contradict each other.
+        They are not two numbers, or contradict each other.
     """
     try:
         low, high = (float(x) for x in given)  # type: ignore[attr-defined]
@@ -69,14 +69,14 @@ def bounds_of(name: str, given: object) -> Bounds:
 
 
 class Statement:
-    """What is asked for.
+    """An optimisation problem: unknowns, constraints and objective.
 
     Attributes
     ----------
     free : dict of str to Free
     required : list of Required
     costs : list of MX
-        Terms of what shall be least.
+        Terms of the objective.
     """
 
     def __init__(self) -> None:
@@ -86,18 +86,18 @@ class Statement:
         self._symbols: dict[int, ca.MX] = {}
 
     def known(self, symbol: ca.MX) -> ca.MX:
-        """A symbol that expressions may contain from now on."""
+        """Register a symbol that expressions may contain, and return it."""
         # Kept, so that no other symbol gets its hash.
         self._symbols[symbol.__hash__()] = symbol
         return symbol
 
     def unknown(self, name: str, guess: ArrayLike, low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> ca.MX:
-        """Free numbers under a name of their own.
+        """Add unknowns under a name and return their symbol.
 
         Parameters
         ----------
-        guess : number, (n,) or (n, m): where to begin, and the shape
-        low, high : broadcast to it
+        guess : number, (n,) or (n, m): start values, and the shape
+        low, high : bounds, broadcast to it
 
         Raises
         ------
@@ -116,11 +116,11 @@ class Statement:
         return self.free[name].symbol
 
     def subject_to(self, *given: ca.MX, name: str = "") -> None:
-        """Relations that have to hold.
+        """Add constraints.
 
         Parameters
         ----------
-        name : what they are called in messages and among the multipliers; what they are made of without
+        name : name in messages and among the multipliers; by default made from the expression
 
         Raises
         ------
@@ -142,7 +142,7 @@ class Statement:
             self.required.append(Required(self._once(called), found))
 
     def minimise(self, cost: Any) -> None:
-        """What shall be least; of further calls the sum.
+        """Add a term to the objective.
 
         Raises
         ------
@@ -176,7 +176,7 @@ class Statement:
         return expression
 
     def refuse_strange(self, name: str, expression: ca.MX) -> None:
-        """Refuse a symbol that is none of this problem.
+        """Refuse an expression with a symbol that does not belong to this problem.
 
         Raises
         ------
@@ -196,7 +196,7 @@ class Statement:
 
 
 class Problem:
-    """What all problems say in the same words.
+    """Base class of problems that users state: their common methods.
 
     Attributes
     ----------
@@ -206,11 +206,11 @@ class Problem:
     statement: Statement
 
     def subject_to(self, *relations: ca.MX, name: str = "") -> None:
-        """Relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.
+        """Add constraints: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.
 
         Parameters
         ----------
-        name : what they are called in messages and among the multipliers; what they are made of without
+        name : name in messages and among the multipliers; by default made from the expression
 
         Raises
         ------
@@ -220,7 +220,7 @@ class Problem:
         self.statement.subject_to(*relations, name=name)
 
     def minimise(self, cost: ca.MX | float) -> None:
-        """What shall be least; of further calls the sum.
+        """Add a term to the objective.
 
         Raises
         ------

@@ -22,7 +22,7 @@ def _libraries() -> ThreadpoolController:
 
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
-    """The function with one thread for linear algebra while it runs; the former number is restored."""
+    """Decorator that limits linear algebra to one thread while the function runs."""
 
     @functools.wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:

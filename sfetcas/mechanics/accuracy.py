@@ -1,4 +1,4 @@
-"""How near an answer is: differences between meshes, and where a mesh is too coarse.
+"""Error estimates by comparing meshes, and a measure of where a mesh is too coarse.
 
 Positions at the ends of elements are of order 2p, between them of order ``min(2p, p + 2)``.  What a halving of all
 elements changes is therefore the error before it, and ``2**-min(2p, p + 2)`` of that the error after it; that the
@@ -30,7 +30,7 @@ BLUR = 1e-12
 
 
 def largest_difference(coarse: Fields, fine: Fields) -> float:
-    """Largest distance of positions at ends of the coarse elements and within, over the size of the scene."""
+    """Largest distance between positions on two meshes, at and within coarse elements, over the scene's size."""
     largest = 0.0
     for name, cuts in coarse.model.mesh.cuts.items():
         x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * WITHIN).ravel(), cuts[-1])
@@ -40,18 +40,18 @@ def largest_difference(coarse: Fields, fine: Fields) -> float:
 
 
 def halving(coarse: Fields, fine: Fields) -> tuple[float, float]:
-    """What the halving of all elements changed of the positions, and the estimated error that it left."""
+    """Relative difference of the positions after all elements were halved, and the estimated error that remains."""
     difference = largest_difference(coarse, fine)
     return difference, remaining(difference, gained(coarse, fine))
 
 
 def gained(coarse: Fields, fine: Fields, *, positions: bool = True) -> float:
-    """Share of the coarse mesh's error that is left on the fine one, as far as roughness tells; 1 where it grew.
+    """Ratio of the error on the fine mesh to that on the coarse one, estimated from roughness; 1 where roughness grew.
 
     Parameters
     ----------
     positions : bool
-        Of positions, whose order between the ends of elements is ``min(2p, p + 2)``; else of what is of order p only.
+        The error of positions, of order ``min(2p, p + 2)`` between the ends of elements; else of quantities of order p.
     """
     before, after = (float(roughness(side).max(initial=0.0)) for side in (coarse, fine))
     order = coarse.model.element.order
@@ -61,14 +61,14 @@ def gained(coarse: Fields, fine: Fields, *, positions: bool = True) -> float:
 
 
 def remaining(difference: float, gain: float) -> float:
-    """Estimated error after all elements were halved, from the difference that this made and what it gained.
+    """Estimated error after all elements were halved.
 
     Parameters
     ----------
     difference : float
-        Relative.
+        Relative difference that the halving made.
     gain : float
-        See :func:`gained`.
+        Ratio of the errors, see :func:`gained`.
     """
     # The order is that of small errors: of larger ones the next term is as much as the square root of them.
     gain = max(gain, np.sqrt(difference))
@@ -76,10 +76,11 @@ def remaining(difference: float, gain: float) -> float:
 
 
 def roughness(fields: Fields) -> Array:
-    """Highest Legendre coefficients of the rotations, rad, and of the reach over the scene's size, (elements,).
+    """A measure of how rough the solution is in each element, (elements,): sizes of its highest Legendre coefficients.
 
-    Rotations count in full, since all that is beyond turns with them; turned tangents count with the length of
-    the element.  Errors of the positions are about the square of these: elements are superconvergent.
+    It adds those of the rotations, rad, and those of the tangents times the element's length over the scene's size.
+    Rotations count in full, since everything beyond moves with them.  Errors of the positions are about the square of
+    these: elements are superconvergent.
     """
     model, element = fields.model, fields.model.element
     nodal = fields.q[model.rotations.turns]
@@ -91,5 +92,5 @@ def roughness(fields: Fields) -> Array:
 
 
 def every_other(cuts: Array) -> Array:
-    """Cuts of a mesh with half the elements."""
+    """The ends of elements (n + 1,), as fractions of the length, of a mesh with half as many elements."""
     return cuts if len(cuts) < 3 else np.unique(np.append(cuts[::2], cuts[-1]))

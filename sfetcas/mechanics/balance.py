@@ -1,6 +1,6 @@
-"""Balance of nodes: reactions, what springs and small members do, and moments inside rigid members.
+"""Balance of nodes: reactions of supports, forces of springs and small members, moments inside rigid members.
 
-Every force and moment here is what one thing takes from its surroundings; at a node they add up to the load and
+Every force and moment here is what one term takes from its surroundings; at a node they add up to the load and
 the reaction, see :mod:`~sfetcas.mechanics.reactions`.
 """
 
@@ -27,7 +27,18 @@ GROUPS = 64
 
 @dataclass(frozen=True)
 class SpringState:
-    """A spring at a state: angle (rad) and moment (N m), or elongation (m) and force (N), on the second party."""
+    """The state of a spring; force and moment act on its second party.
+
+    Attributes
+    ----------
+    rotational : bool
+    travel : float
+        Angle, rad; elongation, or displacement along its direction, m.
+    effort : float
+        Moment, N m, or force, N.
+    stop : float or None
+        Moment or force of its stop, zero while it is not reached; None without a stop.
+    """
 
     rotational: bool
     travel: float
@@ -35,24 +46,24 @@ class SpringState:
     stop: float | None = None
 
     def to_dict(self) -> dict[str, float]:
-        """As in the JSON answer; ``stop`` is what a stop does, zero while it is not reached."""
+        """The spring with the keys of the JSON answer: ``angle``, ``moment`` or ``travel``, ``force``; ``stop``."""
         names = ("angle", "moment") if self.rotational else ("travel", "force")
         found = dict(zip(names, (self.travel, self.effort), strict=True))
         return found if self.stop is None else {**found, "stop": self.stop}
 
 
 def three(a: Array) -> Array:
-    """Vectors (..., 2) or (..., 3) as (..., 3)."""
+    """Vectors (..., 2) of the plane, or (..., 3), with three components (..., 3)."""
     return a if a.shape[-1] == 3 else np.concatenate([a, np.zeros((*a.shape[:-1], 1))], axis=-1)
 
 
 class Balance:
-    """The balance of one state, dimensionless.
+    """The balance of one state; dimensionless and with three components unless said otherwise.
 
     Parameters
     ----------
     places : ndarray (places, axes)
-        Displacements.
+        Displacements of the places, dimensionless.
     """
 
     def __init__(self, equations: Equations, state: State, loading: Loading, places: Array) -> None:
@@ -86,7 +97,7 @@ class Balance:
         return self._three(moments), three(forces.reshape(-1, axes))
 
     def reaction(self, node: str) -> tuple[Array, Array]:
-        """Force and moment about the node that the ground exerts."""
+        """Force (3,) and moment about the node (3,) that the ground exerts on it."""
         moments, forces = self._left
         force = self._reactions.pushed(node) @ forces[self.model.segments.place(node)]
         if self._reactions.shared(node):
@@ -94,7 +105,7 @@ class Balance:
         return force, sum((held @ moments[turn] for turn, held in self._reactions.turned(node)), np.zeros(3))
 
     def held(self, number: int, moment: Array) -> Array:
-        """The share of a moment on a rotation that the ground holds: about what is free nothing does."""
+        """The part of a moment (3,) on a rotation that the ground takes: none about axes that are free."""
         return self._reactions.held(number) @ moment
 
     def starting_moments(self, elements: slice) -> Array:
@@ -102,7 +113,7 @@ class Balance:
         return self._three(self._shares[0][elements, : self._turns])
 
     def start_moment(self, member: str) -> Array:
-        """Moment that the surroundings exert on the first end of a member of elements."""
+        """Moment (3,) that the surroundings exert on the first end of a flexible or rigid member."""
         if self.model.scene.members[member].type == "rigid":
             return self._rigid["member", member]
         first = self.model.beams.first[member]
@@ -114,14 +125,14 @@ class Balance:
         return {key: self._three(found) for key, found in self._reactions.rigid.solved(self._cells).items()}
 
     def spring_moment(self, node: str) -> Array:
-        """Moment that rotational springs at a node take from its surroundings."""
+        """Moment (3,) that rotational springs at a node take from it."""
         found = [self._cells[cells] for cells in self._reactions.connected(node)]
         return self._three(np.sum(found, axis=0)) if found else np.zeros(3)
 
     # -- springs and small members ----------------------------------------------------------------
 
     def spring(self, name: str) -> SpringState:
-        """Angle and moment, or travel and force, and what its stop does, in SI units."""
+        """State of a spring, in SI units."""
         found, record = self.answers("springs", name), self.model.scene.springs[name]
         state = SpringState("angle" in found, *found.values())
         if record.stop is None:
@@ -132,7 +143,7 @@ class Balance:
         return replace(state, stop=effort)
 
     def answers(self, table: str, name: str) -> dict[str, float]:
-        """What connections of a name tell under the keys of the answer, in SI units."""
+        """Quantities that the terms of a record (``table``, ``name``) add to the answer, by key, in SI units."""
         found: dict[str, float] = {}
         for number, i in connections_of(self.model.connections, table, name):
             units = self.model.connections[number].kind.answers
@@ -150,7 +161,7 @@ class Balance:
         return batch(state.q, self._places, state.wound, self._loading.loads[number], lam)[0]
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:
-        """Force and moment that the surroundings exert on each end of a small member."""
+        """Force (3,) and moment (3,) that the surroundings exert on each end of a small member."""
         number, i = next(connections_of(self.model.connections, "members", member))
         count, width = self.model.connections[number].places.shape[1], self._turns
         moments, forces = np.split(self._shares[number + 1][i], [count * width])

@@ -1,4 +1,4 @@
-"""Functions of single terms applied to all terms of a group at once, in numbers."""
+"""CasADi functions of a single term evaluated numerically for all terms of a group at once."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ __all__ = ["GroupBatch", "at_rest"]
 
 
 def at_rest(element: Element, count: int) -> Array:
-    """Rotations (count, components) of the undeformed scene."""
+    """Rotations (count, components) of the undeformed scene: identity quaternions, or zero angles."""
     rest = np.zeros((count, element.components))
     rest[:, 0] = 1.0 if element.space else 0.0
     return rest
 
 
 class GroupBatch:
-    """A function (q, u, data, load, lam) of a term, for all terms of a group or all quantities of one kind.
+    """A function (q, u, data, load, lam) of a single term, evaluated for all terms of a group.
 
     Parameters
     ----------
     model : Model
     group : Acting
-        What acts on which rotations and places, and its data.
+        The rotations and places that the terms connect, and their data.
     function : Function
     angles : slice or ndarray, optional
-        Which counted angles of a state stand last in the data, see :class:`~sfetcas.mechanics.winding.Winding`.
+        Numbers of the turn-counting angles that stand last in the data, see
+        :class:`~sfetcas.mechanics.winding.Winding`.
     """
 
     def __init__(self, model: Model, group: Acting, function: ca.Function, angles: slice | Index | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Units of a model, and what the elements of its members are made of."""
+"""Units of a model, and the data of its elements."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Beams", "Scales", "beams_of", "load_size", "scales_of"]
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of a model: length (m), force (N) and moment or energy (N m)."""
+    """Units of a model, by which its dimensionless numbers are multiplied: length (m), moment or energy (N m)."""
 
     length: float
     moment: float
@@ -29,24 +29,25 @@ class Scales:
         return self.moment / self.length
 
     def of(self, unit: str) -> float:
-        """What a dimensionless number is times, in a unit of an answer: ``m``, ``N``, ``N m``, ``J`` or ``rad``."""
+        """The SI value of the dimensionless number 1 of a quantity in ``m``, ``N``, ``N m``, ``J`` or ``rad``."""
         return {"m": self.length, "N": self.force, "N m": self.moment, "J": self.moment, "rad": 1.0}[unit]
 
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """What the elements of all members are made of, dimensionless.
+    """Data of the elements of all flexible and rigid members, dimensionless.
 
     Attributes
     ----------
     stiffness : ndarray (elements, points, stiffnesses)
-        Stiffness times weight over length, fixed axes of the undeformed scene.
+        Stiffness times weight over length at the integration points, fixed axes of the undeformed scene: the upper
+        triangle of a symmetric 3 x 3 matrix, in the plane one number.
     tangent : ndarray (elements, points, axes)
         Tangent of the unloaded centre line times weight times length.
     weight : ndarray (elements, points)
-        Weight times length.
+        Weight of the integration point times length of the element.
     first : dict
-        Number of the first element of a member.
+        Number of the first element of each member.
     """
 
     stiffness: Array
@@ -56,7 +57,7 @@ class Beams:
 
 
 def scales_of(scene: Scene) -> Scales:
-    """Units that suit a scene: its longest member and its largest stiffness."""
+    """Units for a scene, from its longest member and its largest stiffness (else from springs, else from loads)."""
     length = max(line.length for line in scene.center_lines.values())
     x = np.linspace(0.0, 1.0, 5)
     found = []
@@ -72,7 +73,7 @@ def scales_of(scene: Scene) -> Scales:
 
 
 def load_size(scene: Scene, length: float) -> float:
-    """Size of the loads as moments, N m, over a length in m; zero where there are none."""
+    """Magnitude of the loads as moments, N m, with a length in m as lever; zero without loads."""
     # No squares: a load may be as large as any number.
     forces, moments, spread = (
         [math.hypot(*load.vector) for load in scene.loads.values() if load.type == kind]
@@ -89,7 +90,7 @@ def load_size(scene: Scene, length: float) -> float:
 
 
 def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
-    """Data of the elements of all members but the small ones, which have none."""
+    """Data of the elements of all members; small members have no elements."""
     stiffness, tangent, weight = [], [], []
     first: dict[str, int] = {}
     count = 0

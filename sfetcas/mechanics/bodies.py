@@ -1,16 +1,16 @@
-"""Small members as bodies: stiffness, deformations that do not exist, and levers of their loads.
+"""Small members as superelements: stiffness, constraints of inextensibility, and consistent loads.
 
 From a section the stiffness is that of linear beam theory, inextensible and unshearable as the flexible members
-are, of any shape and any variation along it.  With the first end held, a wrench at the second moves that by
+are, of any shape and any variation along it.  With the first end clamped, a wrench at the second moves that by
 
     C = int B^T D^-1 B ds,      B the moment at s of a unit wrench at the end,
 
 exactly up to quadrature; the stiffness is the inverse of C where it has one, and what C cannot move (the length
-of a straight member) are rows.
+of a straight member) becomes constraint rows.
 
 Loads along a member are a profile times a vector fixed in space.  What they do to a body in a frame is given by
-their sum, their first moment, and consistent forces at its ends: those that hold the ends still.  These are the
-transpose of the shapes that the ends give the member.
+their sum, their first moment, and consistent forces at its ends, with the opposite sign of the clamping forces.  These
+are the transpose of the shape functions of the ends.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ and so many at least that none turns by more than a quarter of a radian."""
 
 @dataclass(frozen=True, eq=False)
 class Lever:
-    """A load profile along a body, in the fixed axes of the undeformed scene.
+    """A load profile along a small member, in the fixed axes of the undeformed scene.
 
     Attributes
     ----------
     total : float
-        Its integral, m (kg where the profile is a mass per length).
+        Integral of the profile, m (kg where the profile is a mass per length).
     first : ndarray (3,)
-        Its first moment about the first node.
+        First moment about the first node, m2 (kg m).
     ends : ndarray (3, 6 n)
-        For a unit vector along each axis the consistent forces and moments at the nodes.
+        For a unit vector along each axis the consistent forces and moments at the n nodes.
     """
 
     total: float
@@ -64,14 +64,15 @@ class BodyData:
     Attributes
     ----------
     rest : ndarray (n, 3)
-        Nodes from the first one.
+        Positions of the nodes relative to the first one, m.
     stiffness : ndarray (6 n, 6 n)
+        Stiffness matrix in displacements and rotations of the nodes; N/m, N, N m.
     stiff : ndarray (rows, 6 n)
-        Deformations that do not exist, unit rows with rotations times the size of the body.
+        Deformations that are constrained to zero, as unit rows, with rotations times the size of the body.
     weight : Lever or None
-        Mass; None where none is given.
+        Distribution of mass; None where none is given.
     mass : ndarray (6 n, 6 n) or None
-        Condensed mass; None without one.
+        Condensed mass matrix; None without one.
     """
 
     rest: Array
@@ -83,7 +84,7 @@ class BodyData:
 
 @kept(64)
 def body_of(scene: Scene, name: str) -> BodyData:
-    """The body of a small member."""
+    """Stiffness, constraints and loads of a small member."""
     member = scene.members[name]
     places = numbers([scene.nodes[n].position for n in member.nodes])
     rest = places - places[0]
@@ -101,7 +102,7 @@ def body_of(scene: Scene, name: str) -> BodyData:
 
 
 def own_axes(scene: Scene, name: str) -> Array:
-    """Section axes of a member at its start as columns, (3, 3)."""
+    """Section axes b1, b2, b3 of a member at its start as columns of a rotation matrix (3, 3)."""
     return numbers(quaternion.matrix(scene.center_lines[name].quaternions(np.array([0.0])))[0])
 
 
@@ -116,7 +117,7 @@ def _lever_of_mass(mass: Array, rest: Array) -> Lever:
 
 
 def quadrature(scene: Scene, name: str) -> tuple[Array, Array]:
-    """Places (fractions of the length) and weights along a member, in panels without kinks."""
+    """Quadrature points (n,), as fractions of the length, and weights (n,) along a member, on panels without kinks."""
     edges, (x, w) = _edges(scene, name), gauss(POINTS)
     lengths = np.diff(edges)[:, None]
     return (edges[:-1, None] + x * lengths).ravel(), (w * lengths).ravel()
@@ -153,7 +154,10 @@ def _moments_of_wrench(arm: Array) -> Array:
 
 
 def compliance_along(scene: Scene, name: str, x: Array) -> Array:
-    """Inverse of the stiffness against bending and twist in the fixed axes, (n, 3, 3); zero about missing axes."""
+    """Compliance against bending and twist, 1/(N m2), in the fixed axes at fractions x, (n, 3, 3).
+
+    It is zero about axes that have no stiffness in the scene.
+    """
     member, line = scene.members[name], scene.center_lines[name]
     values = scene.sections[str(member.section)].stiffness(x)
     inverse = np.where(np.isnan(values), 0.0, 1.0 / values)
@@ -215,10 +219,10 @@ def _cross_all(r: Array) -> Array:
 
 
 def shapes_along(scene: Scene, name: str, x: Array) -> Array:
-    """Displacement and rotation at places x by those of the ends of a member with a section, (n, 6, 12).
+    """Shape functions (n, 6, 12): displacement and rotation at fractions x by those of the two ends.
 
-    With the first end held, a wrench at the second one moves a place as by Betti a force there moves the second end.
-    What the ends cannot do against each other moves no place.
+    With the first end clamped, a wrench at the second one moves a place as by Betti a force there moves the second end.
+    Motions of the ends that are constrained to zero move no place.
     """
     line = scene.center_lines[name]
     places, end = line.positions(x), line.positions(np.array([1.0]))[0]
@@ -237,7 +241,7 @@ def shapes_along(scene: Scene, name: str, x: Array) -> Array:
 
 
 def lever_along(scene: Scene, name: str, profile: Array, x: Array, w: Array) -> Lever:
-    """Lever of a profile at places x with weights w (fractions of the length) along a member with a section."""
+    """Consistent loads of a profile at fractions x with quadrature weights w along a member that has a section."""
     line = scene.center_lines[name]
     share = profile * w * line.length
     first = share @ (line.positions(x) - line.positions(np.array([0.0]))[0])

@@ -1,12 +1,12 @@
 """Inertia of small members: masses of linear beam theory, or condensed ones, and how deformations displace them.
 
-A body is taken as particles that its freedoms ``w`` (displacements and rotations at its nodes) displace linearly.
-Rigid motions and small deformations, and the centrifugal forces on these, know of the particles
+A body is taken as particles that its degrees of freedom ``w`` (displacements and rotations of its nodes) displace
+linearly.  Rigid motions and small deformations, and the centrifugal forces on these, depend on the particles by
 
     sum m,   sum m x,   sum m x x^T,   sum m d(w),   sum m x d(w)^T,   sum m |d(w)|^2 = w^T M w.
 
 From a section all follow by quadrature; rotary inertia is that of particles on the section axes with Euler's weights.
-Of a condensed mass only M is known, and with it all but the symmetric part of ``sum m x d^T``, which tells of
+Of a condensed mass only M is known, and with it all but the symmetric part of ``sum m x d^T``, which determines
 centrifugal forces that strain the body.  A strain is taken to displace particles as it displaces the nodes, which is
 true of lumped masses and of all finite elements without rotations at their nodes that pass the patch test.
 """
@@ -35,18 +35,19 @@ class BodyMass:
     Attributes
     ----------
     rest : ndarray (n, 3)
-        Nodes from the first one.
+        Positions of the nodes relative to the first one, m.
     mass : float
+        kg.
     centre : ndarray (3,)
-        From the first node.
+        Centre of mass relative to the first node, m.
     spread : ndarray (3, 3)
-        Sum of ``m x x^T`` about the centre.
+        Sum of ``m x x^T`` about the centre, kg m2.
     shift : ndarray (3, 6 n)
-        Displacement of the centre by the freedoms.
+        Displacement of the centre by the degrees of freedom.
     shear : ndarray (3, 3, 6 n)
-        Sum of ``m x_a d_b`` about the centre, by the freedoms.
+        Sum of ``m x_a d_b`` about the centre, by the degrees of freedom.
     matrix : ndarray (6 n, 6 n)
-        The mass matrix.
+        The mass matrix; kg, kg m, kg m2.
     """
 
     rest: Array
@@ -59,12 +60,12 @@ class BodyMass:
 
 
 def euler_weights(inertia: Array) -> Array:
-    """Weights of the axes (..., 3) for moments of inertia (..., 3) about them."""
+    """Weights of axes (..., 3) as particles that have the moments of inertia (..., 3) about them, in the same unit."""
     return np.asarray(0.5 * inertia.sum(axis=-1, keepdims=True) - inertia)
 
 
 def body_mass(scene: Scene, name: str) -> BodyMass | None:
-    """Inertia of a small member; None where it has no mass."""
+    """Inertia of a small member; None for one without mass."""
     body = body_of(scene, name)
     if body.weight is None or body.weight.total <= 0.0:
         return None

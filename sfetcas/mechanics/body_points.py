@@ -40,12 +40,14 @@ __all__ = ["BodyPoints", "points_of"]
 @final
 @dataclass(frozen=True)
 class BodyPoints(Term):
-    """Points and numbers of a small member; data: rest vectors (nodes x axes), [x B] of each point, N, by columns.
+    """Points and numbers that carry the inertia of a small member, see the module.
+
+    Data: positions of the nodes (nodes x axes), [x B] of each point, N, by columns; dimensionless.
 
     Attributes
     ----------
     nodes, points, numbers : int
-        How many macro-nodes, points and numbers.
+        Number of nodes of the member, of points and of numbers.
     """
 
     from_place: ClassVar[bool] = True
@@ -56,7 +58,7 @@ class BodyPoints(Term):
 
     @property
     def vectors(self) -> int:
-        """The points; numbers have no momentum."""
+        """Number of points; only these have momentum."""
         return self.points
 
     @property
@@ -72,7 +74,7 @@ class BodyPoints(Term):
         return self.nodes, self.nodes, self.axes * self.points + self.numbers, data, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The points as they are now, the first from the place of the first node in the undeformed scene; numbers."""
+        """Displaced points, relative to the undeformed first node, then the numbers."""
         body, axes = self._body, self.axes
         frame, e = body.frame(q), body.deformation(q, u, data[: axes * self.nodes])
         carried, width, found = ca.vertcat(1.0, e), axes * (1 + e.numel()), []

@@ -1,13 +1,13 @@
-"""What the loads can ask of each member at most, before anything is solved: for the first mesh.
+"""Upper estimates of the force and moment in each member before anything is solved, for the choice of the first mesh.
 
 Forces are in balance at every node, so the forces in the members are a flow from the loads to the ground.  In a tree
-that is the whole truth: a member carries what acts beyond it.  In a structure with loops the members share the
-loads, and how is known only when it is solved; the flow in which all members resist alike says of which size the
-shares are.  Loops carry forces of their own beside it, as the middle of a rope does that carries loads at its ends:
-a member of loops is taken to carry several times the largest share of any member of them.  Guides and springs close
-loops, but the flow does not end in them, as it might not in truth.
+this determines them: a member carries what acts beyond it.  In a structure with loops the distribution is known only
+when it is solved; the flow for equal resistances of all members gives the magnitude of the shares.  Loops carry forces
+of their own beside it, as the middle of a rope does that carries loads at its ends: a member of loops is taken to carry
+several times the largest share of any member of them.  Guides and springs close loops, but the flow does not end in
+them, as it might not in truth.
 
-Sizes are added up whatever their directions, as loads may turn.
+Magnitudes are added up whatever the directions, as loads may turn.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ GROUND = 0
 
 @dataclass(frozen=True)
 class Carried:
-    """Sizes of the force (N) and of the moment (N m) that reach a member."""
+    """Magnitude of the force (N) and of the moment (N m) in a member."""
 
     force: float
     moment: float
 
 
 def carried(scene: Scene) -> dict[str, Carried]:
-    """What each member is taken to carry: forces at the largest factor of the analysis, moments at the factor 1."""
+    """Estimates for each member: forces at the largest factor of the analysis, moments at factor 1."""
     number = {name: i + 1 for i, name in enumerate(scene.nodes)}
     acting = _Acting(scene, number)
     own, at_nodes = acting.along, acting.at_nodes

@@ -49,19 +49,19 @@ __all__ = ["anchored", "body_numbers", "connections_in", "connections_of", "free
 
 
 def connections_in(parts: Parts) -> Iterator[One]:
-    """Joints, driven joints, springs, small members and springs that stand at a stop."""
+    """Terms of joints, driven joints, springs, small members and active stops."""
     maker = _Maker(parts.scene, parts.segments, parts.rotations, parts.element.space, parts.scales)
     yield from maker.all()
     yield from maker.stops(parts.mesh)
 
 
 def touches_in(parts: Parts) -> Iterator[One]:
-    """What touches obstacles."""
+    """Terms of contacts with obstacles."""
     yield from _Toucher(parts.scene, parts.mesh, parts.segments, parts.rotations, parts.element, parts.scales).all()
 
 
 def connections_of(groups: Sequence[Group], table: str, name: str) -> Iterator[tuple[int, int]]:
-    """Groups that have what a name of a table of the scene stands for, and its number in each."""
+    """For each group with terms of the record ``name`` in ``table``: number of the group, number of the term in it."""
     for number, group in enumerate(groups):
         if group.kind.table == table and name in group.names:
             yield number, group.names.index(name)
@@ -347,14 +347,14 @@ class _Toucher:
 
 
 def anchored(scene: Scene, touch: Touch, stop: Obstacle) -> bool:
-    """Whether a place of a stretch has to be put on the obstacle: no support holds an end of it there."""
+    """Whether the end of a contact stretch needs a constraint onto the obstacle: not where a support fixes it there."""
     nodes = scene.members[touch.member].nodes
     ends = [nodes[int(at)] for at in touch.places if at in (0.0, 1.0)]
     return all(takes_part(end, scene.nodes[end], scene.motions.values(), stop) for end in ends)
 
 
 def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, int]:
-    """Data of :class:`~sfetcas.mechanics.joints.Body` and its number of rows."""
+    """Data (numbers,) of :class:`~sfetcas.mechanics.joints.Body`, dimensionless, and its number of constraint rows."""
     chosen = freedoms(len(body.rest), space)
     unit = np.tile([scales.length] * 3 + [1.0] * 3, len(body.rest))
     stiffness = (body.stiffness * unit[:, None] * unit[None, :] / scales.moment)[np.ix_(chosen, chosen)]
@@ -367,6 +367,6 @@ def body_numbers(body: BodyData, space: bool, scales: Scales) -> tuple[Array, in
 
 
 def freedoms(nodes: int, space: bool) -> Index:
-    """Of six freedoms a node those that a model has: all, or x, y and about z."""
+    """Indices, among six degrees of freedom a node, of those of a model: all, or in the plane x, y and about z."""
     each = np.arange(6) if space else np.array([0, 1, 5])
     return (6 * np.arange(nodes)[:, None] + each).ravel()

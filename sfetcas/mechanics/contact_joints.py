@@ -1,6 +1,6 @@
-"""What touching an obstacle asks of places and sections: rows that keep them on it, and the energy of soft cushions.
+"""Terms of contact with obstacles: constraints that keep places and sections on an obstacle, and penalty energies.
 
-Connections as joints are, see :mod:`~sfetcas.mechanics.joints`.
+They are terms as joints are, see :mod:`~sfetcas.mechanics.joints`.  All data are dimensionless.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CENTRE = 1e-60
 @final
 @dataclass(frozen=True)
 class OnPlane(Term):
-    """A place on a plane; data: its normal, the gap in the undeformed scene."""
+    """Constraint: a place lies on a plane; data: unit normal, gap in the undeformed scene."""
 
     on_face: ClassVar[bool] = True
 
@@ -47,7 +47,7 @@ class OnPlane(Term):
 @final
 @dataclass(frozen=True)
 class OnRound(Term):
-    """A place on a circle, cylinder or sphere; data: projection across the axis, centre to place, radius, sign."""
+    """Constraint: a place lies on a circle, cylinder or sphere; data: projection, centre to place, radius, sign."""
 
     on_face: ClassVar[bool] = True
 
@@ -64,30 +64,30 @@ class OnRound(Term):
 @final
 @dataclass(frozen=True)
 class CushionedPlane(Term):
-    """A place that a cushion keeps off a plane; data: as of a place on it, stiffness, thickness."""
+    """Penalty contact of a place with a plane; data: those of :class:`OnPlane`, stiffness, thickness."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """No row."""
+        """No constraint row."""
         return 0, 1, 0, self.axes + 3, 0
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """That of the cushion."""
+        """Penalty energy."""
         return _cushion(_gap_of_plane(u[0], data), data[self.axes + 1 :])
 
 
 @final
 @dataclass(frozen=True)
 class CushionedRound(Term):
-    """A place that a cushion keeps off something round; data: as of a place on it, stiffness, thickness."""
+    """Penalty contact of a place with something round; data: those of :class:`OnRound`, stiffness, thickness."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """No row."""
+        """No constraint row."""
         return 0, 1, 0, self.axes * self.axes + self.axes + 4, 0
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """That of the cushion."""
+        """Penalty energy."""
         return _cushion(_gap_of_round(u[0], data), data[self.axes * self.axes + self.axes + 2 :])
 
 
@@ -115,10 +115,10 @@ def _cushion(gap: ca.SX, data: ca.SX) -> ca.SX:
 @final
 @dataclass(frozen=True)
 class OnEdge(Term):
-    """A place whose section passes an edge at no distance; data: edge, undeformed tangent, edge to place, side.
+    """Constraint: a section touches an edge; data: edge direction, undeformed tangent, edge to place, side.
 
-    The distance counts across the edge and the tangent of the section.  It is the gap where the place is the one
-    nearest to the edge, and then the force goes through the place.
+    The gap is measured across the edge and the tangent of the section.  It is the distance where the place is the one
+    nearest to the edge, and then the contact force acts at the place.
     """
 
     @property
@@ -138,7 +138,7 @@ class OnEdge(Term):
 @final
 @dataclass(frozen=True)
 class Along(Term):
-    """A section whose tangent lies in a plane; data: the normal of the plane, the tangent in the undeformed scene."""
+    """Constraint: the tangent of a section lies in a plane; data: normal of the plane, undeformed tangent."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -154,7 +154,7 @@ class Along(Term):
 @final
 @dataclass(frozen=True)
 class AlongRound(Term):
-    """A section tangential to a circle about its centre; data: centre to place, tangent.  Plane only."""
+    """Constraint: a section is tangential to a circle; data: centre to place, undeformed tangent.  Plane only."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -171,7 +171,7 @@ class AlongRound(Term):
 @final
 @dataclass(frozen=True)
 class Bent(Term):
-    """Two rotations whose difference is prescribed by a circle between them; data: the angle.  Plane only."""
+    """Constraint: the difference of two rotations, given by a circle between them; data: angle, rad.  Plane only."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -179,5 +179,5 @@ class Bent(Term):
         return 2, 0, 1, 1, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The difference less what it shall be."""
+        """The difference of the angles less the given one."""
         return [q[1][0] - q[0][0] - data]

@@ -10,10 +10,10 @@ With ``q`` this rotation, ``kappa_0`` and ``t_0`` curvature and tangent of the u
 so that an undeformed element of any shape has exactly no strain and no displacement.  For a straight member
 this is the interpolation of the source; for a curved one it interpolates the smaller of the two rotations.
 
-Of each integration point an element is told the stiffness (times weight over length, in the fixed axes of the
-undeformed scene), the tangent (unit tangent of the unloaded centre line times weight times length) and the
-pull (minus the internal force) that loads cause: its energy is the strain energy plus ``sum pull.(R(q) - I) tangent``.
-Its row is the chord that it gains, ``sum (R(q) - I) tangent``, whose multiplier is the constant part of the pull.
+The data of an integration point are the stiffness (times weight over length, in the fixed axes of the undeformed
+scene), the tangent (unit tangent of the unloaded centre line times weight times length) and the pull (minus the
+internal force) that loads cause: the energy is the strain energy plus ``sum pull.(R(q) - I) tangent``.  The row of an
+element is the change of its chord, ``sum (R(q) - I) tangent``, whose multiplier is the constant part of the pull.
 
 Two ways to integrate: *at the nodes* (Lobatto), where ``q`` is exactly unit and everything is polynomial, and
 *Gauss*, with the interpolated quaternion divided by its norm.  Both are of order 2p at the element ends.
@@ -41,14 +41,14 @@ __all__ = ["ELEMENTS", "Element", "element_by_name"]
 @final
 @dataclass(frozen=True)
 class Element(Term):
-    """One element type: order, integration and dimension; everything else follows and is made once.
+    """A type of element: order, integration and dimension; everything else follows from these and is made once.
 
     Attributes
     ----------
     order : int
         Polynomial order p of the interpolation; the element has p + 1 nodes.
     gauss : bool
-        Integration on p + 1 Gauss points with the norm divided out instead of at the nodes.
+        Integration at p + 1 Gauss points of the normalised interpolation instead of at the nodes.
     """
 
     order: int
@@ -56,18 +56,18 @@ class Element(Term):
 
     @property
     def name(self) -> str:
-        """The name of scene files: SFET2, SFET3, ..."""
+        """The name in scene files: SFET2, SFET3, ..., by the number of nodes."""
         return f"SFET{self.order + 1}"
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """A rotation at each node; data: stiffnesses and tangents of all points, load: their pulls."""
+        """A rotation at each node; data: stiffnesses and tangents of all integration points; load: their pulls."""
         n = self.order + 1
         return n, 0, self.axes, n * (self.stiffnesses + self.axes), n * self.axes
 
     @property
     def stiffnesses(self) -> int:
-        """Numbers of a stiffness a point: the upper triangle of a symmetric 3 x 3 matrix, or one number."""
+        """Numbers of stiffness at a point: 6, the upper triangle of a symmetric 3 x 3 matrix, or 1 in the plane."""
         return 6 if self.space else 1
 
     @functools.cached_property
@@ -97,7 +97,7 @@ class Element(Term):
     # -- what it says ---------------------------------------------------------------------------------
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Strain energy, and the work that the pull of loads has still to do."""
+        """Strain energy, plus the potential of the loads by their pulls."""
         stiffness, tangent = self.split(data)
         pull = ca.reshape(load, self.axes, self.order + 1)
         here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
@@ -108,14 +108,14 @@ class Element(Term):
         return energy
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The vector from the first to the last node less that of the undeformed element."""
+        """Change of the chord, the vector from the first to the last node, since the undeformed scene."""
         tangent = self.split(data)[1]
         here = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
         gained = [self._tangent(here[:, k], tangent[:, k]) - tangent[:, k] for k in range(self.order + 1)]
         return ca.vertsplit(sum(gained[1:], gained[0]))
 
     def split(self, data: Any) -> tuple[Any, Any]:
-        """Stiffnesses and tangents of the points, a column each."""
+        """Stiffnesses and tangents of the points from the data, a column for each point."""
         n = self.order + 1
         stiffness, tangent = ca.vertsplit(data, [0, n * self.stiffnesses, data.shape[0]])
         return ca.reshape(stiffness, self.stiffnesses, n), ca.reshape(tangent, self.axes, n)
@@ -157,7 +157,7 @@ class Element(Term):
 
     @functools.cached_property
     def turned(self) -> ca.Function:
-        """(q, tangent) -> turned tangents of the points, (axes, p + 1)."""
+        """``(q, tangent) ->`` rotated tangents of the points, (axes, p + 1)."""
         n = self.order + 1
         q, tangent = ca.SX.sym("q", self.components, n), ca.SX.sym("tangent", self.axes, n)
         here = self._at_points(q)[0]
@@ -169,7 +169,7 @@ class Element(Term):
     # by constant matrices, are a tenth of the code, and as fast.
 
     def turning(self) -> ca.Function:
-        """As of any term, in space from those of the points."""
+        """As :meth:`Term.turning`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().turning()
         symbols, q, stiffness, tangent, load, pull = self._large_symbols()
@@ -191,7 +191,7 @@ class Element(Term):
         return self._function("turning", symbols, results)
 
     def turning_forces(self) -> ca.Function:
-        """As of any term, in space from those of the points."""
+        """As :meth:`Term.turning_forces`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().turning_forces()
         symbols, q, stiffness, tangent, _, pull = self._large_symbols()
@@ -200,7 +200,7 @@ class Element(Term):
         return self._function("forces", symbols, {"rows": ca.sum2(tangents - tangent), "gradient": ca.densify(moments)})
 
     def slopes(self) -> ca.Function:
-        """As of any term, in space from those of the points."""
+        """As :meth:`Term.slopes`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().slopes()
         symbols, q, stiffness, tangent, load, _ = self._large_symbols()
@@ -209,7 +209,7 @@ class Element(Term):
         return self._function("slopes", symbols[:4], results)
 
     def curvatures(self) -> ca.Function:
-        """As of any term, in space from those of the points."""
+        """As :meth:`Term.curvatures`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().curvatures()
         symbols, q, stiffness, tangent, load, _ = self._large_symbols()
@@ -220,10 +220,10 @@ class Element(Term):
 
     @functools.cached_property
     def convex(self) -> ca.Function:
-        """(q, u, data, load, lam) -> a positive matrix in place of the stiffness of :meth:`turning`.
+        """``(q, u, data, load, lam) ->`` a positive semidefinite substitute for the stiffness of :meth:`turning`.
 
-        Of the strain energy the share of the first derivatives of the curvature (Gauss and Newton), exact in the plane;
-        of the pull what it resists where it is tension, and as much where it is compression, about both normals.
+        Of the strain energy it has the Gauss-Newton part, which in the plane is exact.  Of the internal force it has
+        the geometric stiffness of its axial part about both normals, with the sign of tension also in compression.
         """
         symbols, q, stiffness, tangent, _, pull = self._large_symbols()
         if self.space:
@@ -365,5 +365,5 @@ ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))
 
 @functools.cache
 def element_by_name(name: str, space: bool, gauss: bool = False) -> Element:
-    """The element type of a name, made once a process so that its functions are, too."""
+    """The element type of a name; each is made once a process, so that its functions are, too."""
     return Element(space, ELEMENTS.index(name) + 1, gauss)

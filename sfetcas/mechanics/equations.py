@@ -1,11 +1,11 @@
 """The stationarity equations of a model in rotations about the fixed axes, and their Newton matrix.
 
-Unknown changes are a rotation vector for each free rotation (an angle in the plane, one number about the axis
-of a held hinge), the displacements kept as unknowns, and the multipliers of the closings.  Rotations are
-updated by ``q <- exp(phi/2) q``, so that norms hold by construction and need neither rows nor multipliers.
+Unknown increments are a rotation vector for each free rotation (an angle in the plane, one number about the axis of a
+hinge to the ground), the displacement unknowns, and the multipliers of loop closures and joints.  Rotations are updated
+by ``q <- exp(phi/2) q``, so that quaternions keep their norm and need neither constraints nor multipliers.
 
-This is the second, independent form of the problem that IPOPT solves with quaternion components and norms as
-constraints; polish, certificate and continuation stand on it.
+IPOPT solves the same problem in another form, with quaternion components and norms as constraints; Newton's method, the
+certificate and continuation use this one.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ class State:
     ----------
     q : ndarray (rotations, 4 or 1)
         Unit quaternions or angles since the undeformed scene.
-    y : ndarray
-        Displacements kept as unknowns.
-    lam : ndarray
-        Multipliers of the closing rows, then of the hinge rows.
-    wound : ndarray
-        Values near which the angles that count turns are counted, see :class:`~sfetcas.mechanics.winding.Winding`.
+    y : ndarray (displacement unknowns,)
+    lam : ndarray (rows,)
+        Multipliers of the loop closures, then of the rows of joints.
+    wound : ndarray (angles,)
+        Reference values, rad, by which the turns of angles are counted, see
+        :class:`~sfetcas.mechanics.winding.Winding`.
     """
 
     q: Array
@@ -59,19 +59,21 @@ class State:
 
 @dataclass(frozen=True)
 class Point:
-    """The equations at a state.
+    """The equations evaluated at a state, dimensionless.
 
     Attributes
     ----------
     potential, strain : float
         Potential energy (zero for the undeformed, unloaded scene) and its elastic part.
     residual : ndarray (unknowns + rows,)
-        Out-of-balance moments and forces, then closing gaps.
+        Out-of-balance moments and forces, then gaps of the constraints.
     scale : ndarray (unknowns + rows,)
-        What rounding of each residual is judged by: the moments and forces added up at the node, no less than a
-        hundredth of its stiffness; 1 for gaps.
+        Reference for the rounding error of each residual: the sum of the magnitudes of moments and forces at the node,
+        plus a hundredth of its stiffness; 1 for gaps.
     entries : ndarray
         Entries of the Newton matrix, in the order of :attr:`Equations.row` and :attr:`Equations.column`.
+    spin : ndarray (elements, moments of the nodes, axes)
+        Derivatives of the chords of elements by rotations of their nodes.
     """
 
     potential: float
@@ -83,7 +85,20 @@ class Point:
 
 
 class Equations:
-    """The stationarity equations of one model, prepared for repeated evaluation."""
+    """The stationarity equations of one model, prepared for repeated evaluation.
+
+    Attributes
+    ----------
+    unknowns, rows, total : int
+        Number of rotation and displacement unknowns, of constraint rows, and their sum.
+    turning_unknowns, displacement_unknowns : int
+    number : ndarray (rotations, width)
+        Unknown of each component of a rotation, see :class:`~sfetcas.mechanics.tables.Tables`.
+    row, column, diagonal : ndarray
+        Rows and columns of the entries of the Newton matrix; which of them are on the diagonal.
+    noise : ndarray (total,)
+        Reference for rounding errors of each residual in the unloaded scene: a hundredth of stiffness; 1 for gaps.
+    """
 
     def __init__(self, model: Model, *, kernels: Kernels = "auto", evaluations: float = 12.0) -> None:
         self.model = model
@@ -117,12 +132,15 @@ class Equations:
 
     @functools.cached_property
     def elastic_displacements(self) -> Index:
-        """Numbers of the displacement unknowns that springs, bodies and joints act upon."""
+        """Indices of the displacement unknowns that springs, small members and joints act on."""
         return self._acted_upon(lambda group: group.kind.has_potential)
 
     @functools.cached_property
     def worked_displacements(self) -> Index:
-        """The same and those that have entries in the energy: of pressure, which works on what it moves."""
+        """Indices of the displacement unknowns with entries in the second variation.
+
+        Those of :attr:`elastic_displacements`, and with pressure also those that it does work on.
+        """
         every = self.model.conservative and not self.model.has_potential
         return self._acted_upon(lambda group: every or group.kind.has_potential)
 
@@ -137,14 +155,14 @@ class Equations:
         return np.lexsort((self.column, self.row))
 
     def symmetric(self, point: Point) -> Point:
-        """The point with the symmetric part of the Newton matrix, where pressure leaves a mesh's share that is not."""
+        """The point with the symmetric part of the Newton matrix; only under pressure is that another matrix."""
         if self.model.has_potential:
             return point
         return replace(point, entries=0.5 * (point.entries + point.entries[self._transposed]))
 
     @functools.cached_property
     def mass(self) -> Array:
-        """Length that belongs to each turning unknown, for norms that do not depend on the mesh."""
+        """Length of member at each rotation unknown (n,), dimensionless: weights for mesh-independent norms."""
         model = self.model
         lump = np.zeros(len(model.rotations.kind))
         w = model.beams.weight
@@ -164,7 +182,7 @@ class Equations:
 
     @property
     def row_names(self) -> tuple[str, ...]:
-        """Names of the closing and hinge rows."""
+        """Names of the constraint rows: loop closures, then joints."""
         return self.model.row_names
 
     # -- pattern of the Newton matrix -----------------------------------------------------------
@@ -204,14 +222,14 @@ class Equations:
     # -- evaluation -----------------------------------------------------------------------------
 
     def start(self, loading: Loading) -> State:
-        """The undeformed scene with held rotations at their prescribed values."""
+        """The undeformed state, with prescribed rotations at their values."""
         winding = self.model.winding
         wound = winding.prescribed(self.model.rotations.kind, loading)
         wound = np.where(np.isnan(wound), winding.of_vectors(loading.turn), wound)
         return State(self.model.held(loading), np.zeros(self.displacement_unknowns), np.zeros(self.rows), wound)
 
     def holding(self, state: State, loading: Loading) -> State:
-        """The state with held rotations moved to their prescribed values."""
+        """The state with prescribed rotations set to their values."""
         q = np.where((self.model.rotations.kind == Turn.HELD)[:, None], self.model.held(loading), state.q)
         if not self.model.winding.count:
             return replace(state, q=q)
@@ -219,7 +237,7 @@ class Equations:
         return replace(state, q=q, wound=np.where(np.isnan(wound), state.wound, wound))
 
     def segment_pulls(self, lam: Array, loading: Loading) -> Array:
-        """Minus the constant part of the internal force of each segment, (segments, axes)."""
+        """Minus the constant part of the internal force of each segment, (segments, axes), dimensionless."""
         return self._closing_pulls(lam) - self._hanging_pulls(loading)
 
     def _closing_pulls(self, lam: Array) -> Array:
@@ -235,7 +253,10 @@ class Equations:
         )
 
     def displacements(self, state: State, loading: Loading, gained: Array) -> tuple[Array, Array]:
-        """Displacements of the places (places * axes,) and closing gaps, from what the chords of elements gained."""
+        """Displacements of the places (places * axes,) and gaps of the loop closures (closings,), dimensionless.
+
+        ``gained`` (elements, axes) are the changes of the chords of the elements.
+        """
         positions = self.model.positions
         delta = np.add.reduceat(gained, self._first, axis=0).ravel() if len(gained) else np.zeros(0)
         nodal = positions.E @ delta + positions.Y @ state.y + positions.B @ loading.shift
@@ -243,7 +264,7 @@ class Equations:
         return nodal, gap
 
     def kept_places(self, state: State, loading: Loading) -> Array:
-        """Displacements (places, axes) of the places that terms act upon: unknown or prescribed; of others wrong."""
+        """Displacements (places, axes), dimensionless, of kept places (unknown or prescribed); undefined for others."""
         positions = self.model.positions
         moved = positions.Y @ state.y + positions.B @ loading.shift
         return np.asarray(moved.reshape(len(self.model.segments.places), self.model.element.axes))
@@ -260,7 +281,11 @@ class Equations:
         return _Results(found, places, pull + constant[:, None, :])
 
     def at(self, state: State, loading: Loading, *, convex: bool = False) -> Point:
-        """The equations at a state; with ``convex`` the matrices of terms without rows made positive."""
+        """Evaluate the equations at a state.
+
+        With ``convex`` the stiffness matrices of terms without constraint rows are replaced by positive semidefinite
+        ones.
+        """
         positions, turning = self.model.positions, self.turning_unknowns
         results = self._evaluated(state, loading)
         found, force, nodal = results.groups, loading.force.ravel(), results.places.ravel()
@@ -303,7 +328,7 @@ class Equations:
         return found.astype(float, copy=False)
 
     def slope(self, state: State, point: Point, rate: Loading) -> Array:
-        """Derivative of the residual at a state along a change of nodal loads and displacements."""
+        """Derivative of the residual, (unknowns + rows,), along a rate of nodal loads and prescribed displacements."""
         positions = self.model.positions
         hanging = -self._hanging_pulls(rate)[self._owner]
         parts = [np.einsum("eca,ea->ec", point.spin, hanging)]
@@ -323,9 +348,9 @@ class Equations:
         return self.displacements(state, loading, gained)[0]
 
     def shares(self, state: State, loading: Loading) -> list[Array]:
-        """What terms take from their surroundings at a state, dimensionless.
+        """Generalised forces that the terms take from their surroundings at a state, dimensionless.
 
-        Of each group moments on its rotations, then forces on its places, (n, width); none of loads.
+        For each group (n, width): moments on the rotations, then forces on the places; zero for loads.
         """
         found = self._evaluated(state, self.acting(state, loading)).groups
         pairs = zip(found, self.model.terms, strict=True)
@@ -333,11 +358,11 @@ class Equations:
 
     @functools.cached_property
     def reactions(self) -> Reactions:
-        """What the ground exerts, by what terms take."""
+        """Linear maps from the forces of the terms to the reactions of the ground."""
         return Reactions(self.tables)
 
     def node_jacobian(self, state: State, loading: Loading, chosen: Index) -> tuple[Array, Array]:
-        """Chosen displacements of nodes and their derivatives by the unknowns, (chosen, unknowns)."""
+        """Chosen displacement components of nodes (chosen,) and their derivatives (chosen, unknowns), dimensionless."""
         positions, tables = self.model.positions, self.tables
         found = self._evaluated(state, loading).groups[0]
         sides = tables.sides[0]
@@ -355,18 +380,18 @@ class Equations:
         return self.displacements(state, loading, found[2])[0][chosen], jacobian
 
     def elastic_entries(self) -> Array:
-        """Entries of the Newton matrix of the strain energy alone at the undeformed state, without closings."""
+        """Entries of the Newton matrix for the strain energy of the elements alone in the undeformed state."""
         nothing = self.model.loading(0.0, 0.0)
         rest = replace(self.start(nothing), q=at_rest(self.model.element, len(self.model.rotations.kind)))
         pairs = zip(self._terms, self._evaluated(rest, nothing).groups, strict=True)
         return self._matrix([group.entries([*part[:5], 0.0 * part[5]]) for group, part in pairs], ties=0.0)
 
     def effective(self, state: State, loading: Loading) -> Loading:
-        """The loading with what follows the state as it is there."""
+        """The loading with follower loads evaluated at the state, as dead loads."""
         return present(self.model, state.q, loading)
 
     def acting(self, state: State, loading: Loading) -> Loading:
-        """The effective loading, with the centrifugal forces in turning axes."""
+        """The effective loading, in rotating axes with the centrifugal forces."""
         loading, spinning = self.effective(state, loading), self.model.spinning
         if spinning is None:
             return loading
@@ -397,20 +422,20 @@ class Equations:
 
     @functools.cached_property
     def solver(self) -> SparseSolver:
-        """Solver of the Newton matrix."""
+        """Sparse solver for the Newton matrix."""
         symmetric = self.model.has_potential
         return SparseSolver(self.total, self.row, self.column, self.rows, symmetric=symmetric)
 
     def regularised(self, entries: Array, primal: Array, dual: float) -> Array:
-        """Entries of a matrix with a primal and a dual regularisation on its diagonal.
+        """Entries of the Newton matrix with a primal and a dual regularisation on its diagonal.
 
         Parameters
         ----------
         entries : ndarray
         primal : ndarray (n,)
-            Added for the first n unknowns, the turning ones or all.
+            Added to the diagonal of the first n unknowns.
         dual : float
-            Subtracted for all rows.
+            Subtracted from the diagonal of all constraint rows.
         """
         found = entries.copy()
         found[self.diagonal[: len(primal)]] += primal
@@ -418,11 +443,11 @@ class Equations:
         return found
 
     def of_rows(self, entries: Array) -> Array:
-        """Of the entries of a matrix the derivatives of the rows, and zero in the place of all others."""
+        """Entries of the Newton matrix that belong to the Jacobian of the constraints; zero in place of all others."""
         return np.where((self.row >= self.unknowns) != (self.column >= self.unknowns), entries, 0.0)
 
     def spins(self, step: Array) -> Array:
-        """Rotation vectors (rotations, turns) about the fixed axes of a change of the unknowns."""
+        """Rotation vectors (rotations, turns), rad, fixed axes, of an increment of the unknowns (unknowns or more,)."""
         tables = self.tables
         unknown, weight = (
             part[: tables.of_places].reshape(self.number.shape) for part in (tables.unknown, tables.weight)
@@ -431,7 +456,7 @@ class Equations:
         return np.asarray((np.append(step[: self.turning_unknowns], 0.0)[unknown] * weight).reshape(self.number.shape))
 
     def moved(self, state: State, step: Array) -> State:
-        """The state after a step of all unknowns and multipliers."""
+        """The state after an increment (unknowns + rows,) of all unknowns and multipliers."""
         turn = self.spins(step)
         if self.model.space:
             q = quaternion.multiply(quaternion.from_rotation_vector(turn), state.q)
@@ -444,7 +469,7 @@ class Equations:
 
 
 def turned_tangents(model: Model, q: Array) -> Array:
-    """Turned tangents times weight and length at the integration points, (elements, points, axes)."""
+    """Rotated tangents times weight and length at the integration points, (elements, points, axes), dimensionless."""
     element, q = model.element, q[model.rotations.turns]
     if element.gauss:
         q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)

@@ -1,8 +1,8 @@
-"""A model as CasADi expressions of its rotations, displacements and multipliers, with loads and data as they are given.
+"""A model as CasADi expressions of its rotations, displacements and multipliers, with loads and data as arguments.
 
-The form of the equations is that of :class:`~sfetcas.mechanics.equations.Equations`, whose numbers of unknowns it has;
-here all of it is one graph, of which time steps, vibrations and generated code are made.  *Full* coordinates are the
-turns of all rotations, the displacements of all places, and the multipliers, held or not.
+The equations and their unknowns are those of :class:`~sfetcas.mechanics.equations.Equations`; here they form one graph,
+from which time steps, vibrations and generated code are made.  *Full* coordinates are the components of all rotations,
+the displacements of all places, and the multipliers, prescribed or not.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ __all__ = ["LOADS", "Expressions", "Given", "Layout", "SymbolicTerms", "data_of"
 
 @dataclass(frozen=True)
 class Layout:
-    """Numbers of a model: rotations, displacements, multipliers, groups of loads.
+    """Sizes of a model: rotations, displacements, multipliers, groups of loads.
 
     Attributes
     ----------
     components, rotations : int
-        Rotations are (components, rotations).
+        Rotations are an array (components, rotations).
     y, lam, factors : int
-        Displacements, multipliers, and factors of the groups of loads.
+        Number of displacement unknowns, of multipliers, and of factors of the groups of loads.
     near : int
-        Angles that count turns.
+        Number of angles that count turns.
     """
 
     components: int
@@ -52,21 +52,21 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Data and loads of the equations, constant or not, dimensionless; all that is no unknown.
+    """Data and loads of the equations, constant or symbolic, dimensionless: everything that is not an unknown.
 
     Attributes
     ----------
     stiffness, tangent : (stiffnesses, points) and (axes, points) of all elements
     pull : (points * axes,)
-        Minus the internal force that loads cause, forces on places that hang on segments included.
+        Minus the internal force that loads cause, including forces on places whose displacement follows from segments.
     force, shift : (places * axes,)
         Forces on places, prescribed displacements.
     turn : (3 * rotations,)
         Prescribed rotation vectors.
     spread : (points * axes,)
-        Distributed forces that ``pull`` was made of.
+        Distributed forces, from which ``pull`` is computed.
     data, loads : tuples of (data, n) and (loads * n,)
-        Of each group of connections.
+        For each group of connections.
     """
 
     stiffness: ca.MX
@@ -81,16 +81,16 @@ class Given:
 
 
 class SymbolicTerms:
-    """The terms of a model as expressions of rotations, displacements, multipliers and what is given, in either chart.
+    """The terms of a model as expressions of rotations, displacements and multipliers, in either chart of rotations.
 
     Parameters
     ----------
     tables : Tables
         The chart, and the numbers of the unknowns.
     kernels : str
-        Compiled or interpreted functions of terms.
+        ``compiled``, ``interpreted`` or ``auto`` functions of terms.
     calls : float
-        How often they will be called, for ``auto``.
+        Expected number of calls, by which ``auto`` decides.
     """
 
     def __init__(self, tables: Tables, kernels: Kernels = "auto", calls: float = 1e4) -> None:
@@ -101,22 +101,22 @@ class SymbolicTerms:
         self._calls, self._kernels = calls, kernels
 
     def many(self, function: ca.Function, n: int) -> ca.Function:
-        """A function of single things for n of them, compiled where that pays."""
+        """A function of a single term mapped over n terms, compiled where that pays."""
         return chosen(function, self._calls * n, self._kernels).map(n)
 
     # -- linear maps --------------------------------------------------------------------------------
 
     @functools.cached_property
     def reaching(self) -> ca.DM:
-        """What takes the turned tangents of all points to the displacements of the places."""
+        """Matrix from the rotated tangents of all points to the displacements of the places."""
         return self._by_tangents(self.model.positions.E)
 
     def onto_unknowns(self, sides: Index) -> ca.DM:
-        """What takes values on sides to the unknowns."""
+        """Matrix that sums generalised forces on sides into the residual (unknowns + rows,)."""
         return self._onto(sides, absolute=False)
 
     def sizes_onto_unknowns(self, sides: Index) -> ca.DM:
-        """The same of sizes of values."""
+        """As :meth:`onto_unknowns` with absolute weights, to sum magnitudes."""
         return self._onto(sides, absolute=True)
 
     def _onto(self, sides: Index, *, absolute: bool) -> ca.DM:
@@ -137,7 +137,7 @@ class SymbolicTerms:
     # -- where things are -----------------------------------------------------------------------------
 
     def tangents(self, q: ca.MX, given: Given) -> ca.MX:
-        """Turned tangents of all points, (axes, elements * points)."""
+        """Rotated tangents of all points, (axes, elements * points)."""
         element, turns = self.model.element, self.model.rotations.turns
         if element.gauss:
             return self.many(element.turned, self.elements)(q[:, turns.ravel().tolist()], given.tangent)
@@ -145,28 +145,28 @@ class SymbolicTerms:
         return self.many(turned_vector(self.model.space), turns.size)(at_points, given.tangent)
 
     def displacements(self, q: ca.MX, y: ca.MX, given: Given) -> ca.MX:
-        """Displacements of all places."""
+        """Displacements of all places, (places * axes,)."""
         moved = self.kept_places(y, given)
         if not self.reaching.nnz():
             return moved
         return moved + times(self.reaching, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
 
     def kept_places(self, y: ca.MX, given: Given) -> ca.MX:
-        """Displacements of the places that terms act upon, unknown or prescribed; of others wrong."""
+        """Displacements of kept places (unknown or prescribed), (places * axes,); undefined for others."""
         positions = self.model.positions
         return times(constant(positions.Y), y) + times(constant(positions.B), given.shift)
 
     def open_gaps(self, y: ca.MX, given: Given) -> ca.MX:
-        """The share of displacements in the closings."""
+        """The part of the gaps of loop closures that unknown and prescribed displacements contribute."""
         positions = self.model.positions
         return times(constant(positions.W), y) + times(constant(positions.BZ), given.shift)
 
     def gaps(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> ca.MX:
-        """What is left open of the loop closures and of the rows of joints."""
+        """Gaps of the loop closures, then of the rows of joints, (rows,)."""
         return self.gaps_of(self.every(q, y, given, near), y, given)
 
     def gaps_of(self, arguments: list[list[ca.MX]], y: ca.MX, given: Given) -> ca.MX:
-        """The same from the arguments of :meth:`every`."""
+        """As :meth:`gaps`, from the arguments that :meth:`every` gives."""
         closed, rows = self.open_gaps(y, given), []
         for number, (group, own) in enumerate(zip(self.model.terms, arguments, strict=True)):
             if not len(group.data) or not (group.rows or number == 0):
@@ -179,7 +179,7 @@ class SymbolicTerms:
         return ca.vertcat(closed, *rows)
 
     def held(self, q: ca.MX, given: Given) -> ca.MX:
-        """Rotations with those that motions prescribe at their values."""
+        """The rotations with prescribed ones set to their values."""
         turn = ca.reshape(given.turn, 3, self.rotations)
         driven = np.any([group.turn.any(axis=1) for group in self.model.groups.values()], axis=0)
         for i in np.flatnonzero(driven & (self.model.rotations.kind == Turn.HELD)).tolist():
@@ -190,14 +190,14 @@ class SymbolicTerms:
 
     @functools.cached_property
     def closing(self) -> ca.DM:
-        """What takes the chords that elements gain, (axes, elements), to the loop closures."""
+        """Matrix from the changes of the chords of elements, (axes, elements), to the gaps of the loop closures."""
         z, axes = self.model.positions.Z, self.axes
         elements, repeated = self.tables.elements_reached(z.column // axes)
         columns = elements * axes + (z.column % axes)[repeated]
         return sparse(z.row[repeated], columns, z.value[repeated], (z.shape[0], self.elements * axes))
 
     def sides(self, group: Acting, q: ca.MX, places: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Rotations and displacements of the sides of a group, the ground being the last of both."""
+        """Rotations and displacements of the sides of a group of terms; the ground is the last column of both."""
         turns, at = group.turns, group.places
         rest = ca.DM([1.0, 0.0, 0.0, 0.0] if self.model.space else [0.0])
         q = ca.horzcat(q, rest) if (turns < 0).any() else q
@@ -207,7 +207,7 @@ class SymbolicTerms:
         return turned, u[:, np.where(at < 0, self.places, at).ravel().tolist()]
 
     def data(self, number: int, given: Given, near: ca.MX) -> ca.MX:
-        """Data of a group of terms; the last of those that count turns is the value near which they do."""
+        """Data of a group of terms; the last row of those that count turns is the value near which they do."""
         if number == 0:
             parts = (given.stiffness, given.tangent)
             return ca.vertcat(*(ca.reshape(part, part.shape[0] * self.points, self.elements) for part in parts))
@@ -216,13 +216,13 @@ class SymbolicTerms:
         return data if part is None else ca.vertcat(data[:-1, :], near[part.start : part.stop].T)
 
     def load(self, number: int, given: Given) -> ca.MX:
-        """Loads of a group of terms, (loads, n); of elements their pull."""
+        """Loads of a group of terms, (loads, n); for elements their pulls."""
         group = self.model.terms[number]
         flat = given.loads[number - 1] if number else given.pull
         return ca.reshape(flat, group.kind.sizes[4], len(group.data))
 
     def multipliers(self, number: int, lam: ca.MX) -> ca.MX:
-        """Multipliers of the rows of a group of terms, (rows, n); of elements by those of the loop closures."""
+        """Multipliers of the rows of a group, (rows, n); for elements combinations of those of loop closures."""
         group = self.model.terms[number]
         if number == 0:
             return ca.reshape(times(self.closing.T, lam[: self.closing.shape[0], :]), self.axes, self.elements)
@@ -231,18 +231,18 @@ class SymbolicTerms:
         return ca.reshape(lam[first : first + labels.size, :], group.kind.sizes[2], len(group.data))
 
     def arguments(self, number: int, q: ca.MX, places: ca.MX, given: Given, near: ca.MX) -> list[ca.MX]:
-        """Rotations, displacements, data and loads of the terms of a group."""
+        """Rotations, displacements, data and loads of the terms of a group, as their functions take them."""
         sides = self.sides(self.model.terms[number], q, places)
         return [*sides, self.data(number, given, near), self.load(number, given)]
 
     def every(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> list[list[ca.MX]]:
-        """Arguments of all groups of terms; of a group without any term nothing."""
+        """Arguments of all groups of terms; an empty list for a group without terms."""
         places = self.kept_places(y, given)
         groups = enumerate(self.model.terms)
         return [self.arguments(i, q, places, given, near) if len(group.data) else [] for i, group in groups]
 
     def energies(self, arguments: list[list[ca.MX]]) -> tuple[ca.MX, ca.MX]:
-        """Energy of all terms, and its elastic part; arguments of :meth:`every`."""
+        """Energy of all terms, and its elastic part, from the arguments that :meth:`every` gives."""
         total, stored = ca.MX(0), ca.MX(0)
         for group, own in zip(self.model.terms, arguments, strict=True):
             if own:
@@ -252,12 +252,12 @@ class SymbolicTerms:
 
 
 class Expressions(SymbolicTerms):
-    """Everything of a model that its equations need, with rotation vectors; made once, Functions on demand.
+    """The equations of a model in rotation vectors as CasADi expressions; Functions are built on demand.
 
     Parameters
     ----------
     equations : Equations
-        Numbers the unknowns.
+        They number the unknowns.
     kernels, calls
         As of :class:`SymbolicTerms`.
     """
@@ -300,7 +300,7 @@ class Expressions(SymbolicTerms):
     # -- what is given --------------------------------------------------------------------------------
 
     def columns(self, part: str) -> ca.DM:
-        """A part of the loads, a column for each group; ``pull`` with forces on places that hang on segments."""
+        """A part of the loads, a column for each group; ``pull`` includes forces on places hanging on segments."""
         found = [getattr(loading, part) for loading in self.loadings]
         if part == "pull":
             hung = (self.reaching.T @ ca.DM(loading.force.ravel()) for loading in self.loadings)
@@ -321,27 +321,28 @@ class Expressions(SymbolicTerms):
         return data_of(self.model)
 
     def given(self, factors: ca.MX) -> Given:
-        """What is given at factors of the groups of loads: data are those of the model, and constant."""
+        """Data of the model, as constants, and its loads for factors (groups,) of their groups."""
         parts: dict[str, Any] = {name: times(columns, factors) for name, columns in self._columns.items()}
         return Given(**self._data, **parts, loads=tuple(times(each, factors) for each in self._link_columns))
 
     def loaded(self) -> dict[str, bool]:
-        """Which parts of the loads there are, those of connections as ``loads_0``, ``loads_1``, ..."""
+        """For each part of the loads whether it is present; those of connections are ``loads_0``, ``loads_1``, ..."""
         found = {name: bool(columns.nnz()) for name, columns in self._columns.items()}
         return found | {f"loads_{i}": bool(ca.sparsify(each).nnz()) for i, each in enumerate(self._link_columns)}
 
     def spins(self, step: ca.MX) -> ca.MX:
-        """Vectors (turns, rotations) about the fixed axes by which changes of the unknowns turn all rotations."""
+        """Rotation vectors (turns, rotations), fixed axes, of an increment of the unknowns."""
         return ca.reshape(times(self._turning[:, : step.shape[0]], step), self.turns, self.layout.rotations)
 
     def turned(self, q: ca.MX, there: ca.MX) -> ca.MX:
-        """Rotation vectors (turns, rotations) from rotations to others."""
+        """Rotation vectors (turns, rotations), fixed axes, from rotations ``q`` to rotations ``there``."""
         return self.many(rotation_between(self.model.space), self.layout.rotations)(q, there)
 
     def gathered(self, shares: list[tuple[Index, ca.MX]], force: ca.MX, lam: ca.MX, rows: list[ca.MX]) -> ca.MX:
-        """The residual of the unknowns and rows.
+        """The residual (unknowns + rows,).
 
-        From shares on sides, forces on all places as a residual, multipliers of the loop closures, and gaps.
+        It is summed from generalised forces on sides, forces on all places as a residual, multipliers of the loop
+        closures, and gaps.
         """
         onto = self.gather[:, self.of_places : self.of_rows]
         residual = times(onto, force)
@@ -366,5 +367,5 @@ LOADS = ("pull", "force", "shift", "turn", "spread")
 
 
 def moved_by(expressions: Expressions, q: ca.MX, phi: ca.MX) -> ca.MX:
-    """Rotations (components, rotations) after rotation vectors (turns, rotations)."""
+    """Rotations (components, rotations) rotated further by rotation vectors (turns, rotations), fixed axes."""
     return expressions.many(moved_rotation(expressions.model.space), expressions.layout.rotations)(q, phi)

@@ -1,4 +1,4 @@
-"""What a state means along the members: positions, rotations, section forces and moments at any place.
+"""Positions, rotations, section forces and moments along the members of a state, at any place.
 
 Section forces and moments come from equilibrium, not from the derivative of the rotations: the moment at the
 first node of a member is minus the gradient of its energy there, and the rest follows by integrating
@@ -30,15 +30,24 @@ from .terms import energies_of
 __all__ = ["Fields", "rotations_along", "transferred"]
 
 LARGE = 1.0
-"""Displacement over size, or rotation in rad, beyond which nothing of what is told of a small member is true."""
+"""Displacement over size, or rotation in rad, of a small member at which its results are refused as meaningless."""
 
 
 MEMBERS = 64
-"""Members of which something is kept at hand: reports ask of one after the other."""
+"""Number of members whose intermediate results are cached, since reports ask for one member after the other."""
 
 
 class Fields:
-    """Fields of one state of a model.  All results are in SI units and fixed axes, with three components."""
+    """Evaluates a state of a model.
+
+    Results are in SI units and fixed axes with three components, unless the docstring says "dimensionless".
+
+    Parameters
+    ----------
+    equations : Equations
+    state : State
+    loading : Loading
+    """
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
         self.model, self.state, self._applied = equations.model, state, loading
@@ -54,13 +63,13 @@ class Fields:
 
     @functools.cached_property
     def balance(self) -> Balance:
-        """The balance of the nodes."""
+        """Reactions, and the forces of springs and small members."""
         return Balance(self._equations, self.state, self._applied, self._nodal)
 
     # -- nodes ----------------------------------------------------------------------------------
 
     def position(self, node: str) -> Array:
-        """Position of a node, m."""
+        """Position of a node, (3,) m."""
         moved = _three(self._nodal[self.model.nodes.index(node)]) * self.model.scales.length
         return np.asarray(self.model.scene.nodes[node].position, dtype=float) + moved
 
@@ -70,7 +79,7 @@ class Fields:
         return None if number is None else self.state.q[number]
 
     def reaction(self, node: str) -> tuple[Array, Array]:
-        """Force (N) and moment about the node (N m) that the ground exerts on a supported node."""
+        """Force (3,) N and moment about the node (3,) N m that the ground exerts on a supported node."""
         force, moment = self.balance.reaction(node)
         more_force, more_moment = self._pressed_at(node)
         force, moment = force + more_force, moment + more_moment
@@ -97,14 +106,14 @@ class Fields:
         return force, moment
 
     def spring(self, name: str) -> SpringState:
-        """A spring of the scene."""
+        """State of a spring, in SI units."""
         return self.balance.spring(name)
 
     def drive(self, name: str) -> dict[str, Any]:
-        """What makes a motion: ``moment`` (N m) with a rotation, ``force`` (N) with a displacement.
+        """What enforces a prescribed motion: ``moment`` (N m) of a rotation, ``force`` (N) of a displacement.
 
-        At a driven joint they are numbers, on the second member about the axis or along the line of the joint.  At a
-        support they are what the ground does: (3,), or a number about its axis where the rotation is a number.
+        At a driven joint these are numbers, on the second member about the axis or along the line of the joint.  At a
+        support they are what the ground exerts: (3,), or a number about its axis where the rotation is a number.
         """
         motion = self.model.scene.motions[name]
         if motion.between is not None:
@@ -122,14 +131,15 @@ class Fields:
     # -- members --------------------------------------------------------------------------------
 
     def along(self, member: str, x: Array, *, dimensionless: bool = False) -> dict[str, Array]:
-        """Fields at fractions x of a member's length.
+        """Fields at fractions x (n,) of a member's length.
 
         Returns
         -------
         dict
-            ``position`` (n, 3) m, ``rotation`` (n, 4) or (n, 1) since the undeformed scene, ``force`` (n, 3) N
-            and ``moment`` (n, 3) N m of what is beyond on what is before, ``curvature`` (n, 3) 1/m about the
-            section's axes b1, b2, b3.
+            ``position`` (n, 3) m; ``rotation`` since the undeformed scene, a quaternion (n, 4) or in the plane an angle
+            (n, 1); section ``force`` (n, 3) N and ``moment`` (n, 3) N m, fixed axes, that the part beyond the place
+            exerts on the part before it; ``curvature`` (n, 3) 1/m about the section's axes b1 (twist), b2, b3.
+            ``dimensionless``: of a flexible or rigid member, force and moment without units and no curvature.
         """
         model, x = self.model, np.asarray(x, dtype=float)
         record, line = model.scene.members[member], model.scene.center_lines[member]
@@ -151,7 +161,10 @@ class Fields:
         return result
 
     def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
-        """Largest strain, and stress (Pa), by bending in sections that have a shape, (n,) each."""
+        """Largest fibre strain and stress (Pa) by bending, (n,) each, of a member whose section has a shape.
+
+        ``curvature`` (n, 3) 1/m at fractions x (n,) of the length, as of :meth:`along`.
+        """
         scene = self.model.scene
         section = scene.sections[str(scene.members[member].section)]
         change, fibres = curvature - scene.center_lines[member].curvatures(x), section.fibres(x)
@@ -159,9 +172,9 @@ class Fields:
         return strain, fibres[:, 0] * strain
 
     def largest_bending(self, member: str) -> tuple[float, float]:
-        """Largest strain, and stress (Pa), by bending along a member whose section has a shape.
+        """Largest fibre strain and stress (Pa) by bending anywhere along a member whose section has a shape.
 
-        The largest of places within elements, and between these of the parabola through the three that are nearest.
+        It is taken from samples within the elements and from parabolas through three neighbouring samples.
         """
         cuts = self.model.mesh.cuts[member]
         x = np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * np.arange(PARTS) / PARTS).ravel(), cuts[-1])
@@ -169,7 +182,7 @@ class Fields:
         return _largest(strain), _largest(stress)
 
     def strain_energy(self, member: str) -> float:
-        """Strain energy of a member that is not rigid, N m."""
+        """Strain energy of a flexible or small member, N m."""
         model = self.model
         if member in model.members:
             return float(self._strain_energies[model.elements_of(member)].sum()) * model.scales.moment
@@ -247,35 +260,35 @@ class Fields:
 
     @property
     def largest_load(self) -> float:
-        """Largest force or moment on a place or a rotation, dimensionless."""
+        """Largest component of the forces on places and the moments on rotations, dimensionless."""
         return max(float(np.abs(part).max(initial=0.0)) for part in (self._loading.force, self._loading.moment))
 
     @property
     def total_load(self) -> Array:
-        """Sum of all forces that act as loads, (3,) N."""
+        """Resultant of all forces that are loads, (3,) N."""
         return _three(self._loading.force.sum(axis=0)) * self.model.scales.force
 
     def moment_on(self, turn: int) -> float:
-        """Moment that acts on a rotation from outside, dimensionless."""
+        """Magnitude of the external moment on a rotation, given by its number; dimensionless."""
         return float(np.linalg.norm(self._loading.moment[turn]))
 
     def obstacle_normal(self, touch: Touch, at: float) -> Array:
-        """Unit vector (3,) from an obstacle to the member that lies on it."""
+        """Unit normal (3,) of an obstacle towards the member that touches it, at a fraction of the member's length."""
         place = np.array([at])
         position, tangent = self.positions(touch.member, place), self.tangents(touch.member, place)
         stop = obstacle(self.model.scene.contacts[touch.contact], self.model.space)
         return np.asarray(stop.normals(position, tangent, touch.way)[0])
 
     def own_force(self, node: str) -> Array:
-        """Load (3,) on a node itself, N."""
+        """Force (3,) N that acts as a load on a node itself, not on its members."""
         return _three(self._loading.own[self.model.segments.place(node)]) * self.model.scales.force
 
     def own_moment(self, node: str) -> Array:
-        """Moment (3,) on a node itself about the fixed axes, dimensionless."""
+        """Moment (3,) about the fixed axes that acts as a load on a node itself, dimensionless."""
         return np.asarray(self._loading.couple[self.model.segments.place(node)])
 
     def load_before(self, member: str, x: Array) -> Array:
-        """Load (n, 3) within a member from its start to fractions of its length, dimensionless."""
+        """Resultant (n, 3) of the loads along a member from its start to fractions x (n,) of it, dimensionless."""
         model, element = self.model, self.model.element
         part, cuts = model.elements_of(member), model.mesh.cuts[member]
         spread, starts = self._loading.spread[part], self._start_forces(part)
@@ -287,12 +300,12 @@ class Fields:
         return _three(points + _summed(self._stations(member, x), sums, spread))
 
     def stiffness(self, member: str, x: float) -> float:
-        """Smallest bending stiffness of the section at a place, dimensionless."""
+        """Smallest bending stiffness of a member's section at a fraction of its length, dimensionless."""
         values = self.model.scene.sections[str(self.model.scene.members[member].section)].stiffness(np.array([x]))
         return float(np.nanmin(values[0, 1:])) / (self.model.scales.moment * self.model.scales.length)
 
     def bend(self, member: str, x: Array, found: dict[str, Array]) -> Array:
-        """Derivative (n, 3) of the tangent along the member, 1/m, of what :meth:`along` found."""
+        """Derivative (n, 3) of the unit tangent by the arc length, 1/m, fixed axes, from :meth:`along`."""
         frames = self._frames(member, x, found["rotation"])
         return np.cross(np.einsum("nij,nj->ni", frames, found["curvature"]), frames[:, :, 0])
 
@@ -305,7 +318,7 @@ class Fields:
         return quaternion.rotate(self._axes(member, x, rotation), curves.FORWARD)
 
     def tangents(self, member: str, x: Array) -> Array:
-        """Tangents (n, 3) at fractions of the length."""
+        """Unit tangents (n, 3) of the centre line, fixed axes, at fractions x (n,) of the length."""
         return self._tangents(member, x, rotations_along(self.model, self.state.q, member, x))
 
     def positions(self, member: str, x: Array) -> Array:
@@ -317,13 +330,15 @@ class Fields:
         return model.scene.center_lines[member].positions(x) + moved * model.scales.length
 
     def rates(self, member: str, x: Array, spin: Array, known: Array) -> tuple[Array, Array]:
-        """Velocity and angular velocity (n, 3) at fractions of the length of a member of elements, dimensionless.
+        """Velocity and angular velocity (n, 3) at fractions x (n,) of a flexible or rigid member's length,
+        dimensionless.
 
         Parameters
         ----------
         spin : angular velocities (rotations, turns)
         known : velocities of all places, (places, axes)
-            Between them what turns says how velocities differ; what it misses is spread evenly.
+            Between places velocities follow from the angular velocities; a remaining difference is distributed
+            linearly.
         """
         model, part = self.model, self.model.elements_of(member)
         turns, axes = model.rotations.turns[part], model.element.axes
@@ -450,7 +465,7 @@ class Fields:
         return rest, rest + _three(self._nodal[places]) * model.scales.length
 
     def bent(self, member: str) -> float:
-        """Largest displacement, over the size, and rotation of the nodes of a small member, seen from its frame."""
+        """Deformation of a small member in its frame: largest nodal displacement over its size, or rotation, rad."""
         model = self.model
         rest, now = self._ends(member)
         turned = self.state.q[list(model.rotations.ends[member])]
@@ -467,7 +482,7 @@ class Fields:
         return float(max(np.linalg.norm(moved, axis=1).max() / size, np.linalg.norm(spins, axis=1).max()))
 
     def too_large(self) -> str:
-        """What is said of the small member that bends most where its linear elasticity tells nothing; else empty."""
+        """A sentence on the small member deformed most, where its linear elasticity is meaningless; else empty."""
         small = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
         worst = [*small, ""][first_of_largest(np.array([*small.values(), 0.0]))]
         if not small.get(worst, 0.0) > LARGE:
@@ -476,9 +491,9 @@ class Fields:
         return f"{found}, and to be accurate a few percent; make it flexible"
 
     def pulled(self, member: str) -> float:
-        """Axial force of a small member with two ends over what displaces these across by its length, ``12 EI / L^2``.
+        """Axial force of a small member with two ends over its transverse stiffness times its length (``12 EI / L^2``).
 
-        Linear elasticity leaves out what such a force does across the member: of this share of its stiffness.
+        The geometric stiffness that linear elasticity leaves out is of this share of the transverse stiffness.
         """
         model, record = self.model, self.model.scene.members[member]
         if len(record.nodes) != 2:
@@ -557,7 +572,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
-    """Rotations at fractions x of a member, (n, 4) unit or (n, 1)."""
+    """Rotations since the undeformed scene at fractions x (n,) of a member: quaternions (n, 4) or angles (n, 1)."""
     at = Stations(model.element, model.mesh.cuts[member], x)
     nodal = q[model.rotations.turns[model.elements_of(member)]]
     values = np.einsum("nj,njc->nc", at.nodal, nodal[at.elements])
@@ -565,9 +580,9 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
 
 
 def transferred(source: Any, state: State, target: Any) -> State:
-    """A state of one mesh on another mesh of the same scene.
+    """A state of one model interpolated onto another mesh of the same scene.
 
-    Displacements and multipliers go by their names; those that the other mesh does not have are left zero.
+    Displacements and multipliers are transferred by their names; those that are new on the other mesh are zero.
     """
     q = np.zeros((len(target.rotations.kind), target.element.components))
     for name, ends in target.rotations.ends.items():

@@ -1,11 +1,13 @@
-"""What joints, springs and small bodies ask of the rotations and displacements that they connect.
+"""Terms of joints, springs and small members: constraints and energies of the rotations and places that they connect.
 
-Each is a kind of :class:`~sfetcas.mechanics.terms.Term`: it sees the world only through its *sides*, rotations ``q``
-since the undeformed scene (an angle in the plane, a quaternion in space) and displacements ``u`` of places, and states
-an energy, or rows that have to be zero, or both.  To add a joint, write one class here and one row in
-``tests/test_joints.py``; what touches obstacles stands in :mod:`~sfetcas.mechanics.contact_joints`.
+Each is a kind of :class:`~sfetcas.mechanics.terms.Term`: it depends only on its *sides*, rotations ``q`` since the
+undeformed scene (an angle in the plane, a quaternion in space) and displacements ``u`` of places, and gives an energy,
+or constraint rows, or both.  All data are dimensionless; vectors are in the fixed axes of the undeformed scene.  To add
+a joint, write one class here and one row in ``tests/test_joints.py``; contact terms are in
+:mod:`~sfetcas.mechanics.contact_joints`.
 
-A ball asks nothing, a rigid joint lets both sides share one rotation, and in the plane a hinge asks nothing.
+A ball needs no constraint, at a rigid joint both sides share one rotation, and in the plane a hinge needs no
+constraint.
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ def _dot(a: Side, b: Side) -> ca.SX:
 @final
 @dataclass(frozen=True)
 class Hinge(Term):
-    """Two rotations that differ about one axis only; data: two directions normal to it.  Space only."""
+    """Constraint: two rotations differ about one axis only; data: two directions normal to the axis.  Space only."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -65,7 +67,7 @@ class Hinge(Term):
 @final
 @dataclass(frozen=True)
 class Universal(Term):
-    """An axis of either side that stay normal to each other; data: both, undeformed.  Space only."""
+    """Constraint: an axis of the first side stays normal to an axis of the second; data: both axes.  Space only."""
 
     supports: ClassVar[bool] = True
 
@@ -83,7 +85,7 @@ class Universal(Term):
 @final
 @dataclass(frozen=True)
 class DrivenTurn(Term):
-    """The angle between two rotations about an axis is prescribed; data: axis, load: angle."""
+    """Constraint: the angle between two rotations about an axis is prescribed; data: axis; load: angle, rad."""
 
     drives: ClassVar[str] = "angle"
     table: ClassVar[str] = "motions"
@@ -95,7 +97,7 @@ class DrivenTurn(Term):
         return 2, 0, 1, 3, 1
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The angle less what it shall be; in space by its half sine, which is smooth at any angle."""
+        """The angle less the prescribed one; in space twice the sine of half this difference, which is smooth."""
         if not self.space:
             return [data[2] * (q[1][0] - q[0][0]) - load]
         r = self.relative(*q)
@@ -103,7 +105,7 @@ class DrivenTurn(Term):
         return [2.0 * (ca.cos(half) * about - ca.sin(half) * r[0])]
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """The moment on the second side; in space the row is a sine, which changes its sign with each whole turn."""
+        """The moment on the second side; in space the sign of the multiplier changes with each whole turn."""
         if not self.space:
             return [-lam]
         r, half = self.relative(*q), 0.5 * load
@@ -113,7 +115,7 @@ class DrivenTurn(Term):
 @final
 @dataclass(frozen=True)
 class Slide(Term):
-    """A place that slides along a line carried by a rotation at another one; data: directions across the line."""
+    """Constraint: a place moves along a line carried by a rotation at another one; data: directions across it."""
 
     one_sided: ClassVar[bool] = True
 
@@ -123,7 +125,7 @@ class Slide(Term):
         return 1, 2, self.axes - 1, self.axes * (self.axes - 1), 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Components of the distance across the line, seen from the turned side."""
+        """Components of the relative displacement across the line, in the rotated axes of the first side."""
         gap = ca.vertcat(*self.back(q[0], [b - a for a, b in zip(*u, strict=True)]))
         n = self.axes
         return [ca.dot(data[n * i : n * i + n], gap) for i in range(n - 1)]
@@ -132,7 +134,7 @@ class Slide(Term):
 @final
 @dataclass(frozen=True)
 class DrivenSlide(Term):
-    """The travel of a slide is prescribed; data: direction of the line, load: travel."""
+    """Constraint: the displacement along the line of a slide is prescribed; data: direction; load: displacement."""
 
     drives: ClassVar[str] = "travel"
     table: ClassVar[str] = "motions"
@@ -145,7 +147,7 @@ class DrivenSlide(Term):
         return 1, 2, 1, self.axes, 1
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Travel along the line less what it shall be."""
+        """The displacement along the line less the prescribed one."""
         gap = ca.vertcat(*self.back(q[0], [b - a for a, b in zip(*u, strict=True)]))
         return [ca.dot(data, gap) - load]
 
@@ -156,21 +158,20 @@ class DrivenSlide(Term):
 
 @dataclass(frozen=True)
 class Turning(Term):
-    """What acts on the angle of the second side against the first about an axis of the first; it has no places.
+    """Base class of terms of the angle of the second side against the first about an axis of the first; no places.
 
-    Angles count turns: in the plane by themselves, in space near a value that the state carries.  With ``r`` the
-    rotation of one side against the other the angle is twice ``atan2(axis.r, r_0)``, and does what it shall for a
-    hinge.  At a universal joint the axis of the one side is normal to a direction ``c`` that the other carries, and
-    the angle of ``c`` about the axis is taken: then the moment is along the axis and leaves the joint what is normal
-    to both axes.
+    Angles count turns: in the plane by themselves, in space by their distance from a reference value in the state.
+    With ``r`` the relative quaternion the angle is twice ``atan2(axis.r, r_0)``, which is exact for a hinge.  At a
+    universal joint the axis of the one side is normal to a direction ``c`` that the other carries, and the angle is
+    that of ``c`` about the axis: then the moment is along the axis, and what is normal to both is left to the joint.
 
-    Data: axis, of a universal joint ``c`` in the undeformed scene, then what :attr:`own` counts, in space the near
-    value.
+    Data: axis, at a universal joint ``c`` in the undeformed scene, then :attr:`own` numbers of the kind, in space last
+    the reference value.
 
     Attributes
     ----------
     crossed : bool
-        At a universal joint.
+        Whether it is at a universal joint.
     """
 
     crossed: bool = False
@@ -180,11 +181,11 @@ class Turning(Term):
     @property
     @abc.abstractmethod
     def own(self) -> int:
-        """Data of the kind itself."""
+        """Number of data of the kind itself."""
 
     @property
     def first(self) -> int:
-        """Where these begin."""
+        """Index at which the data of the kind itself begin."""
         return 6 if self.crossed else 3
 
     @property
@@ -193,7 +194,7 @@ class Turning(Term):
         return 2, 0, 0, self.first + self.own + self.space, 0
 
     def counted(self, data: Array) -> tuple[Array, Array] | None:
-        """The axis, and at a universal joint what the other side carries; none in the plane."""
+        """The axis (n, 3), and the direction ``c`` of a universal joint (n, 3), else zero; None in the plane."""
         axis = data[:, :3]
         return (axis, data[:, 3:6] if self.crossed else np.zeros(axis.shape)) if self.space else None
 
@@ -216,14 +217,14 @@ class Turning(Term):
 @final
 @dataclass(frozen=True)
 class TurnSpring(Turning):
-    """A rotational spring about an axis of the first side; its own data: stiffness, rest angle."""
+    """A rotational spring about an axis of the first side; own data: stiffness, rest angle (rad)."""
 
     table: ClassVar[str] = "springs"
     answers: ClassVar[Mapping[str, str]] = {"angle": "rad", "moment": "N m"}
 
     @property
     def own(self) -> int:
-        """Two."""
+        """Two: stiffness and rest angle."""
         return 2
 
     @property
@@ -232,11 +233,11 @@ class TurnSpring(Turning):
         return "middle" if self.space else "relative"
 
     def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
-        """The angle."""
+        """The angle, rad."""
         return self.angle(q, data)
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the square of the angle from rest, zero in the undeformed scene."""
+        """Half the stiffness times the squared angle from rest, less its value in the undeformed scene."""
         angle = self.angle(q, data)
         return 0.5 * data[self.first] * angle * (angle - 2.0 * data[self.first + 1])
 
@@ -249,11 +250,11 @@ class TurnSpring(Turning):
 @final
 @dataclass(frozen=True)
 class TurnStop(Turning):
-    """A rotational spring that stands at a stop; its own data: angle of the stop."""
+    """Constraint: a rotational spring is at a stop; own data: angle of the stop, rad."""
 
     @property
     def own(self) -> int:
-        """One."""
+        """One: the angle of the stop."""
         return 1
 
     @property
@@ -270,7 +271,7 @@ class TurnStop(Turning):
 @final
 @dataclass(frozen=True)
 class LineStop(Term):
-    """A spring along a direction that stands at a stop; data: direction, travel of the stop."""
+    """Constraint: a spring along a direction is at a stop; data: direction, displacement at the stop."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
@@ -278,7 +279,7 @@ class LineStop(Term):
         return 0, 2, 1, self.axes + 1, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The travel less that of the stop."""
+        """The displacement along the direction less that at the stop."""
         n = self.axes
         return [ca.dot(data[:n], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n]]
 
@@ -286,7 +287,7 @@ class LineStop(Term):
 @final
 @dataclass(frozen=True)
 class Spring(Term):
-    """A spring between two places with a free length; data: their distance (vector), stiffness, free length."""
+    """A spring between two places with a free length; data: vector between them, stiffness, free length."""
 
     table: ClassVar[str] = "springs"
     answers: ClassVar[Mapping[str, str]] = {"travel": "m", "force": "N"}
@@ -302,13 +303,13 @@ class Spring(Term):
         return ca.norm_2(data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])) - data[n + 1]
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the square of the elongation, less that of the undeformed scene."""
+        """Half the stiffness times the squared elongation, less its value in the undeformed scene."""
         n = self.axes
         gap = data[:n] + ca.vertcat(*[b - a for a, b in zip(*u, strict=True)])
         return 0.5 * data[n] * (self._square(gap, data[n + 1]) - self._square(data[:n], data[n + 1]))
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """The elongation and the force, below zero where it pulls."""
+        """The elongation, and the force on the second side, negative in tension."""
         travel = self.travel(q, u, data)
         return [travel, -data[self.axes] * travel]
 
@@ -322,7 +323,7 @@ class Spring(Term):
 @final
 @dataclass(frozen=True)
 class LineSpring(Term):
-    """A spring that acts along a direction fixed in space; data: direction, stiffness, rest travel."""
+    """A spring that acts along a direction fixed in space; data: direction, stiffness, displacement at rest."""
 
     table: ClassVar[str] = "springs"
     answers: ClassVar[Mapping[str, str]] = {"travel": "m", "force": "N"}
@@ -333,16 +334,16 @@ class LineSpring(Term):
         return 0, 2, 0, self.axes + 2, 0
 
     def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
-        """What the second place moves along the direction against the first."""
+        """Displacement of the second place relative to the first along the direction."""
         return ca.dot(data[: self.axes], ca.vertcat(*[b - a for a, b in zip(*u, strict=True)]))
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Half the stiffness times the square of the travel from rest, zero in the undeformed scene."""
+        """Half the stiffness times the squared displacement from rest, less its value in the undeformed scene."""
         n, travel = self.axes, self.travel(q, u, data)
         return 0.5 * data[n] * travel * (travel - 2.0 * data[n + 1])
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """The travel along the direction, and the force."""
+        """The displacement along the direction, and the force."""
         n, travel = self.axes, self.travel(q, u, data)
         return [travel, -data[n] * (travel - data[n + 1])]
 
@@ -350,19 +351,20 @@ class LineSpring(Term):
 @final
 @dataclass(frozen=True)
 class Body(Term):
-    """A body with linear elasticity in a frame that it carries, on macro-nodes with six (three) freedoms each.
+    """A small member: a superelement with linear elasticity in a corotated frame, six (three) freedoms a node.
 
-    The frame turns with the mean of the rotations; of each node the displacement since the undeformed body,
-    relative to the first node, and the rotation relative to the frame are seen from it.  With ``e`` these
-    numbers the energy is ``1/2 e.K e``, and the rows ``N e`` say which deformations do not exist.  Loads along
-    the body work on the rigid motion and on ``e``: ``-P.u_1 - tr(Q^T (R - I)) - tr(R^T T e)``.
+    The frame rotates with the mean of the nodal rotations.  The deformation ``e`` has for each node the displacement
+    since the undeformed body relative to the first node, and the rotation relative to the frame, both in the axes of
+    the frame.  The energy is ``1/2 e.K e``, and the constraint rows ``N e`` exclude deformations.  Loads along the body
+    work on the rigid motion and on ``e``: ``-P.u_1 - tr(Q^T (R - I)) - tr(R^T T e)``.
 
-    Data: rest vectors (nodes x axes), K (upper triangle by columns), N (rows x freedoms); load: P, Q, T.
+    Data: positions of the nodes from the first one (nodes x axes), K (upper triangle by columns), N (rows x freedoms);
+    load: P, Q, T.
 
     Attributes
     ----------
     nodes, stiff : int
-        Number of macro-nodes and of rows.
+        Number of nodes and of constraint rows.
     """
 
     table: ClassVar[str] = "members"
@@ -373,23 +375,23 @@ class Body(Term):
 
     @property
     def freedoms(self) -> int:
-        """Numbers of ``e``: 6 a node in space, 3 in the plane."""
+        """Size of the deformation ``e``: 6 numbers a node in space, 3 in the plane."""
         return (self.axes + self.turns) * self.nodes
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """As many rows as deformations that do not exist."""
+        """Rotation and place of each node; a row for each excluded deformation."""
         n, axes = self.freedoms, self.axes
         data = self.nodes * axes + n * (n + 1) // 2 + self.stiff * n
         return self.nodes, self.nodes, self.stiff, data, axes + axes * axes + axes * axes * n
 
     def stiffest(self, data: Array) -> Array | None:
-        """Of the stiffness matrix."""
+        """Largest entry of the stiffness matrix of each body, (n,)."""
         first = self.nodes * self.axes
         return np.asarray(np.abs(data[:, first : first + self.freedoms * (self.freedoms + 1) // 2]).max(axis=1))
 
     def frame(self, q: list[Side]) -> Side:
-        """Mean rotation of the nodes."""
+        """The rotation of the frame: the mean rotation of the nodes."""
         if not self.space:
             return [sum((side[0] for side in q), ca.SX(0)) / self.nodes]
         total = ca.vertcat(*q[0])
@@ -399,7 +401,7 @@ class Body(Term):
         return ca.vertsplit(total / ca.norm_2(total))
 
     def deformation(self, q: list[Side], u: list[Side], rest: ca.SX) -> ca.SX:
-        """The numbers ``e``: displacements and twice the sines of half the rotations, seen from the frame."""
+        """The deformation ``e``: displacements, and twice the sines of half the rotations, in the axes of the frame."""
         frame, e = self.frame(q), []
         for i in range(self.nodes):
             d = ca.vertsplit(rest[self.axes * i : self.axes * (i + 1)])
@@ -437,6 +439,6 @@ class Body(Term):
         return [self.energy(q, u, data, ca.SX.zeros(load.shape))]
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Deformations that do not exist."""
+        """The deformations that are excluded, ``N e``."""
         rest, _, stiff = self._split(data)
         return ca.vertsplit(ca.mtimes(stiff, self.deformation(q, u, rest))) if self.stiff else []

@@ -1,9 +1,9 @@
-"""Loads as terms: moments on rotations, and forces and moments that turn with what they act on.
+"""Loads as terms: moments on rotations, and follower forces and moments.
 
-A force that follows gives a generalised force ``R(q) f`` on its place and nothing on the rotation that it turns with;
-along an element the forces at its points are carried to its first place, and their levers are moments on its nodes.  A
-moment has a potential in the plane and about an axis that holds a rotation; in space, on what is free to turn, a moment
-that is fixed and one that follows have none.
+A follower force gives a generalised force ``R(q) f`` on its place and nothing on the rotation that it turns with; along
+an element the forces at its points are moved to its first place, and their moments act on its nodes.  A moment has a
+potential in the plane, and about the axis of a rotation that is restrained to it; in space a moment on a free rotation
+has none, whether fixed or follower.
 
 Source: Barraco and Munteanu, Part 1, section 4 (virtual work).
 """
@@ -51,14 +51,14 @@ __all__ = [
 @final
 @dataclass(frozen=True)
 class Follower(Term):
-    """A force on a place that turns with a rotation; load: the force in the undeformed scene."""
+    """A force on a place that turns with a rotation; load: its components in the undeformed scene."""
 
     is_load: ClassVar[bool] = True
     follows: ClassVar[bool] = True
 
     @property
     def has_potential(self) -> bool:
-        """None."""
+        """False."""
         return False
 
     @property
@@ -67,12 +67,12 @@ class Follower(Term):
         return 1, 1, 0, 0, self.axes
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Minus the turned force on the place."""
+        """Minus the rotated force, on the place."""
         nothing = [ca.SX(0)] * self.turns
         return [*nothing, *[-f for f in self.forth(q[0], ca.vertsplit(load))]]
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Minus the turned force times the displacement."""
+        """Minus the rotated force times the displacement."""
         return -ca.dot(ca.vertcat(*self.forth(q[0], ca.vertsplit(load))), ca.vertcat(*u[0]))
 
 
@@ -97,7 +97,7 @@ class FollowingSpread(Term):
 
     @property
     def has_potential(self) -> bool:
-        """None."""
+        """False."""
         return False
 
     @property
@@ -106,7 +106,7 @@ class FollowingSpread(Term):
         return self.nodes, 1, 0, self.nodes * self.axes, self.nodes * self.axes
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Moments of what acts beyond each node, and minus the sum of the forces on the place."""
+        """Moments on the nodes by the forces beyond each, and minus the sum of the forces on the place."""
         tangents, forces, carried = self._now(q, data, load)
         moments = []
         for tangent, force in zip(tangents, carried, strict=True):
@@ -116,7 +116,7 @@ class FollowingSpread(Term):
         return [*moments, *[-f for f in ca.vertsplit(total)]]
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Minus the turned forces times the displacements of the nodes."""
+        """Minus the rotated forces times the displacements of the nodes."""
         tangents, forces, carried = self._now(q, data, load)
         total = -ca.dot(sum(forces[1:], forces[0]), ca.vertcat(*u[0]))
         for k, (tangent, force) in enumerate(zip(tangents, carried, strict=True)):
@@ -141,14 +141,14 @@ class FollowingSpread(Term):
 @final
 @dataclass(frozen=True)
 class Moment(Term):
-    """A moment on a rotation, about z in the plane, fixed in space; load: its components."""
+    """A dead moment on a rotation, in the plane about z; load: its components in the fixed axes."""
 
     is_load: ClassVar[bool] = True
     is_couple: ClassVar[bool] = True
 
     @property
     def has_potential(self) -> bool:
-        """In the plane."""
+        """True in the plane."""
         return not self.space
 
     @property
@@ -173,14 +173,14 @@ class Moment(Term):
 @final
 @dataclass(frozen=True)
 class FollowingMoment(Term):
-    """A moment that turns with the rotation that it acts on, in space; load: its components in the undeformed scene."""
+    """A follower moment on a rotation, in space; load: its components in the undeformed scene."""
 
     is_load: ClassVar[bool] = True
     follows: ClassVar[bool] = True
 
     @property
     def has_potential(self) -> bool:
-        """None."""
+        """False."""
         return False
 
     @property
@@ -189,21 +189,21 @@ class FollowingMoment(Term):
         return 1, 0, 0, 0, 3
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Minus the turned moment."""
+        """Minus the rotated moment."""
         return [-m for m in self.forth(q[0], ca.vertsplit(load))]
 
 
 @final
 @dataclass(frozen=True)
 class AxisMoment(Turning):
-    """A moment on a rotation that is held to an axis in space; it works on the counted angle.  Load: its components."""
+    """A moment on a rotation restrained to an axis, in space; it works on the counted angle; load: components."""
 
     is_load: ClassVar[bool] = True
     is_couple: ClassVar[bool] = True
 
     @property
     def own(self) -> int:
-        """None."""
+        """Zero."""
         return 0
 
     @property
@@ -240,17 +240,17 @@ def _turning_of(rotations: Rotations, name: str, node: str) -> int:
 
 
 def cut_of(mesh: Mesh, load: Load) -> int:
-    """Number of the cut of its member at which a load acts."""
+    """Index of the end of elements of its member at which a load acts."""
     return mesh.cut_at(str(load.member), load.at or 0.0)
 
 
 def loads_in(parts: Parts) -> Iterator[One]:
-    """The loads of a scene that are terms, each by the name ``loads.NAME``.
+    """The loads of a scene that are terms, each under the name ``loads.NAME``.
 
     Raises
     ------
     SceneError
-        Nothing turns with the node that a load acts on.
+        A moment or follower acts on a node without a rotation of its own.
     """
     scene, rotations, space, nothing = parts.scene, parts.rotations, parts.element.space, np.zeros(0)
     for name, load in scene.loads.items():
@@ -278,7 +278,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
 
 
 def followed_elements(scene: Scene, segments: Segments) -> list[int]:
-    """Elements along which forces act that turn with the sections; each is a segment."""
+    """Numbers of the elements under follower distributed loads; each of them is a segment."""
     members = {load.member for load in scene.loads.values() if load.type == "distributed" and load.follows}
     return sorted(part.elements.start for part in segments.parts if part.member in members)
 
@@ -313,11 +313,11 @@ def _place(mesh: Mesh, segments: Segments, load: Load) -> int:
 
 
 def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array, Array]:
-    """Pull (elements, points, axes) and forces on places (places, axes) of forces along the elements.
+    """Pull (elements, points, axes) and forces on places (places, axes) by given forces along the elements.
 
-    The pull at a point is minus the load beyond it up to the end of its segment; within an element "beyond" is
-    the transpose of the matrix that integrates the turned tangents, so that the discrete potential has exactly
-    this gradient.
+    The pull at a point is minus the load between it and the end of its segment.  Within an element this uses the
+    transpose of the matrix that integrates the rotated tangents, so that the discrete potential has exactly this
+    gradient.
     """
     on_element = forces.sum(axis=1)
     pull = -np.einsum("jk,eja->eka", element.to_points, forces) / element.weights[:, None]
@@ -337,9 +337,10 @@ def carried(forces: Array, segments: Segments, element: Element) -> tuple[Array,
 
 
 def present(model: Any, q: Array, loading: Any) -> Any:
-    """The loading (:class:`~sfetcas.mechanics.loading.Loading`) with what follows as it is at rotations (rotations, n).
+    """The :class:`~sfetcas.mechanics.loading.Loading` with follower loads as dead loads at rotations (rotations,
+    components).
 
-    For answers: what follows is turned and put to the loads that do not, and nothing is left that follows.
+    It serves to evaluate answers: the rotated followers are added to the dead loads, and the follower terms are zero.
     """
     if not loading.follows:
         return loading
@@ -382,16 +383,15 @@ def _put(model: Any, group: Group, moments: Array, found: Mapping[str, Array]) -
 
 
 def inner_cut(mesh: Mesh, first: Mapping[str, int], load: Load) -> int | None:
-    """Element that begins where a load acts within its member, None where it acts at an end of it."""
+    """Element that begins where a load acts within its member; None where it acts at an end of the member."""
     member, cut = str(load.member), cut_of(mesh, load)
     return first[member] + cut if 0 < cut < len(mesh.cuts[member]) - 1 else None
 
 
 def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
-    """Distributed forces (axes, points of all elements) as they are at rotations, and minus what they do beyond.
+    """Distributed forces (axes, points of all elements) at given rotations, and the pull of the follower ones alone.
 
-    Of :class:`~sfetcas.mechanics.expressions.Expressions`; the second is the pull of what follows, which is no load of
-    the elements.
+    The first argument is an :class:`~sfetcas.mechanics.expressions.Expressions`.
     """
     model, axes, n = expressions.model, expressions.axes, expressions.points
     spread = ca.reshape(given.spread, axes, -1)
@@ -412,5 +412,5 @@ def spread_of(expressions: Any, q: ca.MX, given: Any) -> tuple[ca.MX, ca.MX]:
 
 
 def elements_of(group: Group) -> Array:
-    """Elements that the terms of a group of loads act along."""
+    """Numbers (n,) of the elements that the terms of a group of distributed loads act along."""
     return np.array([int(name.rpartition(" ")[2]) for name in group.names], dtype=np.intp)

@@ -1,8 +1,7 @@
-"""Loads and motions of a scene on a mesh, in the units of the model.
+"""Loads and prescribed motions of a scene on a mesh, in the units of the model.
 
-Every load is a share of a :class:`Loading`; loads and motions with the same history are one of them, times a
-factor.  What acts along a member is put to its first node, and the internal force that it causes on the way
-there is the pull of the elements before it.
+Loads and motions with the same history form one :class:`Loading`, multiplied by one factor.  Loads along a member are
+moved to its first node; the internal force that they cause in the elements before them is the pull of these.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ __all__ = ["Loading", "unit_loadings"]
 
 @dataclass(frozen=True)
 class Loading:
-    """Loads and motions of one load factor, dimensionless.
+    """Loads and prescribed motions, dimensionless.
 
     Attributes
     ----------
@@ -45,7 +44,7 @@ class Loading:
     moment : ndarray (rotations, 3)
         Moments on rotations, about the fixed axes.
     further : ndarray (rotations, 3)
-        The share of ``moment`` that is in no term: of what follows as it is at a state, and of inertia.
+        The share of ``moment`` that is in no term: of followers evaluated at a state, and of inertia.
     jump : ndarray (elements, 3)
         The share of ``moment`` that acts at the start of an element, within a member.
     couple : ndarray (places, 3)
@@ -53,15 +52,15 @@ class Loading:
     pull : ndarray (elements, points, axes)
         Minus the internal force at the integration points that the loads along the member cause.
     spread : ndarray (elements, points, axes)
-        Distributed force times weight times length; what ``pull`` was made of, for section forces.
+        Distributed force times weight times length, from which ``pull`` is computed; for section forces.
     shift : ndarray (places * axes,)
-        Prescribed displacements, zero for places that are free.
+        Prescribed displacements, zero for other places.
     turn : ndarray (rotations, 3)
-        Prescribed rotation vectors of held rotations.
+        Prescribed rotation vectors, rad; zero for other rotations.
     loads : tuple of ndarray (n, loads)
-        What grows with the load factor in each group of connections, moments and what follows among them.
+        For each group of connections the data that grow with the load factor, as moments and followers.
     kinds : tuple of Term
-        Of these groups.
+        The kinds of these groups.
     """
 
     force: Array
@@ -78,12 +77,12 @@ class Loading:
     kinds: tuple[Term, ...]
 
     def scaled(self, factor: float) -> Loading:
-        """All loads and motions times a factor."""
+        """All loads and prescribed motions times a factor."""
         parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS)}
         return replace(self, **parts, loads=tuple(factor * load for load in self.loads))
 
     def unloaded(self) -> Loading:
-        """The motions alone; the driven joints among them."""
+        """The prescribed motions without the loads; driven joints are motions."""
         zero: dict[str, Any] = {name: np.zeros_like(getattr(self, name)) for name in LOADS}
         loads = tuple(
             load if kind.drives else np.zeros_like(load) for kind, load in zip(self.kinds, self.loads, strict=True)
@@ -96,23 +95,23 @@ class Loading:
         return replace(self, **parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
 
     def of(self, chosen: Callable[[Term], bool]) -> float:
-        """Largest load of the groups whose kind is chosen."""
+        """Largest load of the groups whose kind ``chosen`` accepts, dimensionless."""
         pairs = zip(self.kinds, self.loads, strict=True)
         return max((float(np.abs(load).max(initial=0.0)) for kind, load in pairs if chosen(kind)), default=0.0)
 
     @property
     def nodal(self) -> bool:
-        """Whether it is displacements of places, forces on them and terms that are loads, only."""
+        """Whether it consists only of displacements of places, forces on them, and loads of terms."""
         return not (self.pull.any() or self.of(lambda kind: not kind.is_load))
 
     @property
     def driven(self) -> float:
-        """Largest angle or travel of a driven joint."""
+        """Largest angle (rad) or displacement of a driven joint, dimensionless."""
         return self.of(lambda kind: bool(kind.drives))
 
     @property
     def follows(self) -> bool:
-        """Whether forces or moments turn with what they act on."""
+        """Whether it has follower forces or moments."""
         return bool(self.of(lambda kind: kind.follows))
 
 
@@ -368,12 +367,12 @@ class _Writer:
 
 
 def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | None, Loading]:
-    """Loadings of factor 1, by the history that multiplies them; None is the load factor itself.
+    """Loadings at factor 1, by the name of the history that multiplies them; None: multiplied by the load factor.
 
     Raises
     ------
     SceneError
-        A moment on a node that nothing turns with.
+        A moment on a node without a rotation of its own.
     """
     scene, writer = parts.scene, _Writer(connections=connections, **vars(parts))
     groups: dict[str | None, _Sums] = {None: writer.empty()}

@@ -1,4 +1,4 @@
-"""Masses and dampers of a model: what the rates of positions, section axes and strains cost, dimensionless.
+"""Masses and dampers of a model: weights of the rates of positions, section axes and strains, dimensionless.
 
 Masses of flexible members are lumped at the nodes of their elements (Lobatto quadrature: diagonal, constant, and as
 accurate as the elements); a rigid member has its own consistent mass between its ends, which is exact; a small one
@@ -37,14 +37,16 @@ class Observables:
     kind : Term
         Its rows are the quantities.
     turns, places : ndarray (n, rotations | places)
+        Numbers of the rotations and places that they depend on.
     data : ndarray (n, data)
     mass, damping : ndarray (n, rows)
+        Weights of the squares of accelerations and velocities.
     spring : int or None
-        The group of springs whose travels these are, in which counted turns stand.
+        The group of springs whose angles or elongations these are, to find the angles that count turns.
     numbers : ndarray (n,) or None
-        Which of that group.
+        Their numbers in that group.
     at : ndarray (n, 2) or None
-        Of section axes the place and the element to whose balance of moments their inertia belongs, -1 for none: nodes
+        For section axes the place and the element to whose balance of moments their inertia belongs, -1 for none; nodes
         that share a rotation have balances of their own.
     """
 
@@ -59,7 +61,7 @@ class Observables:
     at: Index | None = None
 
     def put(self, moments: Array, couple: Array, jump: Array) -> None:
-        """Add moments (n, 3) where :attr:`at` says to those on places and elements (each n, 3), in place."""
+        """Add moments (n, 3), in place and as :attr:`at` says, to ``couple`` (places, 3) and ``jump`` (elements, 3)."""
         for sums, number in () if self.at is None else zip((couple, jump), self.at.T, strict=True):
             np.add.at(sums, number[number >= 0], moments[number >= 0])
 
@@ -71,12 +73,13 @@ class Masses:
     Attributes
     ----------
     time, mass : float
-        Units, s and kg.
+        Units of time and mass, s and kg.
     places : SparseMap (places, places)
-        Kinetic energy of the places: half of this by their velocities.
+        Mass matrix of the places.
     place_drag : ndarray (places,)
+        Drag coefficients of the places.
     inner, inner_drag : ndarray (elements, p + 1)
-        At the inner nodes of flexible elements, zero at the ends, which are places.
+        Mass and drag of the inner nodes of flexible elements; zero at the ends, which are places.
     observables : tuple of Observables
         Section axes, strains, springs, points of small members.
     """
@@ -91,7 +94,7 @@ class Masses:
 
 
 def masses_of(model: Any) -> Masses:
-    """The masses of a model (:class:`~sfetcas.mechanics.model.Model`) whose mesh has a place at every cut.
+    """The masses of a :class:`~sfetcas.mechanics.model.Model` whose mesh has a place at every end of an element.
 
     Raises
     ------

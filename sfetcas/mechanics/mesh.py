@@ -1,4 +1,4 @@
-"""Meshes: where the members of a scene are cut into elements, as fractions of their lengths."""
+"""Meshes: the ends of the elements of each member, as fractions of its length."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ __all__ = ["Cushion", "Mesh", "Touch", "breaks_of", "cut", "first_mesh", "unifor
 
 @dataclass(frozen=True)
 class Touch:
-    """Where a member touches an obstacle: at one place, or from one place to another.
+    """A contact between a member and an obstacle: at one place, or along a stretch.
 
     Attributes
     ----------
     contact, member : str
     at, to : float, float or None
-        Fractions of the length; an element ends at each that is not an end of the member.
+        Fractions of the length, ``to`` only for a stretch; elements end there.
     number : int
-        Tells apart touches of the same two.
+        Distinguishes contacts of the same member and obstacle.
     offset : float
-        How far the obstacle has stepped back on the way to its place, m.
+        Distance by which the obstacle is moved back, for a homotopy to its place, m.
     way : float
         1 or -1: on which side of the member an edge is (1: the member's normal is the edge times the tangent), or
         to which side a circle bends the member.
@@ -48,30 +48,31 @@ class Touch:
 
     @property
     def name(self) -> str:
-        """Name of its rows, and of its place where that is no end of the member."""
+        """Name of its constraint rows, and of its place where that is no end of the member."""
         return f"{self.contact} on {self.member}" + (f" ({self.number + 1})" if self.number else "")
 
     @property
     def places(self) -> tuple[float, ...]:
-        """The fractions."""
+        """The fractions of the length: one for a place, two for a stretch."""
         return (self.at,) if self.to is None else (self.at, self.to)
 
 
 @dataclass(frozen=True)
 class Cushion:
-    """A place of a member that an obstacle pushes as a cushion would, on the way to a state in contact.
+    """A penalty contact at a place of a member, used on the way to a state in contact.
 
     Attributes
     ----------
     contact, member : str
+        Names of the obstacle and the member.
     at : float
         Fraction of the length; an element ends there.
     stiffness : float
-        N/m.
+        Penalty stiffness, N/m.
     thickness : float
-        m: within it the force begins.
+        Distance from the obstacle at which the force begins, m.
     edge : float
-        Radius of the thin rod that stands for an edge, m.
+        Radius of the thin rod that replaces an edge, m.
     """
 
     contact: str
@@ -84,26 +85,26 @@ class Cushion:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Element type and cuts.
+    """A mesh: element type, and the elements of each member.
 
     Attributes
     ----------
     order : int
-        Polynomial order p of all elements.
+        Polynomial order p of all elements; p = 1 is SFET2.
     cuts : mapping of str to ndarray (n + 1,)
-        Fractions of the member's length from 0 to 1, rising, n elements.
+        For each flexible or rigid member the ends of its n elements: fractions of its length, rising from 0 to 1.
     gauss : bool
         Gauss integration instead of integration at the nodes.
     rigid : frozenset of str
         Members whose elements are never halved.
     touches : tuple of Touch
-        Where members touch obstacles; elements end there.
+        Contacts with obstacles; elements end there.
     stops : tuple of (str, str)
-        Springs that stand at a stop: name, and ``low`` or ``high``.
+        Springs that are held at a stop: name, and ``low`` or ``high``.
     cushions : tuple of Cushion
-        Places at which obstacles push softly, in the order of their members and fractions.
+        Penalty contacts, in the order of their members and fractions.
     places : bool
-        Every cut of a flexible member is a place with a displacement of its own, as what has mass needs.
+        Whether every end of an element of a flexible member has displacement unknowns, as masses need.
     """
 
     order: int
@@ -121,7 +122,7 @@ class Mesh:
         return sum(len(cuts) - 1 for cuts in self.cuts.values())
 
     def refined(self, marked: Mapping[str, Array] | None = None) -> Mesh:
-        """The mesh with the marked elements halved (boolean array a member); without marks, all of them."""
+        """The mesh with marked elements halved: boolean arrays (elements,) by member; None marks all."""
         cuts = {}
         for name, old in self.cuts.items():
             chosen = np.ones(len(old) - 1, bool) if marked is None else marked[name]
@@ -131,17 +132,17 @@ class Mesh:
         return replace(self, cuts=cuts)
 
     def same(self, other: Mesh) -> bool:
-        """Whether another mesh of the same scene has the same elements and all else as well."""
+        """Whether another mesh of the same scene is equal to this one."""
         alike = replace(self, cuts={}) == replace(other, cuts={})
         return alike and all(np.array_equal(cuts, other.cuts[name]) for name, cuts in self.cuts.items())
 
     def cut_at(self, member: str, place: float) -> int:
-        """Number of the cut of a member that is nearest to a fraction of its length."""
+        """Index in ``cuts`` of the end of elements that is nearest to a fraction of a member's length."""
         return int(np.argmin(np.abs(self.cuts[member] - place)))
 
 
 def breaks_of(scene: Scene, member: str) -> Array:
-    """Fractions at which the solution along a member has a kink and an element has to end."""
+    """Fractions (n,) of a member's length at which its solution has a kink, so that an element has to end there."""
     section = scene.members[member].section
     places = [0.0, 1.0, *scene.center_lines[member].breaks]
     if section is not None:
@@ -168,7 +169,18 @@ def _divided(breaks: Array, elements: int) -> Array:
 
 
 def uniform_mesh(scene: Scene, order: int, elements: int | Mapping[str, int], gauss: bool = False) -> Mesh:
-    """Equal elements on each member; one more wherever a load or a kink of the section needs a cut."""
+    """A mesh of ``elements`` equal elements on each member; more where loads or kinks of a section need ends of
+    elements.
+
+    Parameters
+    ----------
+    order : int
+        Polynomial order p of the elements.
+    elements : int or mapping of str to int
+        Number for all flexible members, or for each by name.
+    gauss : bool
+        Integrate at Gauss points instead of at the nodes.
+    """
     check_scene(scene, "uniform_mesh({}, ...)")
     counts = elements if isinstance(elements, Mapping) else dict.fromkeys(scene.members, elements)
     cuts = {name: _divided(breaks_of(scene, name), counts.get(name, 1)) for name in cut(scene)}
@@ -187,17 +199,17 @@ def rigid(scene: Scene) -> frozenset[str]:
 
 
 def rigid_cuts(scene: Scene, member: str) -> Array:
-    """Elements of a rigid member: they share one rotation, and integrate what acts along its shape."""
+    """Ends (n + 1,) of the elements of a rigid member, which share one rotation and integrate loads along its shape."""
     turning = scene.center_lines[member].turning
     return _divided(breaks_of(scene, member), max(1, int(np.ceil(4.0 * turning))))
 
 
 def first_mesh(scene: Scene, order: int, turning: float = 2.0) -> Mesh:
-    """A coarse mesh to begin with.
+    """A coarse first mesh of elements of polynomial order ``order``.
 
-    No element is expected to turn by more than ``turning`` rad by the unloaded shape, prescribed rotations and
-    end moments.  Under forces far above EI/L^2 a member is straight but for layers as thin as
-    ``sqrt(EI / force)`` at its ends and at loads; there the elements shrink towards them by halves.
+    No element is expected to turn by more than ``turning`` rad by its unloaded shape, prescribed rotations and end
+    moments.  Under forces far above EI/L^2 a member is straight but for boundary layers as thin as
+    ``sqrt(EI / force)`` at its ends and at loads; towards these the elements are halved again and again.
     """
     check_scene(scene, "first_mesh({}, ...)")
     rotations = [np.linalg.norm(m.rotation) for m in scene.motions.values() if m.rotation is not None]

@@ -1,8 +1,8 @@
 """The model of a scene on a mesh: element data, rotations, positions and loads as arrays.
 
-Everything here is dimensionless: lengths by the longest member, energies by the largest bending stiffness over
-that length, so that micrometres and kilometres are the same problem.  All displacements are from the undeformed
-scene.  A model holds only what its scene requires; :attr:`Model.blocks` says what, how much and why.
+Everything here is dimensionless: lengths are over that of the longest member, energies over the largest stiffness
+divided by that length, so that micrometres and kilometres are the same problem.  All displacements are from the
+undeformed scene.  A model has only the unknowns that its scene requires; :attr:`Model.blocks` lists them with reasons.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
 
 SOURCES: list[Callable[[Parts], Iterable[One]]] = [connections_in, touches_in, loads_in]
-"""Where the terms beside the elements come from; a further kind of energy is one more source."""
+"""Functions that make the terms beside the elements; a further kind of energy is one more function."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """One kind of unknowns or rows of a model: its number and why it is there."""
+    """A block of unknowns or constraint rows of a model: its name, its size and a sentence why it is there."""
 
     name: str
     size: int
@@ -57,21 +57,21 @@ class Model:
     Attributes
     ----------
     scene, mesh, element, scales, assembly
-        What it was made of.
+        What it was made of: scene, mesh, element type, units, ``closing`` or ``nodal``.
     beams : Beams
         Stiffness, tangents and weights of the elements.
     segments : Segments
-        Members cut between places.
+        Members divided at the places whose displacements matter.
     rotations : Rotations
-        Numbers and freedoms of the rotations.
+        Rotations of the nodes of elements, and how each is restrained.
     positions : Positions
-        Displacements of nodes, closing equations.
+        Linear maps for displacements and loop closures.
     connections : tuple of Group
-        Joints, springs, small members, and loads that are terms.
+        Terms of joints, springs, small members and loads.
     groups : mapping
-        Loadings of factor 1, by history.
+        Loadings at factor 1, by the name of their history; None: multiplied by the load factor.
     spinning : Spinning or None
-        What turning axes do.
+        Centrifugal terms in rotating axes.
     """
 
     scene: Scene
@@ -89,27 +89,27 @@ class Model:
 
     @property
     def space(self) -> bool:
-        """Quaternions and three axes, or angles and two."""
+        """Whether it is in space (quaternions, three axes) or in the plane (angles, two axes)."""
         return self.element.space
 
     @property
     def unknowns(self) -> int:
-        """Unknowns of the minimisation: components of rotations, displacements kept; without multipliers."""
+        """Number of unknowns of the nonlinear program: components of rotations, displacements; without multipliers."""
         return int(self.widths.sum()) + len(self.positions.unknowns)
 
     @property
     def dimension(self) -> str:
-        """plane or space."""
+        """``plane`` or ``space``."""
         return self.scene.resolved_dimension
 
     @property
     def reason(self) -> str:
-        """Why the model is in the plane or in space."""
+        """A sentence why it is in the plane or in space."""
         return self.scene.dimension_reason
 
     @functools.cached_property
     def terms(self) -> tuple[Group, ...]:
-        """All terms of the Lagrangian by their kinds: the elements, then the connections."""
+        """All terms of the Lagrangian, grouped by kind: the elements, then the connections."""
         n, beams = len(self.rotations.turns), self.beams
         parts = (part.reshape(n, int(np.prod(part.shape[1:]))) for part in (beams.stiffness, beams.tangent))
         data = np.hstack(list(parts))
@@ -124,23 +124,23 @@ class Model:
 
     @functools.cached_property
     def row_names(self) -> tuple[str, ...]:
-        """Names of the closing rows, then of the rows of joints."""
+        """Names of the constraint rows: loop closures, then joints."""
         return (*self.positions.rows, *(row for group in self.connections for row in group.rows))
 
     @functools.cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """What the model consists of, and why."""
+        """The blocks of unknowns and rows, each with a sentence why it is there."""
         return _blocks(self)
 
     @functools.cached_property
     def widths(self) -> Index:
-        """Unknown numbers of each rotation in the minimisation: 4, 2 or 0 in space; 1 or 0 in the plane."""
+        """For each rotation its unknowns in the nonlinear program: 4, 2 or 0 in space, 1 or 0 in the plane."""
         table = np.array([0, 2, 4]) if self.space else np.array([0, 1, 1])
         return table[self.rotations.kind]
 
     @functools.cached_property
     def has_potential(self) -> bool:
-        """Whether all loads have a potential: none follows, and in space no moment turns what is free to turn."""
+        """Whether all loads have a potential: there is no follower, and in space no moment on a free rotation."""
         return not any(self._works(group, i) for i, group in enumerate(self.connections))
 
     def _works(self, group: Group, number: int) -> bool:
@@ -152,27 +152,27 @@ class Model:
 
     @functools.cached_property
     def conservative(self) -> bool:
-        """Whether there is an energy: the loads have a potential, or what follows is pressure, which has one too."""
+        """Whether there is a potential energy: as :attr:`has_potential`, or all followers are pressure."""
         return self.has_potential or is_pressure(self.scene)
 
     @property
     def loaded_at_zero(self) -> bool:
-        """Whether there may be loads at factor 0: those of histories, and of turning axes."""
+        """Whether there may be loads at factor 0: from histories, or in rotating axes."""
         return bool(self.scene.histories) or self.spinning is not None
 
     @functools.cached_property
     def minimisable(self) -> bool:
-        """Whether the energy of the nonlinear program is complete: moments in space are not in it."""
+        """Whether equilibria are minima of the nonlinear program; it does not contain moments in space."""
         turning = self.space and any(group.moment.any() for group in self.groups.values())
         return self.has_potential and not turning
 
     def check_complete(self) -> None:
-        """Refuse to be solved by itself where the scene says more than the model holds.
+        """Refuse a model whose scene has conditions that the model does not contain.
 
         Raises
         ------
         SceneError
-            Contacts, or stops of springs: which of them act is found by :func:`sfetcas.solve` only.
+            The scene has contacts or springs with stops; which of them are active only :func:`sfetcas.solve` finds.
         """
         scene = self.scene
         if scene.contacts and not self.mesh.touches:
@@ -185,16 +185,16 @@ class Model:
 
     @functools.cached_property
     def members(self) -> tuple[str, ...]:
-        """Names of the members that are made of elements, in the order of these."""
+        """Names of the flexible and rigid members, in the order of their elements."""
         return tuple(self.beams.first)
 
     @functools.cached_property
     def nodes(self) -> tuple[str, ...]:
-        """Names of the nodes: the first places, in the order of the displacements."""
+        """Names of the nodes, which are the first places, in the order of the displacements."""
         return tuple(self.scene.nodes)
 
     def elements_of(self, member: str) -> slice:
-        """The elements of a member, first to last."""
+        """Numbers of the elements of a member, as a slice."""
         start = self.beams.first[member]
         return slice(start, start + len(self.mesh.cuts[member]) - 1)
 
@@ -203,7 +203,7 @@ class Model:
         return self.rotations.chain(self.elements_of(member))
 
     def along(self, member: str) -> Array:
-        """Fractions of the length at which the rotations of :meth:`chain` stand; of a small member its ends."""
+        """Fractions of a member's length at which the rotations of :meth:`chain` are; of a small member its ends."""
         if member not in self.mesh.cuts:
             return np.array([0.0, 1.0])
         cuts = self.mesh.cuts[member]
@@ -211,12 +211,12 @@ class Model:
         return np.append(inner.ravel(), 1.0)
 
     def factors(self, factor: float) -> dict[str | None, float]:
-        """Multiplier of each group of loads: the factor, or that of the history at the factor."""
+        """Factor of each group of loads at a load factor: this, or the value of its history there."""
         histories = self.scene.histories
         return {name: factor if name is None else histories[name].factor(factor) for name in self.groups}
 
     def loading(self, factor: float, share: float = 1.0) -> Loading:
-        """Loads and motions at a load factor, all of them times ``share``."""
+        """Loads and prescribed motions at a load factor, multiplied by ``share``; dimensionless."""
         parts = [self.groups[name].scaled(share * value) for name, value in self.factors(factor).items()]
         total = parts[0]
         if self.spinning is not None:
@@ -226,14 +226,14 @@ class Model:
         return total
 
     def motion(self, name: str) -> Loading:
-        """What one motion prescribes, without its factor."""
+        """The prescribed displacements and rotations of one motion at factor 1, dimensionless."""
         motions = {name: self.scene.motions[name]}
         scene = self.scene.model_copy(update={"motions": motions, "loads": {}, "gravity": None})
         parts = Parts(scene, self.mesh, self.element, self.scales, self.beams, self.segments, self.rotations)
         return unit_loadings(parts, self.connections)[motions[name].history].unloaded()
 
     def held(self, loading: Loading) -> Array:
-        """Rotations with the held ones at their prescribed values and all others at rest, (rotations, comps)."""
+        """Rotations (rotations, components): prescribed ones at their values, all others undeformed."""
         if not self.space:
             return loading.turn[:, 2:3].copy()
         return quaternion.from_rotation_vector(loading.turn)
@@ -255,19 +255,18 @@ def assemble(
     mesh : Mesh
         Element order, integration and cuts of each member.
     assembly : str
-        ``closing`` (unknowns are rotations only), ``nodal`` (and displacements of macro-nodes), or ``auto``: the
-        one whose stationarity equations have fewer entries.  In turning axes it is ``nodal``, with a place at every
-        cut, as masses need.
+        ``closing`` (unknowns are rotations, and few displacements), ``nodal`` (also displacements of nodes), or
+        ``auto``: the one whose Newton matrix has fewer entries.  In rotating axes it is ``nodal``, with displacements
+        at every end of an element, as masses need.
     scales : Scales, optional
-        Units; without them those that suit the scene.
+        Units of the model; by default chosen for the scene.
     like : Model, optional
-        Of the same scene: its numbers of rotations and maps of places serve again where nothing but the lengths of
-        elements differs, as where a place of contact moves.
+        A model of the same scene, whose numbering is reused where only lengths of elements differ.
 
     Raises
     ------
     SceneError
-        A moment on a node that nothing turns with.
+        A moment acts on a node without a rotation of its own.
     """
     check_scene(scene, "assemble({}, ...)")
     if scene.rotating is not None:

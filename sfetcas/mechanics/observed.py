@@ -29,26 +29,26 @@ __all__ = ["Axes", "SpringTravel", "Strains"]
 @final
 @dataclass(frozen=True)
 class Axes(Term):
-    """Three directions (in the plane one) that turn with a rotation; data: the directions, undeformed."""
+    """Three directions (in the plane one) that turn with a rotation; data: the directions in the undeformed scene."""
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """Their components."""
+        """A rotation; a row for each component of the directions."""
         n = 9 if self.space else 2
         return 1, 0, n, n, 0
 
     @property
     def discrete(self) -> Discrete:
-        """They turn with the side."""
+        """``ends``: they turn with the side."""
         return "ends"
 
     @property
     def vectors(self) -> int:
-        """All directions."""
+        """Number of directions."""
         return self.sizes[2] // self.axes
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """The directions as they are now."""
+        """The rotated directions."""
         n = self.axes
         directions = [ca.vertsplit(data[n * i : n * i + n]) for i in range(data.numel() // n)]
         return [component for d in directions for component in self.forth(q[0], d)]
@@ -72,7 +72,7 @@ class Strains(Term):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """Three at each node, in the plane one."""
+        """A rotation at each node; at each node three rows, in the plane one."""
         data = self.nodes * (self.nodes + (9 if self.space else 0))
         return self.nodes, 0, self.turns * self.nodes, data, 0
 
@@ -93,22 +93,22 @@ class Strains(Term):
 @final
 @dataclass(frozen=True)
 class SpringTravel(Term):
-    """The angle or length whose rate the damper beside a spring resists; data: as of the spring.
+    """The angle or elongation of a spring, whose rate a damper parallel to it resists; data: as of the spring.
 
     Attributes
     ----------
     spring : Term
-        Whose it is.
+        The kind of the spring.
     """
 
     spring: Term
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """One."""
+        """One row."""
         turns, places, _, data, _ = self.spring.sizes
         return turns, places, 1, data, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """As the spring says it."""
+        """As :meth:`Term.travel` of the spring."""
         return [self.spring.travel(q, u, data)]

@@ -1,4 +1,4 @@
-"""What a scene on a mesh consists of before the terms of its Lagrangian are made."""
+"""The numbered parts of a scene on a mesh, from which the terms of its Lagrangian are made."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ __all__ = ["Parts"]
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Everything that it takes to say where a term acts and what its data are.
+    """What the makers of terms need to know: where a term acts, and in which units its data are.
 
     Attributes
     ----------
     scene, mesh, element, scales
-        The scene, its cuts, the element type, and the units in which all data are given.
+        The scene, its mesh, the element type, and the units of all data.
     beams : Beams
         Stiffness, tangents and weights of the elements.
     segments : Segments
-        Members cut between places, and the numbers of these.
+        Members divided at places, and the numbers of these.
     rotations : Rotations
-        Numbers and freedoms of the rotations.
+        Numbers of the rotations, and how each is restrained.
     """
 
     scene: Scene

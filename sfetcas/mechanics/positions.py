@@ -1,14 +1,14 @@
-"""Displacements of places and closing equations as linear maps of what the segments of members reach.
+"""Displacements of places and loop closures as linear maps of the chords of segments.
 
-Two assemblies.  *closing*: the displacement of a place is the sum of the reaches of the segments on a way from
-the ground, and what is left are closing equations, one for each loop and each further held direction.  *nodal*:
-displacements of free places are unknowns and each segment has its closing equation.  Both are the same linear
-maps with other entries: with ``Delta`` the reaches of the segments less those of the undeformed scene, ``y`` the
-displacements kept as unknowns and ``b`` the prescribed ones,
+The *reach* of a segment is the vector from its first to its last place.  Two assemblies: *closing*: the displacement of
+a place is the sum of the changes of reach along a path from the ground, and what is left are closing equations, one
+for each loop and each further restrained direction; *nodal*: displacements of free places are unknowns and each segment
+has its closing equation.  Both are the same linear maps with other entries: with ``Delta`` the changes of the reaches
+since the undeformed scene, ``y`` the displacement unknowns and ``b`` the prescribed displacements,
 
     u = E Delta + Y y + B b,      0 = Z Delta + W y + B_Z b.
 
-A place that is *kept* has its displacement among ``y``, component by component, in either assembly.
+A place that is *kept* has its displacement among ``y`` (or prescribed), component by component, in either assembly.
 
 Source: Barraco and Munteanu, Part 1, section 1 (the two ways of assembling).
 """
@@ -33,18 +33,18 @@ __all__ = ["Positions", "entries", "place_nodes"]
 
 @dataclass(frozen=True)
 class Positions:
-    """The linear maps of the module's docstring.
+    """The linear maps of the module's docstring, dimensionless.
 
     Attributes
     ----------
     E, Y, B : SparseMap (places * axes, segments * axes | unknowns | places * axes)
         Displacements of the places.
     Z, W, BZ : SparseMap (rows, segments * axes | unknowns | places * axes)
-        Closing equations.
+        Gaps of the closing equations.
     rows, unknowns : tuple of str
-        Names.
+        Names of the closing equations and of the displacement unknowns.
     kept : ndarray (places, axes)
-        Unknown that a component of a kept place is, -1 where it is prescribed or the place is not kept.
+        For each component of a kept place its index in ``y``; -1 where it is prescribed or the place is not kept.
     """
 
     E: SparseMap
@@ -230,8 +230,8 @@ class _Placing:
 def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodies: Mapping[str, int]) -> Positions:
     """The maps of a scene in ``axes`` dimensions, by the closing or the nodal assembly.
 
-    ``bodies``: the rotation of each rigid member.  A loop within one rigid body has no equation: of the forces
-    around it there are many, and the last member carries none.
+    ``bodies`` has the number of the rotation of each rigid member.  A loop within one rigid body has no closing
+    equation: the force around it is indeterminate, and the last member is taken to carry none.
     """
     placing = _Placing(scene, segments, axes, closing, bodies)
     sizes = {"E": len(segments.parts) * axes, "Y": len(placing.labels), "B": len(segments.places) * axes}
@@ -253,7 +253,7 @@ def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodi
 
 
 def entries(positions: Positions, segments: Segments, mesh: Mesh) -> float:
-    """Entries of the closing rows and unknowns: what the stationarity equations grow by."""
+    """Number of entries that closing rows and displacement unknowns add to the Newton matrix, for ``auto``."""
     counts = np.array([part.elements.stop - part.elements.start for part in segments.parts])
     axes = positions.Z.shape[1] // max(len(counts), 1)
     touched = np.unique(positions.Z.row * len(counts) + positions.Z.column // max(axes, 1))

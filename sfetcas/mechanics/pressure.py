@@ -1,9 +1,9 @@
-"""Loads that turn with what they act on and have a potential all the same: even pressure in the plane.
+"""Detection of follower loads that have a potential: uniform pressure in the plane.
 
 A force per length p across a member works by p times the area that the member sweeps, less what its ends sweep seen
-from the origin.  Where members with the same pressure meet, these shares cancel; where a support holds the end or
-leads it along a line, they are known from where it is: pressure on closed rings and on chains with held ends has
-a potential, a follower on a free end has none.
+from the origin.  Where members with the same pressure meet, these shares cancel; where a support fixes the end or
+guides it along a line, they follow from its position: pressure on closed rings and on chains with fixed ends has a
+potential, a follower on a free end has none.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["is_pressure"]
 
 
 def is_pressure(scene: Scene) -> bool:
-    """Whether everything that follows in a scene is such pressure."""
+    """Whether all follower loads of a scene are such pressure."""
     if scene.resolved_dimension == "space":
         return False
     left: dict[tuple[str | None, str], float] = {}

@@ -1,14 +1,14 @@
-"""Reactions of supports as constant linear maps of what the terms of a model take.  Data alone.
+"""Reactions of supports as constant linear maps of the forces and moments that terms take.
 
-Every term takes moments from its rotations and forces from its places.  One after the other, group by group, they are
-the *cells* of a state; behind them stand loads on nodes and cuts that are in no term, as what they take.  Whatever a
-support exerts is the same sum of cells and of multipliers of the loop closures in every state, in numbers and in
-expressions alike.
+Every term takes moments from its rotations and forces from its places (its share of the residual).  These numbers, one
+after the other, group by group, are the *cells* of a state; loads on nodes and within members that are in no term come
+after them.  Each reaction is the same linear combination of cells and of multipliers of the loop closures in every
+state, in numbers and in expressions alike.
 
-Nodes of a rigid body share its rotation, and so what is left there.  Which support exerts which part follows from the
-balance of moments of each node that rigid members join, with the moments on the first ends of these.  Where that leaves
-a choice (rigid members in loops, a body with several supports) the smallest reactions are taken, then the smallest
-moments inside.
+Nodes of a rigid body share its rotation, so the balance of the rotation alone does not separate their reactions.  Which
+support exerts which part follows from the balance of moments of each node that rigid members join, with the moments on
+the first ends of these as unknowns.  Where that leaves a choice (rigid members in loops, a body with several supports)
+the smallest reactions are taken, then the smallest moments inside.
 """
 
 from __future__ import annotations
@@ -38,18 +38,20 @@ FREE = ("free", "ball")
 
 @dataclass(frozen=True, eq=False)
 class RigidBalance:
-    """Balance of moments of all that rigid members join: ``matrix @ moments = known @ cells``.
+    """Balance of moments of the nodes that rigid members join: ``matrix @ moments = known @ cells``; dimensionless.
 
     Attributes
     ----------
     matrix : SparseMap (rows, unknowns)
-        Unknown are moments on first ends of rigid members, then reactions of nodes, each about all axes that turn.
-    known : SparseMap (rows, cells, couples on places and elements among them)
+        Unknowns are moments on first ends of rigid members, then reactions of nodes, each with ``width`` components.
+    known : SparseMap (rows, cells)
+        The cells here include moments on places and elements that are in no term.
     weights : ndarray (unknowns,)
+        Weights in the norm that is minimised.
     unknowns : mapping of (str, str) to int
-        Which each of them is: ("member", name) or ("node", name).
+        Number of each moment: ("member", name) or ("node", name).
     width : int
-        Components of a moment.
+        Components of a moment: 3 in space, 1 in the plane.
     """
 
     matrix: SparseMap
@@ -59,12 +61,12 @@ class RigidBalance:
     width: int
 
     def solved(self, cells: Array) -> dict[tuple[str, str], Array]:
-        """The smallest moments (width,) that are in balance with cells."""
+        """The moments (width,) of smallest norm that balance given cells (cells,), dimensionless."""
         found = smallest(self.matrix, self.known @ cells, self.weights)[0].reshape(-1, self.width)
         return {key: found[i] for key, i in self.unknowns.items()}
 
     def share(self, node: str) -> SparseMap:
-        """The reaction of a node as a map (width, cells) to the smallest moments that are in balance."""
+        """The linear map (width, cells) from cells to the reaction of a node in this solution."""
         first, shares = self.unknowns["node", node] * self.width, []
         for unknown in range(first, first + self.width):
             # Multipliers of the rows say what each of them adds to one unknown of the smallest solution.
@@ -83,7 +85,7 @@ Block = tuple[dict[int, float], list[Index], Array | None]
 
 
 class Reactions:
-    """What the ground exerts at the nodes of a model.
+    """Linear maps from the forces of the terms to the reactions at the nodes of a model.
 
     Attributes
     ----------
@@ -99,9 +101,10 @@ class Reactions:
 
     @functools.cached_property
     def left(self) -> SparseMap:
-        """What cells leave to supports, in full coordinates of rotations, then places.
+        """Sum of the cells on each rotation and place, in full coordinates: the moments and forces that supports
+        balance.
 
-        A universal support is the ground: what it takes is its reaction.
+        The side of a universal support that is the ground does not count: what it takes is the reaction itself.
         """
         full = []
         for group, sides in zip(self.model.terms, self._tables.sides, strict=True):
@@ -113,9 +116,10 @@ class Reactions:
 
     @functools.cached_property
     def forces(self) -> SparseMap:
-        """Forces (places * axes,) of supports from what is left on places, then multipliers of the loop closures.
+        """Map to the forces of supports (places * axes,) from forces left on places, then multipliers of the loop
+        closures.
 
-        Supports take what is left on their places, and of the segments that begin or end there what goes through.
+        A support takes what is left on its place, and the internal forces of the segments that begin or end there.
         """
         model = self.model
         positions, axes, size = model.positions, model.element.axes, self._tables.of_rows - self._tables.of_places
@@ -135,7 +139,7 @@ class Reactions:
     # -- what supports hold -----------------------------------------------------------------------
 
     def pushed(self, node: str) -> Array:
-        """What of a force (3,) a support holds, (3, 3): a guide does nothing along itself, unless it is driven."""
+        """Projection (3, 3) of forces onto those that a support can exert: none along a guide that is not driven."""
         record, found = self.model.scene.nodes[node], np.eye(3)
         driven = any(m.node == node and m.displacement is not None for m in self.model.scene.motions.values())
         if record.slides and not driven:
@@ -144,7 +148,7 @@ class Reactions:
         return found
 
     def held(self, number: int) -> Array:
-        """What of a moment (3,) on a rotation the ground holds, (3, 3): about what is free nothing."""
+        """Projection (3, 3) of moments onto those that the ground can exert on a rotation: none about free axes."""
         kind = self.model.rotations.kind[number]
         if kind == Turn.AXIS:
             axis = self.model.rotations.axis[number]
@@ -152,7 +156,7 @@ class Reactions:
         return np.zeros((3, 3)) if kind == Turn.FREE else np.eye(3)
 
     def turned(self, node: str) -> list[tuple[int, Array]]:
-        """Rotations on which a support exerts what is left there, with what it holds of it, (3, 3)."""
+        """Numbers of the rotations on which a support exerts moments, with the projection (3, 3) onto these moments."""
         number, record = self.model.rotations.node_turn[node], self.model.scene.nodes[node]
         if number is None:
             return [(turn, np.eye(3)) for turn in self._pinned(node)]
@@ -170,7 +174,7 @@ class Reactions:
         return [turn for turn in turns if turn not in elsewhere]
 
     def shared(self, node: str) -> bool:
-        """Whether another support holds the rotation of a node as well, so that it is told by the nodes' balances."""
+        """Whether another support restrains the rotation of a node as well, so that :attr:`rigid` is needed."""
         number, nodes = self.model.rotations.node_turn[node], self.model.scene.nodes
         if number is None:
             return False
@@ -181,7 +185,7 @@ class Reactions:
 
     @functools.cached_property
     def rigid(self) -> RigidBalance:
-        """Balance of every node that a rigid member is joined to."""
+        """The balance of moments of all nodes that rigid members are joined to."""
         scene, width = self.model.scene, self._width
         names = [name for name in self.model.members if scene.members[name].type == "rigid"]
         nodes = list(dict.fromkeys(n for name in names for n in scene.members[name].nodes))
@@ -259,9 +263,11 @@ class Reactions:
         return np.asarray(self.cells + number * self._width + np.arange(self._width))
 
     def connected(self, node: str, turn: int | None = None) -> Iterator[Index]:
-        """Cells of what joints and springs at a node take from one rotation, or springs, slides and loads from all.
+        """Cells (width,) of what joints and springs at a node take from one rotation, or those that do not cancel from
+        all.
 
-        A hinge takes from one side what it gives to the other; a slide has a lever, a spring may go to the ground.
+        A hinge takes from one side what it gives to the other; slides have a lever, springs may go to the ground, and
+        loads act on one side.
         """
         for number, i, side in self._joined.get(node, ()):
             group = self.model.terms[number]

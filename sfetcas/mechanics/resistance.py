@@ -1,4 +1,4 @@
-"""Stiffness that is nothing beside the loads: what it should resist goes beyond all numbers that mean something."""
+"""Check for stiffness that is negligible beside the loads, so that deflections would be meaningless."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ WEAK = 1e-20
 
 
 def check_resistance(scene: Scene) -> None:
-    """Refuse members and springs whose stiffness is nothing beside the loads or the stiffest member, but not zero.
+    """Refuse members and springs whose stiffness is negligible beside the loads or the stiffest member, but not zero.
 
     Raises
     ------
     SceneError
-        Names the motion that nothing resists, its stiffness and what it is nothing beside.
+        Names the motion that nothing resists, its stiffness and what it is compared with.
     """
     length = max(line.length for line in scene.center_lines.values())
     with np.errstate(over="ignore"):

@@ -18,7 +18,7 @@ __all__ = ["STIFF", "Pin", "Rotations", "Turn", "end_joints", "number_rotations"
 
 
 class Turn(enum.IntEnum):
-    """How the rotation of a node may change."""
+    """Restraint of a rotation by the ground: HELD is prescribed, AXIS turns about a fixed axis, FREE is free."""
 
     HELD = 0
     AXIS = 1
@@ -27,10 +27,18 @@ class Turn(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Pin:
-    """A rotation that turns against another one: at which node, how, and whose it is.
+    """A rotation with a joint to another one.
 
-    ``base`` and ``turn`` are numbers of rotations, ``base`` None for the ground; ``joint`` is hinge, ball,
-    universal or cylindrical; ``name`` the member, or the node where the ground holds it.
+    Attributes
+    ----------
+    node, joint : str
+        The node, and the kind of joint: hinge, ball, universal or cylindrical.
+    base : int or None
+        Number of the other rotation; None for the ground.
+    turn : int
+        Number of the rotation.
+    name : str
+        The member, or the node where the joint is to the ground.
     """
 
     node: str
@@ -42,22 +50,22 @@ class Pin:
 
 @dataclass(frozen=True, eq=False)
 class Rotations:
-    """Numbers and freedoms of all rotations.
+    """Numbers and restraints of all rotations.
 
     Attributes
     ----------
     turns : ndarray (elements, p + 1)
-        Numbers of the rotations at the nodes of an element.
+        Numbers of the rotations at the nodes of each element.
     kind : ndarray (rotations,)
-        :class:`Turn` of each rotation.
+        Restraint of each rotation, see :class:`Turn`.
     axis : ndarray (rotations, 3)
-        Axis of the rotations of kind AXIS, fixed axes.
+        Unit axis of rotations of kind AXIS, fixed axes; without meaning for others.
     pins : tuple of Pin
-        Rotations of released ends and of supports, with what they turn against.
+        Joints of released ends and of supports.
     ends : mapping of str to tuple of int
-        Rotations at the ends of a member.
+        Numbers of the rotations at the ends of each member.
     node_turn : mapping of str to int or None
-        Rotation of a node; None where the node has no rotation of its own.
+        Number of the rotation of each node; None where the node has no rotation of its own.
     """
 
     turns: Index
@@ -74,7 +82,7 @@ class Rotations:
 
 
 def number_rotations(scene: Scene, mesh: Mesh, element: Element) -> Rotations:
-    """Number the rotations along the members and say how each may change."""
+    """Number the rotations along the members and find how each is restrained."""
     numbering = _Numbers(scene, element.space)
     turns: list[list[int]] = []
     ends: dict[str, tuple[int, ...]] = {}

@@ -1,8 +1,8 @@
-"""Members cut into segments between places, and which displacements have to be unknowns of their own.
+"""Members divided into segments between places, and which displacements have to be unknowns of their own.
 
-A *place* is a node of the scene, a cut of a member whose displacement is asked for by itself (a load there turns
-with the section), or the end of a member that slides along its node.  A *segment* is a run of elements of one
-member between two places; most members are one segment.
+A *place* is a node of the scene, an end of elements within a member whose displacement is needed (as under a follower
+load), or the end of a member that slides along its node.  A *segment* is a run of elements of one member between two
+places; most members are one segment.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["Segment", "Segments", "cushioned", "cut_members"]
 
 @dataclass(frozen=True)
 class Segment:
-    """A run of elements of a member, numbered in the model, between two places."""
+    """A run of elements of a member between two places: member, slice of elements, names of the places."""
 
     member: str
     elements: slice
@@ -39,15 +39,15 @@ class Segments:
     Attributes
     ----------
     places : tuple of str
-        The nodes of the scene, then cuts and sliding ends.
+        Names: the nodes of the scene, then places within members and sliding ends.
     kept : frozenset of str
         Places whose displacement is prescribed or an unknown in either assembly.
     parts : tuple of Segment
         In the order of their elements.
     owner : ndarray (elements,)
-        Number of the segment of an element.
+        Number of the segment of each element.
     ends : mapping of (str, int) to str
-        Place of the first (0) and the second end (1) of a member.
+        Place of the first (0) and the second end (1) of each member.
     """
 
     places: tuple[str, ...]
@@ -57,7 +57,7 @@ class Segments:
     ends: Mapping[tuple[str, int], str]
 
     def alike(self, other: Segments) -> bool:
-        """Whether others of the same scene join the same places by as many elements."""
+        """Whether other segments of the same scene join the same places by as many elements."""
         return (self.places, self.kept, self.parts) == (other.places, other.kept, other.parts)
 
     @property
@@ -67,7 +67,7 @@ class Segments:
 
     @functools.cached_property
     def single(self) -> tuple[Index, Index]:
-        """Elements that are segments by themselves, and the numbers of the places that these start at."""
+        """Numbers of the elements that are segments by themselves, and of the places at which these start."""
         alone = [part for part in self.parts if part.elements.stop - part.elements.start == 1]
         pairs = [(part.elements.start, self.place(part.start)) for part in alone]
         found = np.array(pairs, dtype=np.intp).reshape(-1, 2)
@@ -75,11 +75,11 @@ class Segments:
 
     @functools.cached_property
     def longer(self) -> tuple[Segment, ...]:
-        """All other segments."""
+        """All segments of several elements."""
         return tuple(part for part in self.parts if part.elements.stop - part.elements.start != 1)
 
     def place(self, name: str) -> int:
-        """Number of a place."""
+        """Number of a place, by its name."""
         return self._number[name]
 
     @functools.cached_property
@@ -94,7 +94,7 @@ def _touched(mesh: Mesh, member: str) -> dict[int, str]:
 
 
 def cushioned(member: str, at: float) -> str:
-    """Name of a place of a member, within it, where obstacles push softly."""
+    """Name of the place of a penalty contact within a member."""
     return f"{member} cushioned at {at:.17g}"
 
 

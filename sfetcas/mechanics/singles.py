@@ -1,4 +1,4 @@
-"""CasADi functions of single things, made once a process: a turned vector, a rotation, the rows of a connection.
+"""CasADi functions of a single vector, rotation or set of rows, made once a process.
 
 They are mapped over all elements, nodes or connections of a model, and may be compiled for that.
 """
@@ -27,12 +27,13 @@ T = TypeVar("T", ca.SX, ca.MX)
 
 
 def tag(space: bool) -> str:
+    """The end of names of functions: ``space`` or ``plane``."""
     return "space" if space else "plane"
 
 
 @functools.cache
 def turned_vector(space: bool) -> ca.Function:
-    """(q, t) -> R(q) t."""
+    """``(q, t) -> R(q) t``: a vector rotated by a unit quaternion, in the plane by an angle."""
     q, t = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("t", 3 if space else 2)
     if space:
         now = ca.vertcat(*turned(ca.vertsplit(q), ca.vertsplit(t)))
@@ -44,7 +45,7 @@ def turned_vector(space: bool) -> ca.Function:
 
 @functools.cache
 def moved_rotation(space: bool) -> ca.Function:
-    """(q, phi) -> exp(phi / 2) q, of length one again."""
+    """``(q, phi) -> exp(phi / 2) q``, normalised: rotation followed by a rotation vector; in the plane ``q + phi``."""
     q, phi = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("phi", 3 if space else 1)
     if space:
         now = ca.vertcat(*product(ca.vertsplit(exponential(phi)), ca.vertsplit(q)))
@@ -55,7 +56,7 @@ def moved_rotation(space: bool) -> ca.Function:
 
 
 def exponential(phi: T) -> T:
-    """Unit quaternion of a rotation vector."""
+    """Unit quaternion of a rotation vector (3,), smooth at zero."""
     square = 0.25 * ca.dot(phi, phi)
     half = ca.sqrt(ca.fmax(square, 1e-30))
     # sin(x) / x to all digits also where the vector vanishes.
@@ -67,7 +68,7 @@ def exponential(phi: T) -> T:
 
 @functools.cache
 def rotation_between(space: bool) -> ca.Function:
-    """(q, p) -> rotation vector from q to p, shorter than a turn."""
+    """``(q, p) ->`` rotation vector from q to p, of at most half a turn; in the plane ``p - q``."""
     q, p = ca.SX.sym("q", 4 if space else 1), ca.SX.sym("p", 4 if space else 1)
     if not space:
         return ca.Function(f"vectors_{tag(space)}", [q, p], [p - q])
@@ -82,7 +83,7 @@ def rotation_between(space: bool) -> ca.Function:
 
 @functools.cache
 def counted_angle() -> ca.Function:
-    """(a, b, axis, across, crossed, near) -> angle of side b against side a in space, nearest to ``near``.
+    """``(a, b, axis, across, crossed, near) ->`` angle of side b relative to side a in space, nearest to ``near``.
 
     See :class:`~sfetcas.mechanics.winding.Winding`.
     """
@@ -101,10 +102,11 @@ def counted_angle() -> ca.Function:
 
 @functools.cache
 def fibre_strain(round_section: bool) -> ca.Function:
-    """(change, reach) -> largest strain of the fibres of a section by bending.
+    """``(change, reach) ->`` largest bending strain in the fibres of a section.
 
-    ``change`` of the curvature about b1, b2, b3; ``reach`` of the outermost fibre from b2 and from b3.  At a corner of
-    a rectangle both bendings add up, at the rim of what is round they add up as vectors.
+    ``change`` (3,) is the change of curvature about b1, b2, b3, ``reach`` (2,) the distances of the outermost fibre
+    from the axes b2 and b3.  At a corner of a rectangle both bending strains add up, at the rim of a circle they add up
+    as vectors.
     """
     change, reach = ca.SX.sym("change", 3), ca.SX.sym("reach", 2)
     if round_section:
@@ -118,14 +120,14 @@ def fibre_strain(round_section: bool) -> ca.Function:
 
 @functools.cache
 def weighted_product(rows: int, width: int) -> ca.Function:
-    """(A, B, w) -> A^T diag(w) B."""
+    """``(A, B, w) -> A^T diag(w) B`` for A, B (rows, width) and w (rows,)."""
     a, b, w = ca.SX.sym("a", rows, width), ca.SX.sym("b", rows, width), ca.SX.sym("w", rows)
     return ca.Function(f"pairs_{rows}_{width}", [a, b, w], [ca.densify(ca.mtimes(a.T, ca.repmat(w, 1, width) * b))])
 
 
 @functools.cache
 def arms_product(axes: int, turns: int, points: int) -> ca.Function:
-    """(A, B, W) -> blocks W_jl A_j^T B_l, of arrays with a block of ``turns`` columns for each point."""
+    """``(A, B, W) ->`` blocks ``W_jl A_j^T B_l`` for A, B with a block of ``turns`` columns for each point."""
     a, b = ca.SX.sym("a", axes, turns * points), ca.SX.sym("b", axes, turns * points)
     w = ca.SX.sym("w", points, points)
     whole = ca.mtimes(a.T, b) * ca.kron(w, ca.SX.ones(turns, turns))

@@ -1,6 +1,6 @@
-"""Turning axes: the potential of the centrifugal forces on all that has mass, and these forces.
+"""Rotating axes: the potential of the centrifugal forces on all that has mass, and these forces.
 
-In axes that turn with ``Omega`` about the origin rest is an equilibrium of the loads and of the centrifugal forces,
+In axes that rotate with ``Omega`` about the origin rest is an equilibrium of the loads and of the centrifugal forces,
 
     V = -1/2 sum m |Omega x r|^2 = -1/2 sum m r.P r,      P = Omega.Omega 1 - Omega Omega^T,
 
@@ -34,7 +34,7 @@ def _matrix(load: ca.SX, axes: int) -> ca.SX:
 @final
 @dataclass(frozen=True)
 class SpunPair(Term):
-    """A mass between two places, or at one that is named twice; data: both at rest, mass; load: P."""
+    """Centrifugal potential of a mass-matrix entry of two places; data: undeformed positions, mass; load: P."""
 
     is_load: ClassVar[bool] = True
 
@@ -53,8 +53,9 @@ class SpunPair(Term):
 @final
 @dataclass(frozen=True)
 class SpunInner(Term):
-    """Inner nodes of an element, which hang on its start; data: of each node its place at rest, mass and arms, then
-    the tangents of all nodes; load: P.
+    """Centrifugal potential of the inner nodes of an element, whose positions follow from the place at its start.
+
+    Data: for each node its undeformed position, mass and integration weights, then the tangents of all nodes; load: P.
 
     Attributes
     ----------
@@ -91,8 +92,9 @@ class SpunInner(Term):
 @final
 @dataclass(frozen=True)
 class SpunVectors(Term):
-    """Vectors that are the first rows of a quantity; data: those of the quantity, of each vector what is to be added
-    and its mass; load: P.
+    """Centrifugal potential of the vectors that are the first rows of a quantity.
+
+    Data: those of the quantity, for each vector its offset from the origin and its mass; load: P.
 
     Attributes
     ----------
@@ -124,19 +126,19 @@ class SpunVectors(Term):
 
 @dataclass(frozen=True, eq=False)
 class Spinning:
-    """Turning axes of a model, dimensionless.
+    """The rotation of the axes of a model, and its centrifugal terms; dimensionless.
 
     Attributes
     ----------
     masses : Masses
     omega : ndarray (3,)
-        Angular velocity by the unit of time of the masses.
+        Angular velocity times the unit of time of the masses.
     pairs : int
-        Which connections are those of the masses at places.
+        Index of the group of connections with the masses at places.
     bodies : range
-        Which are those of section axes and small members.
-    rest, inner_rest : ndarray (places | elements, p + 1, axes)
-        Where the places and the nodes of elements are in the undeformed scene.
+        Indices of the groups with section axes and small members.
+    rest, inner_rest : ndarray (places, axes), (elements, p + 1, axes)
+        Positions of the places and of the nodes of elements in the undeformed scene.
     loading : Loading
         P on everything that has mass; no factor multiplies it.
     """
@@ -150,7 +152,11 @@ class Spinning:
     loading: Loading
 
     def positional(self, model: Any, u: Array, turned: Array, matrix: Array) -> Loading:
-        """Centrifugal forces of P on places and inner nodes as loads, at displacements and turned tangents."""
+        """Centrifugal forces on places and inner nodes as loads, for displacements u (places, axes) and rotated
+        tangents.
+
+        ``matrix`` is P (axes, axes).
+        """
         element, segments = model.element, model.segments
         arms = element.to_points / element.weights
         start = np.array([segments.place(part.start) for part in segments.parts], dtype=np.intp)[segments.owner]
@@ -162,7 +168,7 @@ class Spinning:
 
 
 def with_spinning(model: Any) -> Any:
-    """A model (:class:`~sfetcas.mechanics.model.Model`) with what turning axes do to it.
+    """A :class:`~sfetcas.mechanics.model.Model` with the centrifugal terms of its rotating axes added.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""What is out of balance at a state of a model, and the entries of Newton's matrix, as CasADi expressions.
+"""Residual and Newton matrix of a model at a state, as CasADi expressions.
 
-The same equations as in :class:`~sfetcas.mechanics.equations.Equations`, of which the tests make sure.
+The equations are those of :class:`~sfetcas.mechanics.equations.Equations`; tests compare the two.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Forces", "Stationarity", "summed"]
 
 
 class Forces:
-    """Further forces on a state: on places (places * axes,) as a residual, and pull on the points of all elements."""
+    """Additional forces on a state: on places (places * axes,) as a residual, and pulls on the points of elements."""
 
     def __init__(self, on_places: ca.MX | float = 0.0, pull: ca.MX | float = 0.0) -> None:
         self.on_places, self.pull = on_places, pull
@@ -33,7 +33,7 @@ class Stationarity:
     Parameters
     ----------
     entries : bool
-        Without them derivatives of the residual are short: what gives entries gives their derivatives, too.
+        Whether matrix entries are built; without them the expression graph of the residual is shorter.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Stationarity:
     entries : list of MX
         In the order of :attr:`~sfetcas.mechanics.tables.Tables.static`.
     shares : list of (Index, MX)
-        Of each group of terms the full coordinates of its sides, and what it takes from them.
+        For each group of terms the full coordinates of its sides, and the forces and moments that it takes from them.
     on_places : MX
         Dead forces on places, as a residual.
     spin : MX (axes, turns * nodes of elements)
@@ -95,7 +95,7 @@ class Stationarity:
 
     @property
     def pull(self) -> ca.MX:
-        """Minus the internal force at the points of elements, (axes, points of all)."""
+        """Minus the internal force at the points of elements, (axes, elements * points)."""
         expressions = self._expressions
         own = ca.reshape(self._given.pull + self._further.pull, expressions.axes, -1)
         constant = expressions.multipliers(0, self._lam)
@@ -103,7 +103,7 @@ class Stationarity:
         return own + constant[:, each.tolist()]
 
     def moments(self, nodes: Index) -> ca.MX:
-        """Moments (turns, n) of elements on some of their nodes, what follows along them among these."""
+        """Moments (turns, n) that elements, and follower loads along them, take from given nodes of elements."""
         expressions = self._expressions
         own = ca.vec(self.shares[0][1])
         for group, (_, values) in zip(expressions.model.terms, self.shares, strict=True):
@@ -115,18 +115,18 @@ class Stationarity:
         return ca.reshape(own, expressions.turns, -1)[:, nodes.tolist()]
 
     def gathered(self, more: list[tuple[Index, ca.MX]]) -> ca.MX:
-        """The residual with further shares on sides."""
+        """The residual with further forces and moments on sides added."""
         rows = [self._closed, *self._rows]
         return self._expressions.gathered([*self.shares, *more], self.on_places, self._lam, rows)
 
     @functools.cached_property
     def residual(self) -> ca.MX:
-        """What is out of balance, and what closings and joints miss."""
+        """The residual: out-of-balance moments and forces, then gaps of loop closures and joints."""
         return self.gathered([])
 
 
 def summed(shape: tuple[int, int], places: Places, entries: ca.MX) -> ca.MX:
-    """The sparse matrix of entries by their rows, columns, weights and numbers."""
+    """The sparse matrix of given shape from its entries and their rows, columns, weights and numbers."""
     row, column, weight, entry = places
     cells, inverse = np.unique(column * shape[0] + row, return_inverse=True)
     sums = sparse(inverse.ravel(), entry, weight, (len(cells), entries.shape[0]))

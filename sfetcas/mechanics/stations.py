@@ -1,8 +1,8 @@
-"""Stations along a member: in which elements they are, and the weights that make what is there of what elements carry.
+"""Stations along a member: their elements, and the weights by which fields there follow from values of the elements.
 
-With values at the nodes or integration points of its element, the same for numbers and for expressions:
+From values at the nodes or integration points of the element, in numbers and in expressions alike:
 
-    rotation   = sum nodal q, of length one again
+    rotation   = sum nodal q, normalised
     position   = that of the start of the element + sum gained (turned tangent - undeformed one)
     moment     = that at the first node of the element + sum gained (turned tangent x pull)
     force      = sum spread (distributed force) - pull at the first point
@@ -26,14 +26,14 @@ FEW = 8
 
 
 class Stations:
-    """Fractions of the length of a member.
+    """Stations at fractions of the length of a member.
 
     Attributes
     ----------
     elements : ndarray (n,)
         Elements of the member in which they are, counted from 0.
     xi : ndarray (n,)
-        Where in these, 0 to 1.
+        Positions in these elements, 0 to 1.
     """
 
     def __init__(self, element: Element, cuts: Array, x: Array) -> None:
@@ -50,23 +50,20 @@ class Stations:
 
     @functools.cached_property
     def nodal(self) -> Array:
-        """Weights of the nodes in what is interpolated, (n, nodes)."""
+        """Interpolation weights of the nodes, (n, nodes)."""
         return self._rows(lambda xi: interpolation.evaluation(self._element.nodes, xi))
 
     @functools.cached_property
     def slopes(self) -> Array:
-        """Weights of the nodes in its derivative by xi, (n, nodes)."""
+        """Weights of the nodes in the derivative by xi, (n, nodes)."""
         return self._rows(lambda xi: interpolation.differentiation(self._element.nodes, xi))
 
     @functools.cached_property
     def gained(self) -> Array:
-        """Weights of what is given at the points, times their weights, in its integral up to here, (n, points)."""
+        """Weights (n, points) of values at the points, quadrature weights included, in their integral up to here."""
         return self._rows(lambda xi: interpolation.integration(self._element.points, xi)) / self._element.weights
 
     @property
     def spread(self) -> Array:
-        """Weights of the distributed forces at the points in the internal force, (n, points).
-
-        What acts beyond the station; the pull at the first point has the share that its adjoint gives to it.
-        """
+        """Weights (n, points) of the distributed forces at the points in the internal force at the station."""
         return 1.0 - self._element.to_points[:, 0] / self._element.weights[0] - self.gained

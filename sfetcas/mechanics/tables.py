@@ -1,11 +1,11 @@
-"""Where what the terms of a model give goes: numbers of the unknowns, and places in matrices.  Data alone.
+"""Index tables for assembly: numbers of the unknowns, and positions of the entries of terms in matrices.
 
-*Full* coordinates are those of all rotations, the displacements of all places, and the multipliers, held or not.  In
-one chart the coordinates of a rotation are a rotation vector about the fixed axes, in the other the components of its
-quaternion; in the plane both are the angle.  Each full coordinate has at most one unknown and a weight: of a rotation
-that is held to an axis the three parts of a vector are one unknown times the components of the axis.  Terms give
-moments, forces and second derivatives by full coordinates; sums with weights take them to the unknowns.  The numeric
-and the symbolic evaluation read the same tables.
+*Full* coordinates are those of all rotations, the displacements of all places, and the multipliers, prescribed or not.
+In one chart the coordinates of a rotation are a rotation vector about the fixed axes, in the other the components of
+its quaternion; in the plane both are the angle.  Each full coordinate has at most one unknown and a weight: of a
+rotation that is restrained to an axis the three components of a vector are one unknown times the components of the
+axis.  Terms give moments, forces and second derivatives by full coordinates; weighted sums take them to the unknowns.
+The numeric and the symbolic evaluation use the same tables.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Places = tuple[Index, Index, Array, Index]
 
 
 class Acting(Protocol):
-    """Things of one kind that act on rotations and places: terms, or quantities that carry mass."""
+    """Interface of groups that act on rotations and places: of terms, or of quantities that carry mass."""
 
     @property
     def turns(self) -> Index:
@@ -40,11 +40,11 @@ class Acting(Protocol):
 
     @property
     def data(self) -> Array:
-        """Their data, (n, data)."""
+        """Data, (n, data)."""
 
 
 class Entries:
-    """Places of entries of a matrix in full coordinates, and where they are in the unknowns."""
+    """Positions of matrix entries in full coordinates, and in the unknowns."""
 
     def __init__(self, unknown: Index, weight: Array) -> None:
         self._unknown, self._weight = unknown, weight
@@ -53,7 +53,10 @@ class Entries:
         self.count = 0
 
     def add(self, rows: Array, columns: Array) -> None:
-        """Places of the next entries, in the order of what will be given."""
+        """Append positions of entries in full coordinates, in the order in which their values will be given.
+
+        ``rows`` and ``columns`` are arrays that broadcast; -1 is the ground.
+        """
         rows, columns = np.broadcast_arrays(rows, columns)
         self._rows.append(rows.ravel())
         self._columns.append(columns.ravel())
@@ -61,7 +64,7 @@ class Entries:
 
     @functools.cached_property
     def places(self) -> Places:
-        """Row, column and weight in the unknowns, and which entry each is."""
+        """Row, column and weight in the unknowns, and number, of the entries that are not on prescribed coordinates."""
         nothing = np.zeros(0, np.intp)
         rows = np.concatenate([nothing, *self._rows])
         columns = np.concatenate([nothing, *self._columns])
@@ -74,7 +77,7 @@ class Entries:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Pattern of a matrix, how entries are summed up in it, and the order of its unknowns."""
+    """Sparsity pattern of a matrix, the map that sums entries into it, and a permutation and its inverse."""
 
     pattern: ca.Sparsity
     sums: ca.DM
@@ -84,7 +87,11 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Closed:
-    """Entries of loop closures by rotations: where they go in full coordinates, and which of the spins each is."""
+    """Jacobian entries of loop closures by rotations, each array (entries,).
+
+    ``row`` and ``cell`` are the full coordinates of multiplier and rotation, ``entry`` the index in the derivatives of
+    the chords of elements, ``value`` the factor.
+    """
 
     row: Index
     cell: Index
@@ -93,32 +100,34 @@ class Closed:
 
 
 class Tables:
-    """Numbers of the unknowns of a model and places of what its terms give.
+    """Numbers of the unknowns of a model and positions of the entries of its terms.
 
     Parameters
     ----------
     model : Model
     components : bool
-        The chart of rotations: components instead of rotation vectors.
+        The chart of rotations: components of quaternions instead of rotation vectors.
 
     Attributes
     ----------
     width : int
-        Coordinates of a rotation.
+        Number of coordinates of a rotation.
     number : ndarray (rotations, width)
-        Unknown of each coordinate of a rotation, -1 where it has none; of a rotation that is held to an axis the first
-        is the angle, or the first two are the scalar and the vector's component along it.
+        Unknown of each coordinate of a rotation, -1 where it has none; of a rotation that is restrained to an axis the
+        first is the angle, or the first two are the scalar and the vector's component along the axis.
     place_number : ndarray (places, axes)
-        The same of displacements that are unknowns component by component.
+        Unknown of each component of a displacement that is an unknown by itself, else -1.
     turning_unknowns, displacement_unknowns, unknowns, rows, total : int
+        Number of rotation and displacement unknowns, their sum, number of constraint rows, and the sum of all.
     of_places, of_rows, full : int
         Where displacements and multipliers begin among the full coordinates, and their number.
     unknown, weight : ndarray (full,)
-        Of each full coordinate.
+        Unknown (or -1) and weight of each full coordinate.
     sides : list of ndarray (n, width)
-        Of each group of terms the full coordinates of its sides, -1 of the ground.
+        For each group of terms the full coordinates of its sides, -1 for the ground.
     labels : list of ndarray (n, rows)
-        Of each group the full coordinates of its multipliers; of elements none, they have no multipliers of their own.
+        For each group the full coordinates of its multipliers; none for elements, which have no multipliers of their
+        own.
     """
 
     def __init__(self, model: Model, *, components: bool = False) -> None:
@@ -171,12 +180,12 @@ class Tables:
         self.unknown, self.weight = unknown, weight
 
     def place_cells(self, places: Index) -> Index:
-        """Full coordinates (n, axes) of displacements of places."""
+        """Full coordinates (n, axes) of the displacements of places (n,)."""
         axes = self.model.element.axes
         return np.asarray(self.of_places + axes * places[:, None] + np.arange(axes))
 
     def sides_of(self, group: Acting) -> Index:
-        """Full coordinates of the sides of a group (n, width), -1 of the ground."""
+        """Full coordinates (n, width) of the sides of a group, -1 for the ground."""
         n = len(group.data)
         turning = self.width * group.turns[:, :, None] + np.arange(self.width)
         axes = self.model.element.axes
@@ -189,7 +198,7 @@ class Tables:
 
     @functools.cached_property
     def closed(self) -> Closed:
-        """Derivatives of the loop closures by the rotations of elements, from those of the chords of these."""
+        """Jacobian of the loop closures by rotations of elements, from the derivatives of their chords."""
         model, axes = self.model, self.model.element.axes
         z, cells = model.positions.Z, self.sides[0]
         elements, repeated = self.elements_reached(z.column // axes)
@@ -204,7 +213,7 @@ class Tables:
         )
 
     def elements_reached(self, segments: Index) -> tuple[Index, Index]:
-        """All elements of segments, and of each of them the place of its segment in the given ones."""
+        """All elements of given segments, and for each of them the index of its segment among those given."""
         first = np.searchsorted(self.model.segments.owner, np.arange(len(self.model.segments.parts) + 1))
         counts = first[segments + 1] - first[segments]
         repeated = np.repeat(np.arange(len(segments)), counts)
@@ -215,11 +224,11 @@ class Tables:
 
     @functools.cached_property
     def static(self) -> Entries:
-        """Entries that the terms give, see :meth:`static_entries`."""
+        """Positions of the entries of all terms, see :meth:`static_entries`."""
         return self.static_entries()
 
     def static_entries(self) -> Entries:
-        """A new list of the entries that the terms give: second derivatives, then those of the rows, twice."""
+        """A new list of the entries of all terms: second derivatives, then Jacobian of the rows and transpose."""
         found = self.entries()
         for number in range(len(self.sides)):
             self._add_second(found, number)
@@ -230,7 +239,7 @@ class Tables:
 
     @functools.cached_property
     def second(self) -> Entries:
-        """Entries of second derivatives alone, group by group."""
+        """Positions of the entries of second derivatives alone, group by group."""
         found = self.entries()
         for number in range(len(self.sides)):
             self._add_second(found, number)
@@ -238,7 +247,7 @@ class Tables:
 
     @functools.cached_property
     def first(self) -> Entries:
-        """Entries of the rows' derivatives alone, group by group."""
+        """Positions of the entries of the Jacobian of the rows alone, group by group."""
         found = self.entries()
         for number in range(len(self.sides)):
             found.add(*self._first(number))
@@ -257,11 +266,11 @@ class Tables:
         return row, column
 
     def entries(self) -> Entries:
-        """A new list of entries."""
+        """A new, empty list of entries."""
         return Entries(self.unknown, self.weight)
 
     def tied(self, entries: Entries) -> Places:
-        """Entries, and the ties between displacements and loop closures: one number, 1, after all others."""
+        """The positions of entries, then those of displacements in loop closures, of one last entry, the number 1."""
         w = self.model.positions.W
         row, column, value, entry = entries.places
         r, c = self.unknowns + w.row, self.turning_unknowns + w.column
@@ -274,7 +283,7 @@ class Tables:
 
     @functools.cached_property
     def whole(self) -> Places:
-        """Entries of the terms, ties, and the whole diagonal of a further number, 0, which shifts are put on."""
+        """Positions of the entries of the terms, of displacements in loop closures, and of a diagonal of entry 0."""
         row, column, weight, entry = self.tied(self.static)
         every = np.arange(self.total)
         return (

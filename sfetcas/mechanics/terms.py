@@ -1,16 +1,16 @@
-"""Terms of the Lagrangian: what every kind of term says, its derivatives in two charts of rotations, and where it acts.
+"""Terms of the Lagrangian: functions of a kind of term, their derivatives in two charts of rotations, and their sides.
 
 For statics the Lagrangian of a model is a sum over terms,
 
     L(q, u, lam) = sum energy(q_1..q_k, u_1..u_m; data, loads) + lam . rows(q_1..q_k, u_1..u_m; data, loads),
 
-of the rotations ``q`` and displacements ``u`` of its *sides*.  The rows of a joint have to vanish and its multipliers
-are unknowns; the row of an element is the chord that it gains, and its multiplier the internal force, which is linear
-in the multipliers of the loop closures.  What has no potential gives generalised forces instead of an energy.
+of the rotations ``q`` and displacements ``u`` of its *sides*.  The rows of a joint are constraints, whose multipliers
+are unknowns.  The row of an element is the change of its chord, and its multiplier the internal force, which is linear
+in the multipliers of the loop closures.  A term without potential gives generalised forces instead of an energy.
 
-A kind of term is one class that says these functions.  Their derivatives follow from the one expression, once a process
-and kind, in either chart: components of rotations, of which norms are rows of their own (IPOPT's program), or rotation
-vectors about the fixed axes, ``dq = 1/2 (0, phi) q`` on unit quaternions (Newton's method and all that stands on it).
+A kind of term is one class that defines these functions.  Their derivatives follow from the one expression, once a
+process and kind, in either chart: components of rotations, whose norms are further constraints (IPOPT's program), or
+rotation vectors about the fixed axes, ``dq = 1/2 (0, phi) q`` on unit quaternions (Newton's method).
 """
 
 from __future__ import annotations
@@ -50,132 +50,139 @@ Side = list[ca.SX]
 """Components of a rotation or of a vector."""
 
 Discrete = Literal["middle", "ends", "relative"]
-"""Where derivatives are taken between two states, see :attr:`Term.discrete`."""
+"""Where derivatives are taken between two states in the energy-momentum scheme, see :attr:`Term.discrete`."""
 
 GROUND = -1
-"""Number of a side that is the ground: it neither turns nor moves."""
+"""Number of a side that is the ground, which neither rotates nor moves."""
 
 
 @dataclass(frozen=True)
 class Term(Components, abc.ABC):
-    """A kind of term; what it says stands in the methods that a new kind gives.
+    """Base class of the kinds of terms; a new kind overrides the methods that differ from their defaults.
+
+    In all methods ``q`` and ``u`` list the rotations and displacements of the sides, ``data`` is constant, and ``load``
+    grows with the load factor; everything is dimensionless.
 
     Attributes
     ----------
     space : bool
-        Quaternions and three axes, or angles and two.
+        In space (quaternions, three axes) or in the plane (angles, two axes).
     """
 
     space: bool
 
     table: ClassVar[str] = ""
-    """Table of the scene and of the answer in which it stands by its name; empty of what is told of in none."""
+    """Table of the scene and of the answer to which it belongs; empty where it belongs to none."""
 
     answers: ClassVar[Mapping[str, str]] = {}
-    """Keys of what :meth:`answer` says of it, with their units."""
+    """Keys of the quantities that :meth:`answer` gives, with their units."""
 
     one_sided: ClassVar[bool] = False
-    """Whether its moments on the rotations of one node do not add up to nothing."""
+    """Whether its moments on the rotations of one node have a non-zero sum."""
 
     supports: ClassVar[bool] = False
-    """Whether what it does to the ground is a reaction of the support there."""
+    """Whether its force and moment on the ground are a reaction of the support there."""
 
     follows: ClassVar[bool] = False
-    """Whether it is a load that turns with what it acts on."""
+    """Whether it is a follower load."""
 
     is_load: ClassVar[bool] = False
-    """Whether what it does to its sides is a load, not what a joint or a spring does."""
+    """Whether its forces are loads, not those of a joint or a spring."""
 
     is_couple: ClassVar[bool] = False
-    """Whether it is a load that is a moment and does not turn."""
+    """Whether it is a dead moment."""
 
     drives: ClassVar[str] = ""
-    """What a motion prescribes by its load, ``angle`` or ``travel``; empty of all that no motion drives."""
+    """What a prescribed motion gives by its ``load``: ``angle`` or ``travel``; empty where it is no driven joint."""
 
     along_element: ClassVar[bool] = False
-    """Whether its loads are forces at the nodes of an element, of which its rotations are."""
+    """Whether its loads are forces at the nodes of an element, whose rotations are its sides."""
 
     on_face: ClassVar[bool] = False
-    """Whether its row keeps a place on a face of an obstacle."""
+    """Whether its row keeps a place on the surface of an obstacle."""
 
     from_place: ClassVar[bool] = False
-    """Whether the first of its :attr:`vectors` begins where its first place is in the undeformed scene."""
+    """Whether the first of its :attr:`vectors` is relative to its first place in the undeformed scene."""
 
     @property
     def discrete(self) -> Discrete:
-        """Where between two states its derivatives are taken whose work is what its energy and its rows gain.
+        """How the energy-momentum scheme takes derivatives whose work equals the change of energy and rows between two
+        states.
 
-        ``middle`` of the states, to second order; the mean of both ``ends``, exact for vectors that turn with one side;
-        by the ``relative`` rotation, of the second side against the first or of one against the ground, exact for rows
-        that are linear in it, and for energies quadratic in the angle of the plane.
+        ``middle``: at the mean state, to second order; ``ends``: the mean of those at both ends, exact for vectors that
+        turn with one side; ``relative``: by the rotation of the second side relative to the first, or of one to the
+        ground, exact for rows that are linear in it, and in the plane for energies quadratic in the angle.
         """
         return "middle"
 
     @property
     def vectors(self) -> int:
-        """How many vectors its rows begin with that have momentum, and on which turning axes act."""
+        """How many vectors its rows begin with that have momentum, centrifugal and Coriolis forces."""
         return 0
 
     @property
     def has_potential(self) -> bool:
-        """Whether what it does is the derivative of its energy; else of :meth:`forces`."""
+        """Whether its forces are the derivative of its energy, not those of :meth:`forces`."""
         return True
 
     def counted(self, data: Array) -> tuple[Array, Array] | None:
-        """Axis of the first side and direction of the second, (n, 3) each, whose angle about it counts turns.
+        """Axis (n, 3) of the first side and direction (n, 3) of the second whose angle about the axis counts turns.
 
-        Without a direction, zero, it is the angle of the rotation itself.  Where there is such an angle the last number
-        of the data is the value near which it is counted.  See :class:`~sfetcas.mechanics.winding.Winding`.
+        A zero direction means the angle of the rotation itself.  For such terms the last number of the data is the
+        reference value of the angle, see :class:`~sfetcas.mechanics.winding.Winding`.  None for terms without such an
+        angle.
         """
         return None
 
     @property
     @abc.abstractmethod
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """Rotations, places, rows, data and loads (data that grow with the load factor)."""
+        """Number of rotations, places, rows, data, and loads (data that grow with the load factor)."""
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Potential energy, dimensionless."""
         return ca.SX(0)
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """What has to be zero: angles (rad) and displacements, dimensionless."""
+        """The constraint rows, zero where met: angles (rad) and displacements, dimensionless."""
         return []
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Generalised forces beside those of the energy, as a residual: moments on rotations, then forces on places.
+        """Generalised forces without potential, as a residual: moments on rotations, then forces on places.
 
-        What has a potential has none, or such as do no work on anything that its sides may do.
+        A term with a potential has none, or only such that do no work on the possible motions of its sides.
         """
         return []
 
     def stiffest(self, data: Array) -> Array | None:
-        """Largest stiffness (n,) of each term, where rounding of a stiff direction has levers on the others."""
+        """Largest stiffness (n,) of each term, where its rounding errors affect softer directions; None elsewhere."""
         return None
 
     def travel(self, q: list[Side], u: list[Side], data: ca.SX) -> ca.SX:
-        """Of a spring the angle, rad, or length, dimensionless, whose rate a damper beside it resists."""
+        """Angle, rad, or elongation, dimensionless, of a spring, whose rate a damper parallel to it resists."""
         return ca.SX(0)
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
-        """Minus the present generalised forces times the displacements: told with the energy, never differentiated."""
+        """Minus the generalised forces times the displacements, to be reported with the energy; it is never
+        differentiated.
+        """
         return ca.SX(0)
 
     def answer(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX, lam: ca.SX) -> list[ca.SX]:
-        """What the answer tells of it, in the order of :attr:`answers`, dimensionless; ``lam`` of its rows."""
+        """Quantities for the answer, in the order of :attr:`answers`, dimensionless; ``lam``: multipliers."""
         return []
 
     # -- what the sides say to each other --------------------------------------------------------
 
     def back(self, q: Side, v: Side) -> Side:
-        """The vector seen from the turned side, ``R(q)^T v``."""
+        """The components of a vector in rotated axes, ``R(q)^T v``."""
         if self.space:
             return turned([q[0], -q[1], -q[2], -q[3]], v)
         c, s = ca.cos(q[0]), ca.sin(q[0])
         return [c * v[0] + s * v[1], c * v[1] - s * v[0]]
 
     def turned_back(self, q: Side, v: Side) -> Side:
-        """What turning back changes, ``R(q)^T v - v``, also of small rotations to full precision."""
+        """``R(q)^T v - v``, to full relative precision also for small rotations."""
         if self.space:
             spin = [-a for a in q[1:]]
             once = ca.cross(ca.vertcat(*spin), ca.vertcat(*v))
@@ -184,21 +191,21 @@ class Term(Components, abc.ABC):
         return [s * v[1] - versine * v[0], -s * v[0] - versine * v[1]]
 
     def forth(self, q: Side, v: Side) -> Side:
-        """The vector turned with the side, ``R(q) v``."""
+        """The rotated vector, ``R(q) v``."""
         return self.back([-q[0]] if not self.space else [q[0], -q[1], -q[2], -q[3]], v)
 
     def relative(self, a: Side, b: Side) -> Side:
-        """Rotation of side b against side a, seen from the undeformed scene."""
+        """Rotation of side b relative to side a, in undeformed axes: ``conj(a) b``, in the plane the difference."""
         return product([a[0], -a[1], -a[2], -a[3]], b) if self.space else [b[0] - a[0]]
 
     # -- derivatives, where a kind has a shorter way to them than the whole expression ---------------
 
     def turning(self) -> ca.Function:
-        """What :func:`by_turning` gives."""
+        """The function :func:`by_turning` of this kind."""
         return _by_turning(self)
 
     def turning_forces(self) -> ca.Function:
-        """What :func:`forces_by_turning` gives."""
+        """The function :func:`forces_by_turning` of this kind."""
         whole = by_turning(self)
         symbols = whole.sx_in()
         found = whole.call(symbols)
@@ -206,32 +213,32 @@ class Term(Components, abc.ABC):
         return ca.Function(f"forces_{name_of(self)}", symbols, [found[2], found[3]], names, ["rows", "gradient"])
 
     def slopes(self) -> ca.Function:
-        """What :func:`slopes_of` gives."""
+        """The function :func:`slopes_of` of this kind."""
         return _slopes(self)
 
     def curvatures(self) -> ca.Function:
-        """What :func:`curvatures_of` gives."""
+        """The function :func:`curvatures_of` of this kind."""
         return _curvatures(self)
 
 
 @dataclass(frozen=True)
 class One:
-    """One term before it is put to those of its kind.
+    """One term before it is grouped with those of its kind; its data are dimensionless.
 
     Attributes
     ----------
     kind : Term
     name : str
-        What it is: a spring, a member, a motion, a load, or a joint.
+        The record that it belongs to: a spring, member, motion, load, or joint.
     node : str
         The node at which it is; empty where there is none.
-    data : ndarray
+    data : ndarray (data,)
     turns, places : tuple of int
-        Numbers of its sides.
+        Numbers of the rotations and places that are its sides.
     row : str
         Name of its rows.
-    loads : mapping of str or None to ndarray
-        What grows with a history, or with the load factor (None), at the factor 1, beside the loads of the scene.
+    loads : mapping of str or None to ndarray (loads,)
+        Data that grow with a history, or with the load factor (None), at factor 1, beside the loads of the scene.
     """
 
     kind: Term
@@ -257,11 +264,11 @@ class Group:
     rows : tuple of str
         Names of the rows that have multipliers of their own, those of the first term first.
     names : tuple of str
-        What each term is: a spring, a member, a motion, a load, or a joint.
+        For each term the record that it belongs to: a spring, member, motion, load, or joint.
     nodes : tuple of str
-        The node at which it is; of a small member its first.
+        For each term the node at which it is; of a small member its first.
     loads : mapping of str or None to ndarray (n, loads)
-        What grows with a history, or with the load factor (None), at the factor 1, beside the loads of the scene.
+        Data that grow with a history, or with the load factor (None), at factor 1, beside the loads of the scene.
     """
 
     kind: Term
@@ -275,7 +282,7 @@ class Group:
 
 
 def grouped(ones: Iterable[One]) -> tuple[Group, ...]:
-    """Terms by their kinds, in the order in which these come first; moments, which C looks for in one run, last."""
+    """Terms grouped by kind, in the order in which the kinds first appear; dead moments come last."""
     found: dict[Term, list[One]] = {}
     for one in ones:
         found.setdefault(one.kind, []).append(one)
@@ -301,7 +308,7 @@ def _group(kind: Term, ones: list[One]) -> Group:
 
 
 def name_of(kind: Term) -> str:
-    """A name for functions of a kind, of its own for each kind."""
+    """A name for the functions of a kind, unique among kinds."""
     extra = ""
     for item in fields(kind):
         value = getattr(kind, item.name)
@@ -338,7 +345,7 @@ def _work(kind: Term, arguments: list[ca.SX]) -> ca.SX:
 
 @functools.cache
 def by_turning(kind: Term) -> ca.Function:
-    """(q, u, data, load, lam) -> energy, its share without loads, rows, gradient, stiffness, and the rows' derivative.
+    """``(q, u, data, load, lam) ->`` energy, its part without loads, rows, gradient, stiffness, Jacobian of the rows.
 
     Derivatives of the Lagrangian ``energy + lam.rows`` by rotations about the fixed axes of all sides, then by all
     displacements, on unit quaternions: with ``E`` from ``dq = 1/2 (0, phi) q`` the gradient is ``E^T g`` and the
@@ -397,15 +404,15 @@ def _halves(forces: ca.SX, rotations: int, space: bool) -> ca.SX:
 
 @functools.cache
 def forces_by_turning(kind: Term) -> ca.Function:
-    """(q, u, data, load, lam) -> rows and gradient of :func:`by_turning` alone, of which derivatives are short."""
+    """``(q, u, data, load, lam) ->`` rows and gradient of :func:`by_turning` alone, as a short expression graph."""
     return kind.turning_forces()
 
 
 @functools.cache
 def slopes_of(kind: Term) -> ca.Function:
-    """(q, u, data, load) -> gradient of the energy and jacobian of the rows of a kind.
+    """``(q, u, data, load) ->`` gradient of the energy and Jacobian of the rows of a kind that has a potential.
 
-    By the components of all rotations, then of all displacements; of what has a potential.
+    By the components of all rotations, then of all displacements.
     """
     return kind.slopes()
 
@@ -419,7 +426,7 @@ def _slopes(kind: Term) -> ca.Function:
 
 @functools.cache
 def curvatures_of(kind: Term) -> ca.Function:
-    """(q, u, data, load, lam, weight) -> Hessian of ``weight energy + lam.rows`` of a kind by the same components."""
+    """``(q, u, data, load, lam, weight) ->`` Hessian of ``weight energy + lam.rows`` by the components of all sides."""
     return kind.curvatures()
 
 
@@ -433,7 +440,7 @@ def _curvatures(kind: Term) -> ca.Function:
 
 @functools.cache
 def energies_of(kind: Term) -> ca.Function:
-    """(q, u, data, load) -> energy of a kind, and its share without loads."""
+    """``(q, u, data, load) ->`` energy of a kind, and its part without loads."""
     arguments, energy, _, _ = _said(kind)
     stored = ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape))
     results, names = [energy + _work(kind, arguments), stored], ["energy", "stored"]
@@ -442,14 +449,14 @@ def energies_of(kind: Term) -> ca.Function:
 
 @functools.cache
 def rows_of(kind: Term) -> ca.Function:
-    """(q, u, data, load) -> rows of a kind."""
+    """``(q, u, data, load) ->`` constraint rows of a kind."""
     arguments, _, rows, _ = _said(kind)
     return ca.Function(f"rows_{name_of(kind)}", arguments[:4], [ca.densify(rows)], [*ARGUMENTS[:4]], ["rows"])
 
 
 @functools.cache
 def answers_of(kind: Term) -> ca.Function:
-    """(q, u, data, load, lam) -> what the answer tells of a term, in the order of its ``answers``."""
+    """``(q, u, data, load, lam) ->`` quantities of a term for the answer, in the order of its ``answers``."""
     arguments, sides = _symbols(kind)
     found = kind.answer(*sides, *arguments[2:])
     name = f"answers_{name_of(kind)}"

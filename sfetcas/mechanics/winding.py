@@ -1,9 +1,9 @@
 """Angles about axes in space that count turns.
 
-A quaternion knows the angle of a hinge up to two turns, the direction of an axis up to one.  What is missing is
-carried beside the rotations of a state: for each angle a value near which it is counted, brought forward with every
-step.  Energies of springs and the work of moments about held hinges are smooth then at any number of turns.  In the
-plane rotations are angles, which count turns by themselves.
+A quaternion determines the angle of a hinge up to two turns, the direction of an axis up to one.  The missing turns are
+part of the state: for each angle a reference value, updated with every step, and of all angles with the same rotation
+the one nearest to it is taken.  So the energies of springs and the work of moments about hinges to the ground are
+smooth at any number of turns.  In the plane rotations are angles, which count turns by themselves.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ SWUNG = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Winding:
-    """The angles of a model that count turns: of springs and stops, and of what moments about held axes work on.
+    """The angles of a model that count turns: of springs, stops and driven joints, and for moments about fixed axes.
 
     Attributes
     ----------
     sides : ndarray (n, 2)
-        Numbers of the rotations, -1 the ground; the angle is that of the second against the first.
+        Numbers of the rotations, -1 for the ground; the angle is that of the second relative to the first.
     axis : ndarray (n, 3)
         Unit axis, carried by the first side.
     across : ndarray (n, 3)
         Direction carried by the second side whose angle about the axis it is, see
         :class:`~sfetcas.mechanics.joints.Turning`; zero for the angle of the rotation itself.
     parts : tuple of slice or None
-        Of each group of terms its angles.
+        For each group of terms its angles; None where it has none.
     driven : tuple of (int, int, int, float)
-        Angles that a driven joint prescribes: which, by which group and connection, and the sign.
+        For angles that a driven joint prescribes: number of the angle, of group and term of the joint, and sign.
     names : tuple of str
-        What has each angle, for sentences.
+        Description of each angle for messages.
     """
 
     sides: Index
@@ -64,7 +64,7 @@ class Winding:
         return len(self.sides)
 
     def angles(self, q: Array, near: Array) -> Array:
-        """The angles (n,), rad, at rotations (rotations, 4): of all that look the same those nearest to ``near``."""
+        """The angles (n,), rad, at q (rotations, 4): of all with the same rotation those nearest to ``near``."""
         if not self.count:
             return near
         sine, cosine, share = self._parts(q)
@@ -101,7 +101,7 @@ class Winding:
         return np.where(self._crossed, 1.0, 2.0)
 
     def moved(self, q: Array, near: Array, turn: Array, there: Array) -> Array:
-        """The angles after rotations ``q`` have turned by vectors (rotations, 3) about the fixed axes to ``there``."""
+        """The angles (n,), rad, after ``q`` has changed by vectors ``turn`` (rotations, 3), rad, to ``there``."""
         if not self.count:
             return near
         if self._on_ground:
@@ -113,7 +113,7 @@ class Winding:
         return self.angles(there, self.angles(q, near) + gained)
 
     def prescribed(self, kind: Index, loading: Loading) -> Array:
-        """(n,): the angles that motions prescribe, between held rotations and at driven joints; else nan."""
+        """The angles (n,), rad, that prescribed rotations and driven joints determine; nan for all others."""
         near = np.full(self.count, np.nan)
         if not self.count:
             return near
@@ -124,16 +124,16 @@ class Winding:
         return near
 
     def of_vectors(self, turn: Array) -> Array:
-        """The angles where all rotations turn about one axis each by vectors (rotations, 3)."""
+        """The angles (n,), rad, where each rotation is by a vector ``turn`` (rotations, 3) about its fixed axis."""
         turn = np.vstack([turn, np.zeros(3)])
         apart = turn[self.sides[:, 1]] - turn[self.sides[:, 0]]
         return np.asarray(np.sign(_dot(self.axis, apart)) * np.linalg.norm(apart, axis=1))
 
     def doubt(self, q: Array, near: Array, loading: Loading) -> str | None:
-        """Why an angle cannot be told at a state, None where all can.
+        """A sentence on why an angle is undetermined at a state; None where all are determined.
 
-        A driven joint is off by whole turns from what drives it, or the axis of a spring between sides that turn
-        freely has swung half round: then any angle about it leads to the same rotation.
+        The angle of a driven joint differs from the prescribed one by whole turns, or the axis of a spring between
+        freely rotating sides has swung by half a turn, where the rotation does not determine the angle about it.
         """
         if not self.count:
             return None

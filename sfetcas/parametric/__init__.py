@@ -1,1 +1,1 @@
-"""Numbers of a scene as parameters: how its data depend on them, its equilibria and motions as functions of them."""
+"""Numbers of a scene as parameters: equilibria and motions as functions of them, with exact derivatives."""

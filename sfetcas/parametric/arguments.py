@@ -1,4 +1,4 @@
-"""Numbers of a scene as arguments, and what is given to the equations as a function of them."""
+"""Numbers of a scene as arguments: names, defaults, ranges, and the data of the equations as their functions."""
 
 from __future__ import annotations
 
@@ -47,19 +47,20 @@ FACTOR = "factor"
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of one's own that several numbers of a scene follow: a length, the place of a joint on a line.
+    """A user-defined parameter on which several numbers of a scene depend: a length, the place of a joint on a line.
 
     ``Parameter(1.0, lambda x: {"nodes.B.position": [x, 0], "nodes.C.position": [2 * x, 0]})``
 
     Attributes
     ----------
     value : float
-        That of the scene as it stands.
+        Its value in the scene as given.
     numbers : callable
-        Numbers of the scene for a value, by their names; it is called with a symbol, too, which NumPy's functions take.
+        Value -> numbers of the scene by their names; also called with a symbol, which NumPy's functions accept.
     low, high : float or None
-        What is accepted.
+        Range of accepted values.
     unit, meaning : str
+        For tables and messages.
     """
 
     value: float
@@ -79,13 +80,14 @@ class Argument:
     name : str
         As in the scene: ``loads.tip.value``.
     default : tuple of float
+        Its value in the scene.
     unit, meaning : str
     low, high : float or None
-        What is accepted of each number.
+        Range of accepted values of each number.
     components : tuple of int or None
-        Which numbers of a list these are; None of a single number.
+        Indices of the numbers of a list; None for a single number.
     numbers : callable or None
-        Numbers of the scene for its value, of a :class:`Parameter`.
+        For a :class:`Parameter`: value -> numbers of the scene by their names.
     """
 
     name: str
@@ -99,7 +101,7 @@ class Argument:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and largest value that is accepted: its range, and of sections what is positive."""
+        """Least and largest accepted value: the range; else above zero for sections, from zero for ``stiffness``."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         if self.name.startswith("sections.") and ".polynomial" not in self.name:
@@ -108,18 +110,24 @@ class Argument:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """A name for each number."""
+        """A name for each of its numbers: with the index for those of a list."""
         if self.components is None:
             return (self.name,)
         return tuple(f"{self.name}.{i}" for i in self.components)
 
 
 Asked = Sequence[str] | Mapping[str, tuple[float, float] | Parameter | None] | None
-"""Names of numbers, or these with their ranges, and names of one's own with what they are; None for the usual ones."""
+"""Names of numbers, or a mapping of them to ranges (None: no range) or :class:`Parameter`; None: defaults."""
 
 
 def asked_for(scene: Scene, asked: Asked) -> list[Argument]:
-    """The arguments that are asked for."""
+    """The arguments of the given names; those of :func:`default_arguments` for None.
+
+    Raises
+    ------
+    SceneError
+        The scene has no such number, it changes the elements, or a range or parameter is wrong.
+    """
     chosen = asked if asked is not None else default_arguments(scene)
     spans = chosen if isinstance(chosen, Mapping) else dict.fromkeys(chosen)
     for name, span in spans.items():
@@ -166,7 +174,7 @@ def _own(scene: Scene, name: str, given: Parameter) -> Argument:
 
 
 def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, float]:
-    """Values of numbers and of lists of numbers, number by number.
+    """Values of single numbers, by name, from values of numbers and of lists of numbers; in the units of the scene.
 
     Raises
     ------
@@ -188,7 +196,7 @@ def single_numbers(scene: Scene, values: Mapping[str, ArrayLike]) -> dict[str, f
 
 
 def default_arguments(scene: Scene) -> list[str]:
-    """The factor where it multiplies anything, those of histories, all loads, and what all motions prescribe."""
+    """Names of the default arguments: the load factor, the histories, all loads, and all prescribed motions."""
     free = [one for table in (scene.loads, scene.motions) for one in table.values() if one.history is None]
     names = [FACTOR] if free or scene.gravity is not None else []
     names += [f"histories.{name}" for name in scene.histories]
@@ -200,7 +208,7 @@ def default_arguments(scene: Scene) -> list[str]:
 
 
 def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -> Argument:
-    """The argument of a name.
+    """The argument of a name, with a range ``span`` if given.
 
     Raises
     ------
@@ -341,18 +349,19 @@ def _meaning(path: Sequence[str]) -> str:
 
 
 class Arguments:
-    """What is given as a function of the arguments.
+    """The data and loads of the equations as functions of the arguments.
 
     The numbers of the scene are symbols in the data of its model, which is assembled once: at values near those of the
-    scene at which nothing vanishes by chance, so that its structure is that of all values.
+    scene at which no entry vanishes by chance, so that its sparsity is that for all values.
 
     Attributes
     ----------
     arguments : tuple of Argument
     model : Model
-        At these values.
+        Assembled at these values.
     program : Program
     defaults : ndarray (numbers,)
+        Values of the scene, in its units.
     """
 
     def __init__(
@@ -384,7 +393,7 @@ class Arguments:
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
     def accepted(self, values: Array) -> bool:
-        """Whether values of the numbers are finite and within their limits."""
+        """Whether values (numbers,), in the units of the scene, are finite and within their limits."""
         limits = [one.limits for one in self.arguments for _ in one.default]
         return all(low <= x <= high and np.isfinite(x) for x, (low, high) in zip(values, limits, strict=True))
 
@@ -441,7 +450,7 @@ class Arguments:
                 raise SceneError(message, ("arguments", self._names[i]))
 
     def scene_at(self, values: Array) -> Scene:
-        """The scene with these values of the numbers; the factor in the place of all steps."""
+        """The scene with values (numbers,) of its numbers, in its units; a load factor replaces all ``steps``."""
         scene = with_numbers(self._scene, self._followed([float(values[i]) for i in self._own]))
         steps, histories = (self._scene.analysis.steps[-1],), dict(scene.histories)
         for name, value in zip(self._names, values.tolist(), strict=True):
@@ -490,11 +499,11 @@ class Arguments:
         return flags
 
     def undeformed(self, p: ca.MX) -> ca.MX:
-        """What ``rest`` tells, for numbers (numbers,)."""
+        """Undeformed positions as :meth:`Results.rest` gives them, for numbers (numbers,)."""
         return self._told.at(picked(p, np.array(self._own, dtype=np.intp)))
 
     def given(self, p: ca.MX) -> ca.MX:
-        """What is given, as :class:`~sfetcas.solvers.program.Program` takes it, for numbers (numbers,)."""
+        """Data and loads as :class:`~sfetcas.solvers.program.Program` takes them, for numbers (numbers,)."""
         own = picked(p, np.array(self._own, dtype=np.intp))
         data, loads = self._split(self._given.at(own), ca.vertsplit)
         names = list(self._layout)
@@ -514,13 +523,13 @@ class Arguments:
         return argument(self._scene, name).default[0]
 
     def prepare(self, name: str) -> ca.Function:
-        """(arguments) -> given."""
+        """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
 
 
 def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
-    """The mesh with elements that go with the places of loads along their members."""
+    """The mesh with symbolic ends of elements that move with the places of loads along their members."""
     cuts = dict(mesh.cuts)
     for name, place in symbolic.items():
         if not re.fullmatch(r"loads\.[^.]+\.at", name):
@@ -600,15 +609,15 @@ def _at_values(value: Any) -> Any:
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
-    """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; in the dimension that it has.
+    """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; plane or space as before.
 
-    Where a shape changes that says itself where it ends, as a given curvature does, a free node there goes with it.
-    What was expected of its answers is left out.
+    Where a shape changes that determines its own end, as a given curvature does, a free node there moves along.  The
+    expectations of the scene are dropped.
 
     Raises
     ------
     SceneError
-        The changed scene is none.
+        The changed scene is not valid.
     """
     found = _with(scene, _tree(scene, {name: float(value) for name, value in numbers.items()}), _checked)
     assert isinstance(found, Scene)
@@ -616,7 +625,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
 
 
 def depending(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
-    """The same with symbols in the place of numbers that the scene has; nothing of it is checked again."""
+    """As :func:`with_numbers`, with symbols in place of numbers; the scene is not validated again."""
     found = _with(scene, _tree(scene, numbers), _unchecked)
     assert isinstance(found, Scene)
     # Which is not asked of symbols.

@@ -1,4 +1,4 @@
-"""A scene with other numbers, by their names."""
+"""Changing numbers of a scene by their names."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ __all__ = ["changed"]
 
 
 def changed(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
-    """The scene with other values of numbers, named as in the scene.
+    """A scene with other values of some of its numbers.
 
-    ``changed(scene, {"sections.strip.EI3": 2.0, "loads.tip.value": [0, 3], "factor": 0.5})``; a list takes a list of as
-    many numbers (in a plane scene those of the plane), or single ones by ``loads.tip.value.1``.  ``factor`` takes the
-    place of all steps.  What was expected of the answers is left out.
+    ``changed(scene, {"sections.strip.EI3": 2.0, "loads.tip.value": [0, 3], "factor": 0.5})``.  Names are those of the
+    keys of the scene, values in its units.  A list takes a list of the same length (in a plane scene two components),
+    or single entries by ``loads.tip.value.1``.  ``factor`` replaces all ``steps``.  The expectations of the scene are
+    dropped.
 
     Raises
     ------
     SceneError
-        The scene has no such number, or accepts no such value.
+        The scene has no such number, or does not accept the value.
     """
     check_scene(scene, "changed({}, ...)")
     single = single_numbers(scene, values)

@@ -1,4 +1,4 @@
-"""An equilibrium solver ready to be written as C: its functions, tables and what they mean."""
+"""An equilibrium solver of CasADi functions, ready to be exported as C, with the meaning of its inputs and outputs."""
 
 from __future__ import annotations
 
@@ -31,25 +31,29 @@ Place = Mapping[str, Sequence[float]]
 """Fractions of the length of members."""
 
 USUAL_PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where members are told of without a word about it."""
+"""Default fractions of the length at which results along members are given."""
 
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumSolver:
-    """The solver of one scene on one mesh; every function of it is CasADi's, in process as in C.
+    """The equilibrium solver of one scene on one mesh, made of CasADi functions that are the same in generated C.
+
+    Arguments (numbers,) and results (results,) are flat arrays in the units of the scene; the state (states,) and the
+    data and loads ``given`` are dimensionless.
 
     Attributes
     ----------
     name : str
-        Beginning of all names in C.
+        Prefix of all names in C.
     scene : Scene
     arguments : Arguments
     results : Results
     rules : Rules
+        Settings of the algorithm.
     start : ndarray or None
-        State that a cold solve begins with; None for the undeformed one.
+        State from which a solve begins; None for the undeformed one.
     answer : Equilibrium
-        That of statics for the last step of the scene, on a finer mesh: what the accuracy was checked by.
+        The static answer for the last step of the scene on a finer mesh, by which the accuracy was checked.
     """
 
     name: str
@@ -62,22 +66,22 @@ class EquilibriumSolver:
 
     @property
     def model(self) -> Model:
-        """The model, at values of the arguments where nothing vanishes by chance."""
+        """The model, assembled at values of the arguments at which no entry vanishes by chance."""
         return self.arguments.model
 
     @functools.cached_property
     def method(self) -> Globalised:
-        """The algorithm."""
+        """The globalised Newton method."""
         return Globalised(self.arguments.program, Prepared(self.model).weight, self.rules)
 
     @functools.cached_property
     def prepare(self) -> ca.Function:
-        """(arguments) -> given."""
+        """``(arguments) -> given``: data and loads of the equations."""
         return self.arguments.prepare(f"{self.name}_prepare")
 
     @functools.cached_property
     def tell(self) -> ca.Function:
-        """(arguments, state, given) -> results."""
+        """``(arguments, state, given) -> results``."""
         program = self.arguments.program
         p = ca.MX.sym("arguments", len(self.arguments.defaults))
         told = self.results.expression(program, self.arguments.undeformed(p))
@@ -87,9 +91,9 @@ class EquilibriumSolver:
 
     @functools.cached_property
     def sensitivities(self) -> ca.Function:
-        """(arguments, state, given) -> derivatives of all results by all arguments, (results, arguments).
+        """``(arguments, state, given) ->`` derivatives (results, arguments) of all results, flat row by row.
 
-        By the implicit function theorem: what the state does is the solution of one linear system for each argument.
+        By the implicit function theorem, with the solution of one linear system for each argument.
         """
         program = self.arguments.program
         p, state, given = ca.MX.sym("arguments", len(self.arguments.defaults)), program.state_symbol, program.symbol
@@ -108,12 +112,12 @@ class EquilibriumSolver:
         return ca.Function(f"{self.name}_sensitivity", [p, state, given], [flat], names, ["sensitivities"])
 
     def solve(self, arguments: Array | None = None, start: Array | None = None) -> tuple[Outcome, Array]:
-        """The equilibrium for values of the arguments, and the results: not a number where there is none.
+        """The equilibrium for values of the arguments, and its results (results,): nan where none was found.
 
         Parameters
         ----------
-        arguments : (numbers,), the defaults without
-        start : state to begin with, for a warm start
+        arguments : (numbers,), by default those of the scene
+        start : (states,), state to begin with, for a warm start
         """
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         given = np.array(self.prepare(p)).ravel()
@@ -131,16 +135,16 @@ class EquilibriumSolver:
 
     @property
     def unique(self) -> bool:
-        """Whether reactions and section forces are: not where closings depend on each other."""
+        """Whether reactions and section forces are unique: not where constraints depend on each other."""
         return not any(note.startswith(NOT_UNIQUE) for note in self.answer.notes)
 
     def with_results(self, names: Sequence[str]) -> EquilibriumSolver:
-        """The same solver with other results."""
+        """This solver with other results, given by their names."""
         told = Results(self.model, names, self.results.places, unique=self.unique)
         return replace(self, results=told)
 
     def by_name(self, results: Array) -> dict[str, Array]:
-        """The results by their names, in their shapes."""
+        """The results (results,) by their names, each in its shape and unit."""
         bounds = np.cumsum([0, *(result.size for result in self.results.results)]).tolist()
         parts = zip(self.results.results, bounds, bounds[1:], strict=False)
         return {one.name: results[a:b].reshape(one.shape) for one, a, b in parts}
@@ -161,10 +165,10 @@ def equilibrium_solver(
     ----------
     scene : Scene
     name : str
-        Beginning of all names in C.
-    arguments : names of numbers of the scene, or a mapping of them to ranges; the usual ones without
-    results : names of results; the usual ones without
-    places : fractions of the length at which members are told of
+        Prefix of all names in C.
+    arguments : names of numbers of the scene, or a mapping of them to ranges; by default load factor, loads, motions
+    results : names of results; by default those of :func:`~sfetcas.parametric.results.default_results`
+    places : fractions of the length at which results along members are given
     settings : as of :func:`~sfetcas.equilibria.statics.solve`
 
     Raises
@@ -215,12 +219,12 @@ NOT_UNIQUE = "reactions are not unique"
 
 
 def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
-    """Refuse what takes a search that is not exported, or is ``lacking`` otherwise.
+    """Refuse a scene whose equilibrium needs a search (contacts, stops, ...), which is not exported, or is ``lacking``.
 
     Raises
     ------
     SceneError
-        Says what, and what is possible instead.
+        Names it, and what is possible instead.
     """
     instead = "accepted: the scene without"
     if scene.contacts:
@@ -234,7 +238,13 @@ def refuse_search(scene: Scene, lacking: str = "not exported") -> None:
 
 
 def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium]:
-    """The mesh that the accuracy asks for, the assembly, and the answer of statics."""
+    """The mesh that the accuracy requires, the assembly, and the static answer.
+
+    Raises
+    ------
+    SceneError, SolveError
+        The scene cannot be modelled, or has no equilibrium that could be found.
+    """
     static = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
     still = scene.model_copy(update={"analysis": static})
     try:
@@ -253,12 +263,12 @@ def asked_mesh(scene: Scene, settings: Settings) -> tuple[Mesh, Any, Equilibrium
 
 
 def chosen_places(members: Sequence[str], given: Place) -> dict[str, tuple[float, ...]]:
-    """Where each member is told of.
+    """The fractions of the length at which results along each flexible member are given.
 
     Raises
     ------
     SceneError
-        A place that is none, or of what is no flexible member.
+        A place is not between 0 and 1, or belongs to no flexible member.
     """
     for name, places in given.items():
         if name not in members:

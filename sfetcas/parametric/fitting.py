@@ -1,9 +1,9 @@
-"""Parameters of a scene from what was measured of it: estimates with bounds of confidence.
+"""Identification: parameters of a scene from measurements, by weighted least squares, with confidence bounds.
 
-The sum of squares of all residuals over their standard deviations is least (for normal noise the likelihood is
-greatest).  With the derivatives ``J`` of the residuals there the covariance is ``(J^T J)^-1``, or, as second
+The sum of squares of all residuals over their standard deviations is minimised (the likelihood of normal noise is
+maximised).  With the Jacobian ``J`` of these residuals ``r`` the covariance is ``(J^T J)^-1``, or, as second
 derivatives are exact, ``(J^T J + sum r r'')^-1``: both agree where residuals are small or the model is nearly linear.
-Deviations that are not known are taken as one, estimated from the residuals; bounds are then Student's.
+Unknown deviations are taken as equal and estimated from the residuals; bounds are then those of Student's distribution.
 
 Source: Seber and Wild 2003, sections 2.1, 2.8 and 5.1 (estimation, confidence regions, intervals).
 """
@@ -31,7 +31,7 @@ __all__ = ["Fit", "Fitting", "Measurement", "fit", "fitting"]
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured of one load case.
+    """A measured quantity of one load case.
 
     Attributes
     ----------
@@ -39,11 +39,11 @@ class Measurement:
         As in the answer: ``nodes.tip.position``, ``springs.k.angle``, ``reactions.A.force``; along a member with a
         place, ``members.beam.position at 0.5``; one component by its number, ``nodes.tip.position.1``.
     value : number or list of numbers
-        SI units; of a vector in the plane two are enough, and what was not measured is not a number (``nan``).
+        SI units; two components of a vector are enough in a plane scene; ``nan`` where nothing was measured.
     deviation : number, list or None
-        Standard deviation of the noise; None where it is not known: then of none, and all are taken to have the same.
+        Standard deviation of the noise, in the same unit.  None: unknown, for all measurements alike, and equal.
     case : mapping
-        Numbers of the scene that are others than there: ``{"loads.tip.value": [0, 3]}``.
+        Numbers of the scene that differ in this load case: ``{"loads.tip.value": [0, 3]}``.
     """
 
     quantity: str
@@ -60,25 +60,25 @@ def fit(
     start: Values | None = None,
     settings: Settings | None = None,
 ) -> Fit:
-    """Parameters by which a scene is nearest to what was measured.
+    """Fit parameters of a scene to measurements, by weighted least squares.
 
     Parameters
     ----------
     scene : Scene
-        Its own numbers are where the search begins, and decide the mesh.
+        Its numbers are the start of the search, and determine the mesh.
     parameters : as of :func:`~sfetcas.parametric.solving.parametric`
         Ranges are bounds of the search.
     measurements : sequence of Measurement
     start : mapping, optional
-        Where the search begins instead.
+        Values of parameters to start from instead.
     settings : Settings, optional
 
     Raises
     ------
     SceneError
-        What is measured, or asked for, is not there; fewer measurements than parameters.
+        The scene has no such parameter or measured quantity; fewer measured numbers than parameters.
     SolveError
-        No equilibrium at the start, no least sum of squares, or parameters that the measurements do not determine.
+        No equilibrium at the start, no convergence, or parameters that the measurements do not determine.
     """
     check_scene(scene, "fit({}, ...)")
     return fitting(scene, parameters, measurements, settings=settings).fit(start=start)
@@ -87,12 +87,12 @@ def fit(
 def fitting(
     scene: Scene, parameters: Asked, measurements: Sequence[Measurement], *, settings: Settings | None = None
 ) -> Fitting:
-    """The same prepared: measured values may then be others, as for many experiments of one kind.
+    """Prepare a fit, as :func:`fit` does, for repeated use with other measured values of the same quantities.
 
     Raises
     ------
     SceneError
-        As of :func:`fit`.
+        As :func:`fit`.
     """
     check_scene(scene, "fitting({}, ...)")
     if not measurements:
@@ -154,12 +154,14 @@ class Fitting:
     Attributes
     ----------
     equilibrium : ParametricEquilibrium
-        Of the parameters and of what cases give.
+        The model, as a function of the parameters and of the numbers that load cases change.
     measurements : tuple of Measurement
     parameters : tuple of str
-        Names of what is fitted.
+        Names of the parameters that are fitted.
     cases : tuple of mapping
-        The load cases, each once.
+        The distinct load cases.
+    values : ndarray (measured,)
+        The measured numbers, SI units.
     """
 
     def __init__(
@@ -243,41 +245,43 @@ class Fitting:
 
     @property
     def known(self) -> bool:
-        """Whether deviations are."""
+        """Whether the standard deviations of the measurements are known."""
         return not np.isnan(self._deviations).any()
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations, one each where they are not known."""
+        """Standard deviations of the measured numbers, (measured,), SI units; 1 where they are not known."""
         return self._deviations if self.known else np.ones(len(self._deviations))
 
     @property
     def numbers(self) -> tuple[str, ...]:
-        """A name for each number that is fitted."""
+        """A name for each fitted number."""
         return tuple(self.equilibrium.numbers[i] for i in self._own)
 
     # -- the fit ------------------------------------------------------------------------------------
 
     def limits(self) -> tuple[Array, Array]:
-        """Least and largest values of the numbers."""
+        """Lower and upper bounds of the fitted numbers, (numbers,) each, in the units of the scene."""
         known = [one for one in self.equilibrium.parameters if one.name in self.parameters]
         ends = np.array([one.limits for one in known for _ in one.default])
         return ends[:, 0], ends[:, 1]
 
     def fit(self, values: ArrayLike | None = None, start: Values | None = None) -> Fit:
-        """The parameters by which the residuals are least.
+        """Fit the parameters.
 
         Parameters
         ----------
-        values : (measured numbers,), optional
-            Instead of those measured, in the order of :attr:`values`.
+        values : (measured,), SI units, optional
+            Replace the measured numbers, in the order of :attr:`values`.
         start : mapping, optional
-            Where the search begins, the scene's own numbers without.
+            Start of the search; by default the numbers of the scene.
 
         Raises
         ------
+        SceneError
+            There are more or fewer values, or they are not finite.
         SolveError
-            No equilibrium at the start, no least sum of squares, or parameters that are not determined.
+            No equilibrium at the start, no convergence, or parameters that are not determined.
         """
         from scipy.optimize import least_squares
 
@@ -379,18 +383,19 @@ def _refuse_undetermined(found: Fit) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Parameters with their bounds of confidence.
+    """Fitted parameters with their confidence bounds, in the units of the scene.
 
     Attributes
     ----------
     of : Fitting
     measured : ndarray (measured,)
+        The measured numbers, SI units.
     scale : ndarray (numbers,)
-        Sizes of the numbers.
+        Scales of the fitted numbers.
     minimum : scipy.optimize.OptimizeResult
-        Where the search ended, for numbers over their sizes: ``x``, residuals ``fun``, their derivatives ``jac``.
+        End of the search: ``x``, numbers over their scales; ``fun``, residuals over deviations; ``jac``, derivatives.
     answers : tuple of ParametricAnswer
-        The equilibrium of each case there.
+        The equilibrium of each load case at the fitted parameters.
     """
 
     of: Fitting
@@ -401,7 +406,7 @@ class Fit:
 
     @property
     def estimates(self) -> dict[str, float]:
-        """The numbers by their names."""
+        """The fitted numbers by their names."""
         return dict(zip(self.of.numbers, (self.minimum.x * self.scale).tolist(), strict=True))
 
     @property
@@ -411,34 +416,34 @@ class Fit:
 
     @property
     def held(self) -> Array:
-        """Which numbers push against an end of their range, (numbers,) of bool."""
+        """Which fitted numbers are at an active bound, (numbers,) of bool."""
         return np.asarray(self.minimum.active_mask * self.minimum.grad < 0.0)
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: measured numbers less those that are free."""
+        """Degrees of freedom: number of measured numbers less that of fitted numbers at no active bound."""
         return len(self.measured) - int((~self.held).sum())
 
     @property
     def chi_square(self) -> float:
-        """Sum of the squares of residuals over deviations; over the freedom it is near one where the model is right."""
+        """Sum of squared residuals over deviations; with known deviations near :attr:`freedom` for a correct model."""
         return float(self.minimum.fun @ self.minimum.fun)
 
     @property
     def probability(self) -> float | None:
-        """How often noise alone would leave more than this; None where deviations are not known."""
+        """Probability that noise alone gives a larger :attr:`chi_square`; None where deviations are not known."""
         from scipy.special import chdtrc
 
         return float(chdtrc(self.freedom, self.chi_square)) if self.of.known and self.freedom else None
 
     @property
     def deviation(self) -> float | None:
-        """The standard deviation of the noise as the residuals tell it, where it is not known."""
+        """Standard deviation of the noise estimated from the residuals, SI unit; None where deviations are known."""
         return None if self.of.known else float(np.sqrt(self.chi_square / self.freedom))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know about the bounds."""
+        """Remarks for the reader on bounds and residuals."""
         found = []
         for name, held in zip(self.of.numbers, self.held, strict=True):
             if held:
@@ -454,12 +459,12 @@ class Fit:
 
     @property
     def covariance(self) -> Array:
-        """Of the numbers, (numbers, numbers), from first derivatives; not a number where a range ends."""
+        """Covariance matrix (numbers, numbers) by first derivatives; nan for numbers at an active bound."""
         return self._inverse(self.minimum.jac.T @ self.minimum.jac)
 
     @functools.cached_property
     def full_covariance(self) -> Array:
-        """The same from second derivatives, too."""
+        """Covariance matrix (numbers, numbers) by first and second derivatives; nan for numbers at an active bound."""
         size = len(self.minimum.x)
         curved: Array = np.zeros((size, size))
         shares = self.minimum.fun / self.of.deviations
@@ -480,19 +485,19 @@ class Fit:
 
     @property
     def deviations(self) -> dict[str, float]:
-        """Standard deviations of the numbers."""
+        """Standard deviations of the fitted numbers, by name."""
         return dict(zip(self.of.numbers, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def correlation(self) -> Array:
-        """Of the numbers, (numbers, numbers)."""
+        """Correlation matrix (numbers, numbers) of the fitted numbers."""
         size = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(size, size))
 
     def bounds(self, confidence: float = 0.95, *, full: bool = False) -> dict[str, tuple[float, float]]:
-        """Least and largest value of each number by itself, with a confidence.
+        """Confidence interval (low, high) of each fitted number by itself.
 
-        ``full`` takes second derivatives into account.
+        ``full`` uses second derivatives as well.  SceneError unless ``confidence`` is between 0 and 1.
         """
         if not 0.0 < confidence < 1.0:
             raise SceneError(f"found {confidence:g}, accepted: between 0 and 1", ("confidence",))
@@ -506,7 +511,7 @@ class Fit:
         return dict(zip(self.of.numbers, pairs, strict=True))
 
     def ellipse(self, first: str, second: str, confidence: float = 0.95, points: int = 100) -> Array:
-        """The curve (points, 2) that holds two numbers together with a confidence."""
+        """Points (points, 2) on the boundary of the joint confidence region of two fitted numbers."""
         places = [self._place(name) for name in (first, second)]
         tail = 1.0 - confidence
         # Chi-square of two degrees of freedom, and twice Fisher's distribution of two and as many as there are.

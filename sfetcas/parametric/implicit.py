@@ -1,13 +1,13 @@
-"""Derivatives of answers of an equilibrium by numbers, first and second, from its equations.
+"""First and second derivatives of answers of an equilibrium by parameters, by the implicit function theorem.
 
-Near an equilibrium a state is told by a *step* of all unknowns and multipliers from it, after held rotations have
-moved to where the numbers say.  With the equations ``F(step, p) = 0`` and the answers ``a(step, p)``, both in this
-step, ``K = dF/dstep`` and ``S = dstep/dp = -K^-1 dF/dp``
+Near an equilibrium a state is given by a *step* of all unknowns and multipliers from it, after prescribed rotations
+have been set to their values for the parameters.  With the equations ``F(step, p) = 0`` and the answers ``a(step, p)``,
+both functions of this step, ``K = dF/dstep`` and ``S = dstep/dp = -K^-1 dF/dp``
 
     da/dp = a_step S + a_p,      K^T m = -a_step^T,      d2a/dp2 = [S; I]^T d2(a + m.F) [S; I],
 
-exact whatever the step means, as long as it means the same in both.  Equations and answers know of the numbers by the
-*data* only, whose own derivatives are put between: ``d/dp = d/ddata ddata/dp``.
+exact however the step is defined, as long as it is the same in both.  Equations and answers depend on the parameters
+through the *data* only, with the chain rule ``d/dp = d/ddata ddata/dp``.
 
 Source: Hinze, Pinnau, Ulbrich and Ulbrich 2009, section 1.6 (sensitivities and adjoints; the second derivatives).
 """
@@ -56,11 +56,12 @@ class Slopes:
     Attributes
     ----------
     steps : ndarray (total, numbers)
-        Of the step by the numbers.
+        Derivatives of the step, dimensionless, by the numbers.
     answers : ndarray (answers,)
+        In SI units.
     jacobian : ndarray (answers, numbers)
     entries : ndarray
-        Of Newton's matrix.
+        Entries of the Newton matrix.
     """
 
     steps: Array
@@ -78,14 +79,14 @@ class Implicit:
     results : Results
         The answers.
     weight : ndarray (total,)
-        Of the unknowns, on the scale of which eigenvalues are of the size of one; nothing of multipliers.
+        Weights of the unknowns, by which eigenvalues are of order one; zero for multipliers.
     unique : bool
-        Whether closings are independent.
+        Whether constraints are independent of each other.
 
     Attributes
     ----------
     total, turning : int
-        Unknowns and multipliers; of these the first are rotations.
+        Number of unknowns and multipliers; number of rotation unknowns, which come first.
     """
 
     def __init__(self, arguments: Arguments, results: Results, weight: Array, *, unique: bool = True) -> None:
@@ -214,7 +215,7 @@ class Implicit:
 
     @single_threaded
     def slopes(self, p: Array, state: Array) -> Slopes:
-        """First derivatives at the equilibrium of the numbers.
+        """First derivatives at the equilibrium ``state`` (states,) of the numbers p (numbers,).
 
         Raises
         ------
@@ -247,7 +248,7 @@ class Implicit:
 
     @single_threaded
     def second(self, p: Array, state: Array, slopes: Slopes, weights: Array) -> Array:
-        """Second derivatives (numbers, numbers) of the answers, each times its weight and added up."""
+        """Hessian (numbers, numbers) of the sum of all answers times their ``weights`` (answers,)."""
         x, seeds = self._x(p)
         (right,) = self._called("_by_step", x, state, weights)
         multipliers = self._transposed(slopes.entries, -right)

@@ -1,4 +1,4 @@
-"""The equations of motion with numbers of the scene in the place of the factors of its loads."""
+"""The equations of motion as functions of numbers of the scene, which replace the factors of its loads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["ParametricStages", "answers_of_motion", "motion_of", "parametric_sta
 
 
 class ParametricStages(StageEquations):
-    """The equations of motion whose ``factors`` are the numbers of some arguments."""
+    """The equations of motion whose ``factors`` are the values of arguments."""
 
     def __init__(self, arguments: Arguments, masses: Masses) -> None:
         super().__init__(arguments.expressions.equations, masses, "interpreted")
@@ -31,29 +31,29 @@ class ParametricStages(StageEquations):
         self.layout = replace(self.layout, factors=len(arguments.defaults))
 
     def given(self, factors: ca.MX) -> Given:
-        """What is given for the numbers."""
+        """Data and loads for values of the arguments."""
         return self._arguments.program.given_by(self._arguments.given(factors))
 
 
 def motion_of(scene: Scene, settings: Settings) -> Simulation:
-    """The motion of a scene, not yet run.
+    """The dynamic analysis of a scene, not yet run.
 
     Raises
     ------
     SceneError
-        It takes a search that has no derivatives, or cannot be modelled.
+        It needs a search that has no derivatives, or cannot be modelled.
     """
     refuse_search(scene)
     return Simulation(scene, settings)
 
 
 def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
-    """The equations of motion for arguments, with the masses of their defaults.
+    """The equations of motion as a function of arguments; masses are those of their defaults.
 
     Raises
     ------
     SceneError
-        Some argument changes masses.
+        An argument changes masses.
     """
     found = masses_of(arguments.model)
     if not _same(masses, found):
@@ -62,9 +62,10 @@ def parametric_stages(arguments: Arguments, masses: Masses) -> ParametricStages:
 
 
 def answers_of_motion(results: Results, arguments: Arguments, system: ParametricStages, time: float) -> ca.Function:
-    """(state, numbers, rates) -> results: of rotations, displacements, multipliers and counted angles as one vector.
+    """A function ``(state, numbers, rates) -> results``.
 
-    ``rates`` are those of the quantities; time is the unit of time in s.
+    ``state`` has rotations, displacements, multipliers and turn-counting angles, ``rates`` those of the quantities that
+    carry mass; ``time`` is the unit of time, s.
     """
     layout, program = system.layout, arguments.program
     state, p, rates = ca.MX.sym("state", program.states), ca.MX.sym("numbers", layout.factors), ca.MX.sym("v", layout.x)

@@ -1,7 +1,7 @@
-"""What the generated code tells of an equilibrium: positions, rotations, reactions, section forces, stiffness.
+"""Results of parametric solvers and generated code: positions, rotations, reactions, section forces, stiffness.
 
-Reactions are derivatives of the Lagrangian by what the ground holds, section forces the pull on the integration
-points: both as accurate as the positions.
+Reactions are derivatives of the Lagrangian by restrained coordinates, section forces follow from the internal force at
+the integration points: both are as accurate as the positions.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ __all__ = ["Result", "Results", "default_motion_results", "default_results"]
 
 @dataclass(frozen=True)
 class Result:
-    """One result of the generated code: rows of numbers, or a vector, or a number.
+    """One result: a number, a vector, or along a member a row for each place.
 
     Attributes
     ----------
     name : str
         As it was asked for: ``nodes.tip.position``.
     asked : AnswerName
-        The same, read.
+        Its parsed name.
     shape : tuple of int
-        Along a member a row for each place, unless its name has one place.
+        ``(places, ...)`` along a member, unless the name has one place.
     unit, meaning : str
     """
 
@@ -55,17 +55,20 @@ class Result:
 
     @property
     def size(self) -> int:
-        """How many numbers."""
+        """Number of its numbers."""
         return int(np.prod(self.shape, dtype=int))
 
     @property
     def member(self) -> str:
-        """The member at whose places it has a row each; empty of all else."""
+        """The member along which it has a row for each place; empty for all others."""
         return self.asked.record if self.asked.kind.along and self.asked.at is None else ""
 
 
 def default_results(model: Model, *, unique: bool = True) -> list[str]:
-    """Positions and rotations of all nodes, positions of members, springs; reactions and section forces if unique."""
+    """Names of the default results: positions and rotations of nodes, positions of members, springs.
+
+    With ``unique``, reactions and section forces as well.
+    """
     names = []
     rotation = "quaternion" if model.space else "angle"
     for name in model.nodes:
@@ -86,7 +89,7 @@ def default_results(model: Model, *, unique: bool = True) -> list[str]:
 
 
 def default_motion_results(model: Model) -> list[str]:
-    """Of a motion: positions, rotations and velocities of all nodes, positions along the members, springs."""
+    """Default results of a motion: positions, rotations and velocities of nodes, positions along members, springs."""
     every = [answer_name(name) for name in default_results(model, unique=False)]
     moving = [name.text for name in every if name.kind.table == "nodes" or name.kind.key == "position"]
     sprung = [name.text for name in every if name.kind.table == "springs" and name.kind.key in TRAVELS]
@@ -119,11 +122,11 @@ class Results:
     model : Model
     names : sequence of str
     places : mapping of str to sequence of float
-        Of each member the fractions of its length at which it is told, unless a name says where.
+        For each member the fractions of its length at which results are given, unless their name has a place.
     unique : bool
-        Whether reactions and section forces are: not where closings depend on each other.
+        Whether reactions and section forces are unique: not where constraints depend on each other.
     motion : bool
-        Of a motion, where velocities are known, and forces of inertia are not in those of statics.
+        Results of a motion: velocities are available, reactions and section forces, which need inertia, are not.
 
     Attributes
     ----------
@@ -150,7 +153,7 @@ class Results:
 
     @property
     def size(self) -> int:
-        """How many numbers all of them are."""
+        """Number of all their numbers."""
         return sum(result.size for result in self.results)
 
     # -- what there is ------------------------------------------------------------------------------
@@ -202,12 +205,12 @@ class Results:
 
     @property
     def curved(self) -> list[str]:
-        """Members whose curvature is told, or follows into what is."""
+        """Members whose curvature is needed for a result."""
         bent = (result.asked for result in self.results if result.asked.kind.key in BY_FORCES[2:])
         return list(dict.fromkeys(name.record for name in bent))
 
     def refuse_along(self, members: Iterable[str]) -> None:
-        """Refuse answers at places of members whose elements move, and with them where in an element a place is.
+        """Refuse results along members whose elements move with a parameter, and with them the places within elements.
 
         Raises
         ------
@@ -221,7 +224,7 @@ class Results:
                 raise SceneError(message, ("results",))
 
     def rest(self, model: Model) -> Array:
-        """Undeformed positions (m) of all nodes, then of the places of all members, flat; then what curvatures need."""
+        """Undeformed positions (m) of nodes and places along members, then section data for curvatures; flat."""
         scene = model.scene
         nodes = [numbers(scene.nodes[name].position) for name in model.nodes]
         along = [scene.center_lines[name].positions(np.array(x)) for name, x in self.every.items()]
@@ -254,8 +257,8 @@ class Results:
         Parameters
         ----------
         moment : (3, places), N m, fixed axes
-        axes : what turns vectors (3, places) as the sections turn
-        sections : what :meth:`rest` tells of them, (18, places)
+        axes : function that rotates vectors (3, places) with the sections
+        sections : (18, places), their data as of :meth:`rest`
         """
         known, found = self._stiffness(member), []
         for k in range(3):
@@ -268,9 +271,9 @@ class Results:
         return ca.vertcat(*found)
 
     def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
-        """All results one after the other, rows before columns, in SI units.
+        """All results (size,), one after the other, each row by row, in SI units.
 
-        ``speeds`` (axes, places) are those of a motion; of what is ``short`` derivatives are, too.
+        ``speeds`` (axes, places) are velocities of a motion; ``short`` gives expressions with short derivatives.
         """
         told = _Told(self, program, rest, speeds, program.forces if short else program.stationarity)
         return ca.vertcat(*(ca.densify(ca.vec(told.value(result.asked).T)) for result in self.results))

@@ -33,13 +33,13 @@ from .results import Result, Results
 __all__ = ["ParametricAnswer", "ParametricEquilibrium", "Values", "parametric"]
 
 Values = Mapping[str, ArrayLike]
-"""Values of parameters by their names; what is left out has its default."""
+"""Values of parameters by their names, in the units of the scene; those left out have their defaults."""
 
 FAR = 0.3
-"""Rotation, rad, up to which first derivatives tell where to begin."""
+"""Largest rotation, rad, for which the start of a solve is extrapolated by first derivatives."""
 
 SOLVED = (Code.SOLVED, Code.UNSTABLE)
-"""How a solve ends that found an equilibrium."""
+"""Outcomes with an equilibrium."""
 
 
 def parametric(
@@ -55,23 +55,23 @@ def parametric(
     Parameters
     ----------
     scene : Scene
-        Its last step is what is solved, on the mesh that its accuracy asks for with its own numbers.
+        The load factor is the last of its ``steps``; the mesh is the one that its accuracy needs with its own numbers.
     parameters : names of numbers, or mapping of names to ranges or to a :class:`Parameter`
         As ``loads.tip.value``, ``sections.strip.EI3``, ``springs.k.rest``, ``nodes.B.position.0``, ``factor``; a range
-        ``(low, high)`` limits what is accepted.  The usual ones without: factor, loads and motions.
+        ``(low, high)`` limits accepted values.  Default: load factor, loads and prescribed motions.
     answers : names
         As ``nodes.tip.position``, ``members.beam.moment``, ``reactions.A.force``, ``energy.elastic``,
-        ``compliance.tip``; without all of nodes, reactions, springs and energies.
+        ``compliance.tip``.  Default: all quantities of nodes, reactions, springs and energies.
     places : mapping of members to fractions of their length
-        Where members are told of.
+        Where answers along members are given.
     settings : Settings, optional
         As of :func:`~sfetcas.solve`.
 
     Raises
     ------
     SceneError
-        A scene with contact, stops or turning axes; a number or an answer that it does not have; a number that changes
-        what the model is made of.
+        A scene with contact, stops or rotating axes; a number or an answer that it does not have; a number that changes
+        the structure of the model.
     """
     check_scene(scene, "parametric({}, ...)")
     parameters = [parameters] if isinstance(parameters, str) else parameters
@@ -100,7 +100,10 @@ def _renamed(error: SceneError) -> SceneError:
 
 @dataclass(frozen=True, eq=False)
 class ParametricEquilibrium:
-    """The equilibrium of one scene on one mesh, a function of parameters; made by :func:`parametric`.
+    """The equilibrium of one scene on one mesh as a function of parameters; made by :func:`parametric`.
+
+    Flat arrays (numbers,) have all numbers of all parameters in the order of :attr:`numbers`, in the units of the
+    scene.
 
     Attributes
     ----------
@@ -113,12 +116,12 @@ class ParametricEquilibrium:
 
     @property
     def parameters(self) -> tuple[Argument, ...]:
-        """The parameters: name, default, unit, meaning, range."""
+        """The parameters, each with name, default, unit, meaning and range."""
         return self.solver.arguments.arguments
 
     @property
     def answers(self) -> tuple[Result, ...]:
-        """The answers: name, shape, unit, meaning."""
+        """The answers, each with name, shape, unit and meaning."""
         return self.solver.results.results
 
     @property
@@ -128,11 +131,11 @@ class ParametricEquilibrium:
 
     @property
     def defaults(self) -> dict[str, Array]:
-        """The parameters as they stand in the scene."""
+        """The values of the parameters in the scene: a number, or (n,) for a list of n."""
         return self.by_parameter(self.solver.arguments.defaults)
 
     def by_parameter(self, numbers: Array) -> dict[str, Array]:
-        """Arrays whose last axis is that of all numbers, cut into parameters; single numbers lose the axis."""
+        """Split the last axis (numbers,) of an array by parameter; for single numbers that axis is dropped."""
         found, first = {}, 0
         for one in self.parameters:
             last = first + len(one.default)
@@ -141,12 +144,12 @@ class ParametricEquilibrium:
         return found
 
     def flat(self, values: Values | None = None) -> Array:
-        """All numbers in one array; what is not given has its default.
+        """Values of the parameters as a flat array (numbers,); those not given have their defaults.
 
         Raises
         ------
         SceneError
-            There is no such parameter, it takes another number of numbers, or is out of its range.
+            There is no such parameter, its length is another one, or it is out of its range.
         """
         values = values or {}
         known = [one.name for one in self.parameters]
@@ -157,7 +160,7 @@ class ParametricEquilibrium:
         return np.concatenate([np.zeros(0), *parts])
 
     def scene_at(self, values: Values | None = None) -> Scene:
-        """The scene with these values, as :func:`~sfetcas.solve` takes it."""
+        """The scene with these values, with a static analysis, for :func:`~sfetcas.solve`."""
         scene = self.solver.arguments.scene_at(self.flat(values))
         analysis = scene.analysis.model_copy(update={"type": "static", "equilibria": "one"})
         return scene.model_copy(update={"analysis": analysis})
@@ -170,14 +173,14 @@ class ParametricEquilibrium:
         values : mapping of names to numbers, or lists of them
             Those left out have their defaults.
         start : ParametricAnswer, optional
-            An earlier answer, near which to look first: faster, and on its branch.
+            An earlier answer from which to start: faster, and on the same branch of equilibria.
 
         Raises
         ------
         SceneError
-            A value that is not accepted.
+            A value is not accepted.
         SolveError
-            There is no equilibrium, or none was found.
+            No equilibrium was found.
         """
         numbers = self.flat(values)
         outcome = self._outcome(numbers, None if start is None else start.near(numbers))
@@ -196,7 +199,7 @@ class ParametricEquilibrium:
 
     @functools.cached_property
     def implicit(self) -> Implicit:
-        """The derivatives."""
+        """Evaluates derivatives by the implicit function theorem."""
         return Implicit(self.solver.arguments, self.solver.results, self.solver.method.mass, unique=self.solver.unique)
 
 
@@ -220,15 +223,17 @@ def _given(one: Argument, value: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ParametricAnswer:
-    """One equilibrium; derivatives are computed when they are first asked for.
+    """An equilibrium for values of parameters; derivatives are computed when they are first asked for.
+
+    ``answer["nodes.tip.position"]`` is an answer by its name.
 
     Attributes
     ----------
     of : ParametricEquilibrium
     numbers : ndarray (numbers,)
-        Where the parameters are.
+        Values of the parameters, flat, in the units of the scene.
     outcome : Outcome
-        State, residual, ways out and iterations.
+        State, residual, number of negative eigenvalues and iterations.
     """
 
     of: ParametricEquilibrium
@@ -237,22 +242,28 @@ class ParametricAnswer:
 
     @property
     def values(self) -> dict[str, Array]:
-        """The parameters by their names."""
+        """Values of the parameters by their names."""
         return self.of.by_parameter(self.numbers)
 
     @property
     def residual(self) -> float:
-        """Of all equations, relative."""
+        """Largest relative residual of all equations."""
         return self.outcome.residual
 
     @property
     def stable(self) -> bool | str:
-        """Whether the energy has no way out; "not defined" for loads without potential."""
+        """Whether the second variation has no negative eigenvalue; "not defined" for loads without potential."""
         return "not defined" if self.outcome.negative == NOT_DEFINED else self.outcome.negative == 0
 
     @functools.cached_property
     def answers(self) -> dict[str, Array]:
-        """The answers by their names, in their shapes, SI units."""
+        """The answers by their names, in their shapes, in SI units.
+
+        Raises
+        ------
+        SolveError
+            A stiffness or compliance that was asked for has no value, as the equilibrium is singular.
+        """
         solver = self.of.solver
         given = np.array(solver.prepare(self.numbers)).ravel()
         try:
@@ -272,7 +283,10 @@ class ParametricAnswer:
         return name
 
     def near(self, numbers: Array) -> Array:
-        """A state to begin with for other numbers: by first derivatives where these are known and do not lead far."""
+        """A state (states,) to start from for other ``numbers``.
+
+        It is extrapolated where first derivatives are known already and rotations change little.
+        """
         # What has been computed already costs nothing.
         slopes: Slopes | None = self.__dict__.get("_slopes")
         if slopes is None:
@@ -291,7 +305,7 @@ class ParametricAnswer:
 
     @property
     def flat_jacobian(self) -> Array:
-        """First derivatives of all answers, one after the other, by all numbers: (answers, numbers).
+        """Jacobian (answers, numbers): derivatives of all numbers of the answers by all numbers of the parameters.
 
         Raises
         ------
@@ -302,7 +316,9 @@ class ParametricAnswer:
 
     @functools.cached_property
     def jacobian(self) -> dict[str, dict[str, Array]]:
-        """First derivatives, ``jacobian[answer][parameter]``, of the shape of the answer and then of the parameter."""
+        """First derivatives ``jacobian[answer][parameter]``: the shape of the answer, then (n,) for a list of n
+        numbers.
+        """
         found = {}
         for one, rows in self._rows():
             own = self.flat_jacobian[rows].reshape(*one.shape, -1)
@@ -314,7 +330,15 @@ class ParametricAnswer:
         return [(one, slice(a, b)) for one, a, b in zip(self.of.answers, bounds, bounds[1:], strict=False)]
 
     def flat_hessian(self, weights: ArrayLike) -> Array:
-        """Second derivatives (numbers, numbers) of all answers, each times its weight and added up."""
+        """Hessian (numbers, numbers) of the sum of all numbers of the answers times their ``weights`` (answers,).
+
+        Raises
+        ------
+        SceneError
+            There are more or fewer weights.
+        SolveError
+            The equilibrium is singular.
+        """
         given = np.asarray(weights, dtype=float).ravel()
         size = self.of.solver.results.size
         if len(given) != size:
@@ -324,7 +348,7 @@ class ParametricAnswer:
     def hessian(self, answer: str) -> dict[str, dict[str, Array]]:
         """Second derivatives of one answer, ``hessian(answer)[parameter][parameter]``.
 
-        Arrays of the shape of the answer, then of the first and of the second parameter.
+        Each array has the shape of the answer, then an axis for each of the two parameters that is a list.
         """
         self._known(answer)
         one, rows = next(pair for pair in self._rows() if pair[0].name == answer)
@@ -341,9 +365,10 @@ class ParametricAnswer:
     # -- how good it is -----------------------------------------------------------------------------
 
     def errors(self) -> dict[str, float]:
-        """By how much each answer changes, at most, when all elements are halved.
+        """For each answer its largest change when all elements are halved, in its unit.
 
-        The mesh is that of the scene's own numbers: far from these it may be too coarse, and this says so.
+        The mesh is chosen for the numbers of the scene; for values far from these it may be too coarse, which shows
+        here.
 
         Raises
         ------
@@ -367,11 +392,12 @@ class ParametricAnswer:
         return {name: float(np.abs(there[name] - own).max(initial=0.0)) for name, own in self.answers.items()}
 
     def certified(self) -> Equilibrium:
-        """The equilibrium by :func:`~sfetcas.solve` for the same values, with its mesh, its branch and its certificate.
+        """The equilibrium that :func:`~sfetcas.solve` finds for the same values, with its own mesh, branch and
+        certificate.
 
         Raises
         ------
         SolveError
-            There is none.
+            No equilibrium was found.
         """
         return solve(self.of.scene_at(self.values), self.of.settings).last

@@ -1,1 +1,1 @@
-"""Paths of equilibria over a factor or a motion, with and without contact: limit points, bifurcations, branches."""
+"""Paths of equilibria over a load factor, with and without contact: limit points, bifurcations, branches, flutter."""

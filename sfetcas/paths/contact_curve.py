@@ -1,9 +1,10 @@
-"""The curve of equilibria in contact over the load factor, while what touches does not change its kind.
+"""The curve of equilibria in contact over the load factor, while the kind and number of contacts do not change.
 
-Unknowns are the rotations, the factor and the places of contact.  With places held the equilibrium is found across
-a direction of rotations and factor, as along any curve (see :mod:`~sfetcas.solvers.arclength`), so that limit points
-are nothing special; the places follow from their conditions by Broyden's method.  Meshes are stretched with the places,
-so that unknowns keep their numbers.  Tangents are exact but for differences by the places.
+Unknowns are the rotations, the factor and the positions of the contacts along members.  For fixed contact positions the
+equilibrium is found by arc-length continuation (see :mod:`~sfetcas.solvers.arclength`), so that limit points need no
+special treatment; the contact positions follow from their conditions by Broyden's method.  Meshes are stretched with
+the contact positions, so that unknowns keep their numbers.  Tangents are exact but for finite differences by the
+contact positions.
 """
 
 from __future__ import annotations
@@ -48,15 +49,15 @@ class Stood:
     Attributes
     ----------
     held : Held
-        The equilibrium, its conditions met.
+        The equilibrium, its contact conditions met.
     standing : Standing
-        The same on the curve with places held.
+        The equilibrium as a point of the curve with fixed contact positions.
     tangent : Tangent
-        Direction of the curve, of length one in rotations and factor.
+        Unit tangent of the curve in rotations (rad) and factor (over its unit).
     rates : ndarray (places,)
-        Rates of the places along it.
+        Derivatives of the contact positions, as fractions of the length, by the arc length.
     slopes : ndarray (places, places)
-        Derivative of the conditions by the places across the tangent.
+        Jacobian of the contact conditions by the contact positions, across the tangent; dimensionless.
     arc : float
         Arc length from the start of the curve.
     """
@@ -96,13 +97,13 @@ class ContactCurve:
         self.piece = (-np.inf, np.inf)
 
     def plain(self, prepared: Prepared) -> Curve:
-        """The curve of one model, with places held."""
+        """The curve of equilibria of one model, with fixed contact positions."""
         return Curve(prepared, self.unit, self.piece)
 
     # -- points ---------------------------------------------------------------------------------
 
     def stood(self, held: Held, factor: float, along: Tangent, arc: float = 0.0) -> Stood | None:
-        """A settled equilibrium with the direction of the curve to the side of another; None where that is open."""
+        """A point of the curve for an equilibrium, its tangent oriented as ``along``; None if that is undetermined."""
         curve = self.plain(held.prepared)
         return self._with_tangent(held, curve.standing(held.corrected.state, factor, along, arc=arc), along, arc)
 
@@ -174,7 +175,10 @@ class ContactCurve:
     # -- along ----------------------------------------------------------------------------------
 
     def expected(self, start: Stood, length: float, before: Stood | None = None) -> tuple[State, float, Array]:
-        """State, factor and changes of the places a length along the tangent, bent as since the point before."""
+        """Predicted state, factor and changes of the contact positions a length along the tangent.
+
+        With the point ``before`` the prediction also has the curvature of the curve.
+        """
         curve, bend, rates = self.plain(start.held.prepared), None, length * start.rates
         if before is not None:
             arc = start.arc - before.arc
@@ -188,7 +192,7 @@ class ContactCurve:
         return curve.held(state, curve.loading(factor)), factor, rates
 
     def along(self, start: Stood, length: float, before: Stood | None = None) -> Stood | None:
-        """The point of the curve across the tangent at a length from another; None where none is found."""
+        """The point of the curve in the plane normal to the tangent at a length; None where none is found."""
         free = free_places(start.held.mesh.touches)
         state, factor, change = self.expected(start, length, before)
         found = self._held_at(start.held, free, change, state, factor, start.tangent)
@@ -208,7 +212,7 @@ class ContactCurve:
         return None
 
     def limit(self, a: Stood, b: Stood) -> Stood | None:
-        """The point between two others at which the factor ceases to grow; None where it is not found."""
+        """The limit point (extremum of the factor) between two points; None where it is not found."""
         met: dict[float, Stood] = {0.0: a, b.arc - a.arc: b}
         flat = FLAT * max(abs(a.tangent.factor), abs(b.tangent.factor))
 

@@ -51,12 +51,12 @@ BIFURCATIONS = "in contact: limit points are located, bifurcations and branches 
 
 
 def follow_in_contact(scene: Scene, settings: Settings) -> Path:
-    """The path of a scene with obstacles.
+    """Path analysis of a scene with obstacles.
 
     Raises
     ------
     SolveError
-        There is no equilibrium to start from, or none beside it.
+        There is no equilibrium to start from, or none next to it.
     """
     return ContactPath(scene, settings).path()
 
@@ -74,7 +74,7 @@ class _Level:
 
 
 class ContactPath:
-    """A path in contact on finer and finer meshes."""
+    """Path analysis in contact: the path on finer and finer meshes."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
         self.span, self.analysis = scene.analysis.span, scene.analysis
@@ -86,7 +86,7 @@ class ContactPath:
         self.knots = tuple(sorted(knots))
 
     def path(self) -> Path:
-        """The answer."""
+        """The path on a mesh fine enough for the accuracy."""
         begin = time.perf_counter()
         base = self.meshes.target if self.meshes.prescribed else self.meshes.target.refined()
         coarse = self._level(base)

@@ -1,7 +1,7 @@
-"""Following a path in contact step by step, over changes of what touches.
+"""Following a path in contact step by step, over changes of the contacts.
 
-A step beyond which something touches otherwise is taken back and halved until the change is near; the state beyond it
-is then looked for with the factor held, and the path goes on from there, away from the change.
+A step after which other places touch is taken back and halved until the change is near.  The state beyond the change is
+then sought at a fixed factor, and the path goes on from there, away from the change.
 """
 
 from __future__ import annotations
@@ -70,11 +70,11 @@ class Trace:
     notes : list of str
         What happened on the way.
     end : str
-        Why it ends: ``range``, ``points``, ``lost``, or ``bent`` beyond what small members are for.
+        Why it ends: ``range``, ``points``, ``lost``, or ``bent``: a small member is bent beyond linear elasticity.
     told : str
-        Of ``bent``, which member and how far.
+        For ``bent``: which member, and how far.
     corners : set of int
-        Numbers of points after which something touches otherwise.
+        Indices of points after which the contacts change.
     """
 
     points: list[Stood]
@@ -86,14 +86,14 @@ class Trace:
 
 
 class Tracer:
-    """Paths of one scene on meshes that begin as one base.
+    """Follows paths of one scene on meshes that start from one base mesh.
 
     Parameters
     ----------
     run : ContactRun
     base : Mesh
     span : tuple of float
-        Factors between which the path is followed.
+        Smallest and largest factor.
     knots : tuple of float
         Factors at which histories have knots.
     """
@@ -106,9 +106,10 @@ class Tracer:
     # -- begin ----------------------------------------------------------------------------------
 
     def begin(self, beside: Callable[[float], Equilibrium]) -> tuple[Stood, tuple[str, ...]] | None:
-        """The first point, looking upwards unless the range ends at 0; beside factor 0 where all is open there.
+        """The first point and notes: upwards unless the range ends at 0; next to factor 0 where that has no
+        equilibrium.
 
-        ``beside``: the equilibrium at a factor, on any mesh.
+        ``beside`` gives the equilibrium at a factor, on any mesh.
         """
         up = 1.0 if self.span[1] > 0.0 else -1.0
         factor, notes = 0.0, tuple[str, ...]()
@@ -147,7 +148,7 @@ class Tracer:
     # -- along ----------------------------------------------------------------------------------
 
     def traced(self, start: Stood, count: int) -> Trace:
-        """The path from a point on, until the factor leaves the span, or for so many points."""
+        """The path from a point until the factor leaves the range, for at most ``count`` points."""
         trace = Trace([start])
         now, before, length, barrier = start, None, FIRST, np.inf
         while len(trace.points) < count:
@@ -238,7 +239,7 @@ class Tracer:
         return curve.prepared.distance(expected, there.standing.state) <= FAR * turned + EVENT * FAR
 
     def wrong(self, now: Stood, there: Stood) -> tuple[Touch, ...] | None:
-        """What has to touch otherwise at a point; what touches now where the step leads over an obstacle."""
+        """The contacts a point should have instead; the present ones where a step passed an obstacle; else None."""
         held, reviser, way = there.held, self.run.reviser, self.run.at(there.factor)
         released = reviser.released(held.prepared.model, held.loading, held.mesh.touches, way)
         if released != held.mesh.touches:
@@ -363,7 +364,7 @@ class Tracer:
         return replace(near, held=held, standing=plain.standing(state, factor, near.tangent, arc=arc), arc=arc)
 
     def crossings(self, trace: Trace, factors: tuple[float, ...]) -> list[Stood]:
-        """The points of a path at factors, in the order in which they are met."""
+        """The points of a path at given factors, in the order along the path."""
         first = trace.points[0]
         met = [first for factor in factors if factor == first.factor][:1]
         for a, b in zip(trace.points, trace.points[1:], strict=False):
@@ -377,7 +378,7 @@ class Tracer:
         return met
 
     def again(self, point: Stood) -> Held | None:
-        """A point of a path on another mesh, settled on this one at the same factor."""
+        """A point of a path on another mesh as an equilibrium on this one at the same factor; None if there is none."""
         held = point.held
         return self._on_base(held.prepared.model, held.corrected.state, held.mesh.touches, point.factor)
 

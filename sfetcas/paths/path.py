@@ -1,4 +1,4 @@
-"""Paths: equilibria over the load factor, with critical points, the branches that cross there, and frequencies."""
+"""Answers of path analyses: equilibria over the load factor, critical points, branches and frequencies."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ NO_POTENTIAL = (
     "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
     "tangent is singular (divergence), and flutter would only show with the key 'modes'"
 )
-"""A note."""
+"""A note on what limit points and bifurcations mean for loads without potential."""
 
 FLUTTER = (
     "loads without potential: no energy tells what is stable; limit points and bifurcations are where the static "
     "tangent is singular (divergence), flutter points where one of the modes asked for starts to grow"
 )
-"""The note where modes are asked for."""
+"""A note as :data:`NO_POTENTIAL` where modes are asked for, which find flutter points."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlutterPoint(Equilibrium):
-    """An equilibrium from which on a motion grows while it oscillates: without damping two frequencies meet there.
+    """An equilibrium at which a motion starts to grow while it oscillates; without damping two frequencies coincide
+    there.
 
     Attributes
     ----------
@@ -45,7 +46,7 @@ class FlutterPoint(Equilibrium):
     omega: float = field(kw_only=True)
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As of :meth:`Equilibrium.table`; also the frequency."""
+        """As :meth:`Equilibrium.table`; the table of the whole state also has the frequency ``omega``."""
         found = super().table(kind, name)
         return found if kind else {**found, "omega": self.omega}
 
@@ -61,21 +62,21 @@ class PathPoint:
     Attributes
     ----------
     factor : float
-        Factor of the loads and motions.
+        Factor of the loads and prescribed motions.
+    state, loading
+        Unknowns and loads, dimensionless.
     negative : int
-        Negative eigenvalues of the energy on the closings.
+        Number of negative eigenvalues of the tangent stiffness on the constraints.
     stable : bool, "neutral", or "not defined" for loads without potential
-        What they say.
     arc : float
         Arc length from the start, see :class:`Path`.
     kind : str
         ``""``, ``"limit point"`` or ``"bifurcation"``.
     prepared : Prepared, optional
-        Its own discretisation, where that is not the one of the whole path: in contact elements end where something
-        touches.
+        Its own discretisation where that differs from the one of the path: in contact elements end at the contacts.
     omega, growth : ndarray (modes,), optional
-        Where modes are asked for: angular frequencies, rad/s, and rates of growth, 1/s, of the lowest motions.  Those
-        that leave the equilibrium without oscillating come first, with frequency zero; a rate below zero fades.
+        Where modes are asked for: angular frequencies, rad/s, and growth rates, 1/s, of the lowest motions.  Those that
+        leave the equilibrium without oscillating come first, with frequency zero; a negative rate means decay.
     """
 
     factor: float
@@ -92,7 +93,7 @@ class PathPoint:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """The stretch of a path between its first and its last point.
+    """A connected sequence of equilibria: the path itself, or a branch that crosses it at a bifurcation.
 
     Attributes
     ----------
@@ -103,9 +104,10 @@ class Branch:
     end : str
         Why it ends, a sentence.
     bifurcation, side : int
-        From which bifurcation of the path it starts (0: it is the path itself), and to which side, 1 or -1.
+        The bifurcation of the path from which it starts (1 is the first, 0: it is the path itself), and its side, 1 or
+        -1.
     flutter_points : tuple of FlutterPoint
-        Where modes are asked for: points from which on, along the path, one more motion grows while it oscillates.
+        Where modes are asked for: points beyond which one more motion grows while it oscillates.
     """
 
     points: tuple[PathPoint, ...] = field(repr=False)
@@ -119,11 +121,11 @@ class Branch:
 
     @property
     def factors(self) -> Array:
-        """Factors of the points, (points,)."""
+        """Load factors of the points, (points,), dimensionless."""
         return np.array([point.factor for point in self.points])
 
     def stretches(self) -> list[tuple[bool | str, int, int]]:
-        """Stretches of one stability: what it is, numbers of the first and last point."""
+        """Sections of equal stability: what ``stable`` is there, index of the first and of the last point."""
         found: list[tuple[bool | str, int, int]] = []
         for i, point in enumerate(self.points):
             if point.kind and i and found:
@@ -147,15 +149,21 @@ class Path:
         follow the path to the end of its range.
     branches : tuple of Branch
         The path itself, then those that were followed from its bifurcations.
+    prepared : Prepared
+        Discretisation of the points.
     unit : float
-        Arc lengths are the root of the mean square of the rotations (rad) and of the factor over this unit.
+        Change of the factor that counts as much as 1 rad in arc lengths, which are root mean squares of rotations, rad,
+        and of the factor over this unit.
     error_estimate : float
         Largest estimated error along the path: of positions over the size of the scene, of the factors of limit
         points and bifurcations, of frequencies and of the factors of flutter points relative to themselves.
+    last : Equilibrium
+        The equilibrium at the last point of the path.
+    notes : tuple of str
     seconds : mapping
-        Time spent on models and on solving.
+        Wall time of assembling and of solving, s.
     massive : Prepared, optional
-        The discretisation that modes are on, where these are asked for.
+        Discretisation for the modes, where these are asked for.
     """
 
     scene: Any = field(repr=False)
@@ -171,7 +179,7 @@ class Path:
 
     @property
     def model(self) -> Model:
-        """Discretisation that the points are on, or the last one in contact."""
+        """The model that the points belong to; with contact the last one."""
         return self.prepared.model
 
     @property
@@ -186,7 +194,7 @@ class Path:
 
     @property
     def steps(self) -> tuple[Equilibrium, ...]:
-        """Crossings of the factors asked for: of the path, then of the branches."""
+        """Equilibria where the path, then its branches, cross the factors of ``analysis.steps``."""
         return tuple(entry for branch in self.branches for entry in branch.steps)
 
     @property
@@ -205,11 +213,11 @@ class Path:
         return tuple(entry for branch in self.branches for entry in branch.flutter_points)
 
     def fields(self, point: PathPoint) -> Fields:
-        """Everything by name at a point."""
+        """Positions, forces and moments at a point of the path or a branch, by name."""
         return Fields((point.prepared or self.prepared).equations, point.state, point.loading)
 
     def configuration(self, point: PathPoint) -> Configuration:
-        """The same as of an equilibrium, but for what certifies it."""
+        """The state at a point with positions, forces and reactions by name: an equilibrium without a certificate."""
         fields = self.fields(point)
         return Configuration(point.factor, fields.model, point.state, point.loading, fields)
 
@@ -218,7 +226,7 @@ class Path:
         return np.array([self.fields(point).position(node) for point in self.branches[branch].points])
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON answer."""
+        """The JSON answer as nested dictionaries."""
         answer: dict[str, Any] = {**heading(self, self.model), "path": self._arrays(self.main)}
         for kind in ("steps", "limit_points", "bifurcations", "flutter_points"):
             entries = [
@@ -261,7 +269,7 @@ class Path:
 
 
 def ending(end: str, factor: float, count: int, told: str) -> str:
-    """Why a stretch with so many points ends at a factor, in words."""
+    """A sentence on why a branch of ``count`` points ends at a factor; ``told`` names a small member bent too far."""
     return {
         "range": f"the factor leaves the range at {factor:g}",
         "points": f"{count} points",

@@ -68,7 +68,7 @@ LEAST_WAY = 1e-3
 
 @single_threaded
 def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) -> Path:
-    """The path of equilibria of a scene whose analysis is a path.
+    """Path analysis: the equilibria of a scene over its load factor.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     Raises
     ------
     SceneError
-        The scene asks for what cannot be modelled, or for no path.
+        The scene cannot be modelled, or its analysis is no path.
     SolveError
-        There is no equilibrium to start from, or none beside it.
+        There is no equilibrium to start from, or none next to it.
     """
     if scene.analysis.type != "path":
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
@@ -98,14 +98,15 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
 
     Parameters
     ----------
+    path : Path
     bifurcation : int
-        Which bifurcation of the path itself, 1 is the first.
+        Number of the bifurcation on the path itself, 1 is the first.
     side : int
-        1 or -1.
+        Direction along the eigenvector, 1 or -1.
     shape : int
-        Which of the shapes where several eigenvalues vanish at once.
+        Number of the eigenvector, from 1, where several eigenvalues vanish at once.
     points : int, optional
-        Most points; that of the scene by default.
+        Largest number of points; ``analysis.points`` by default.
 
     Raises
     ------
@@ -193,7 +194,7 @@ class PathTracing:
     # -- meshes ---------------------------------------------------------------------------------
 
     def path(self) -> Path:
-        """The answer."""
+        """The path, with its branches, on a mesh fine enough for the accuracy."""
         begin = time.perf_counter()
         mesh, last = self._first_mesh(), np.inf
         coarse = self._level(mesh)
@@ -293,7 +294,7 @@ class PathTracing:
         level.stretches.append(_Stretch(without(traced, known), number, side))
 
     def branch(self, curve: Curve, event: Event, side: int, shape: int, points: int) -> Traced | None:
-        """The branch at a bifurcation to one side; None where none is found."""
+        """The branch at a bifurcation to one side; None where Newton's method finds none within the range."""
         first = switched(curve, event, shapes_at(curve, event), side, shape)
         if first is None or not self._in_range(first):
             return None
@@ -303,7 +304,7 @@ class PathTracing:
         return self.span[0] <= standing.factor <= self.span[1]
 
     def stretch(self, part: _Stretch, curve: Curve) -> _Stretch:
-        """The same with the crossings of the factors asked for."""
+        """A traced branch with the equilibria at the factors of ``analysis.steps`` added."""
         points = part.traced.points
         crossings = at_factors(curve, points, self.analysis.steps)
         # A closed curve ends where it begins.
@@ -375,7 +376,7 @@ class PathTracing:
         )
 
     def answered(self, curve: Curve, stretch: _Stretch, errors: dict[tuple[str, int], float]) -> Branch:
-        """The answer of one stretch."""
+        """A traced branch as a :class:`Branch`, with the estimated errors of its points."""
         traced = stretch.traced
         kinds = {id(event.standing): event for event in traced.events}
         energy = curve.model.conservative

@@ -1,9 +1,10 @@
 """Modes at the points of a path, and flutter points: where two frequencies meet and a motion starts to grow.
 
-1. The points of the path are put on a mesh with a place at every cut, which masses need, and corrected there.
-2. With ``z`` the squares of the exponents, two that meet have a difference whose square ``(z1 - z2)^2`` is smooth in
-   the load and changes its sign, while the exponents themselves have the slope of a root there.  With damping the real
-   part of an exponent changes its sign.  Either is a bracketed root along the path.
+1. The points of the path are transferred to a mesh with a displacement at every end of an element, as masses need it,
+   and corrected there.
+2. Let ``z`` be the squares of the exponents (eigenvalues).  Of two that coincide ``(z1 - z2)^2`` is smooth in the load
+   and changes its sign, while the exponents behave like a square root there.  With damping the real part of an exponent
+   changes its sign.  Either gives a bracketed root along the path.
 3. All elements are halved until frequencies and flutter points change by less than the accuracy, relative to
    themselves.
 
@@ -61,14 +62,14 @@ TRIES = 3
 
 
 def with_modes(path: Path, settings: Settings) -> Path:
-    """The path with the lowest motions at each point, on a mesh fine enough for these, and with flutter points.
+    """The path with the lowest modes at each point, on a mesh fine enough for them, and with flutter points.
 
     Raises
     ------
     SceneError
-        Nothing has mass, or masses cannot stand where the elements are asked to be integrated.
+        Nothing has mass, or Gauss integration is asked for, which masses exclude.
     SolveError
-        A point of the path is none on the mesh of the masses.
+        A point of the path could not be transferred to the mesh for masses.
     """
     if settings.gauss:
         raise SceneError("integration: found 'gauss', accepted: 'nodes' with modes, as masses stand at the nodes")
@@ -110,7 +111,7 @@ def with_modes(path: Path, settings: Settings) -> Path:
 
 
 def shaken(path: Path, branch: Branch) -> Branch:
-    """A branch of a path that has modes, with modes on the mesh of these."""
+    """A branch with modes at its points, on the mesh for the modes of its path."""
     assert path.massive is not None
     return _Level(replace(path, branches=(branch,)), path.massive).answered(0, None)
 

@@ -1,1 +1,1 @@
-"""Pictures of scenes, equilibria and paths; the only place that knows matplotlib."""
+"""Pictures of scenes, equilibria, paths and motions; the only package that imports matplotlib."""

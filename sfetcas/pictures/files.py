@@ -1,4 +1,4 @@
-"""Figures as files."""
+"""Writing matplotlib figures to files, in the format of their ending."""
 
 from __future__ import annotations
 

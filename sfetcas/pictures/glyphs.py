@@ -69,7 +69,7 @@ def sketch_all(sketch: Sketch) -> None:
 
 
 def sketch_holds(sketch: Sketch) -> None:
-    """Sketch what holds the structure and joins its members: obstacles, supports, joints, springs."""
+    """Add symbols of obstacles, supports, joints and springs to a sketch."""
     scene = sketch.scene
     for name, contact in scene.contacts.items():
         sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))

@@ -215,7 +215,7 @@ def _end(member: Member, node: str) -> Array:
 
 
 def turned_party(sketch: Sketch, party: str, node: str) -> Array:
-    """Rotation of a party of a rotational spring since the undeformed scene, (4,)."""
+    """Rotation (4,), a unit quaternion since the undeformed scene, of a party of a rotational spring."""
     if party in sketch.scene.members:
         return np.asarray(sketch.step.along(party, _end(sketch.scene.members[party], node))["quaternion"][0])
     turned = None if party == "ground" else sketch.step.quaternion(party)

@@ -163,23 +163,23 @@ def _noise(step: Configuration, fields: Iterable[dict[str, Array]]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Directions (3,) to the right and up in the picture; elevation and azimuth in degrees in space."""
+    """Unit vectors (3,) to the right and up in the picture; in space elevation and azimuth of the view in degrees."""
 
     right: Array
     up: Array
     angles: tuple[float, float] | None = None
 
     def flat(self, points: Any) -> Array:
-        """Points or vectors (..., 3) in the plane of the picture, (..., 2)."""
+        """Points or vectors (..., 3) in fixed axes projected onto the picture, (..., 2), in the same unit."""
         return np.asarray(np.asarray(points, float) @ np.stack([self.right, self.up], axis=1))
 
     def raised(self, points: Any) -> Array:
-        """Vectors (..., 2) of the plane of the picture in fixed axes, (..., 3)."""
+        """Vectors (..., 2) in the picture as vectors (..., 3) in fixed axes, in the same unit."""
         return np.asarray(np.asarray(points, float) @ np.stack([self.right, self.up]))
 
 
 def view_of(space: bool, lines: Sequence[Array]) -> View:
-    """The plane; in space that of some usual views which shows the lines the broadest."""
+    """The x-y plane or, in space, of some usual views the one in which lines (n, 3), in drawn units, appear largest."""
     if not space:
         return View(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     points = np.vstack([line[:: max(1, len(line) // 100)] for line in lines])
@@ -298,7 +298,7 @@ class Sketch:
         self.marks.append(mark)
 
     def dot(self, point: Array, name: str) -> None:
-        """Sketch a small circle at (3,)."""
+        """Add a small circle at (3,), in drawn units."""
         mark = Mark(kind="dot", points=point[None, :], name=name, colour=SUPPORT, fill="white", level=8.0)
         self.marks.append(mark)
 
@@ -308,12 +308,12 @@ class Sketch:
         self.marks.append(Mark(kind="arrow", points=points, level=7.0, **look))
 
     def label(self, text: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
-        """Ask for a text."""
+        """Add a text beside an anchor (3,), in drawn units."""
         label = Label(anchor=anchor, away=away, text=text, colour=ink.colour, name=ink.name, gap=gap)
         self.labels.append(label)
 
     def tell(self, value: float, unit: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
-        """Ask for a value with its unit, which may be left out where larger ones take the place."""
+        """Add a value with its unit beside an anchor (3,); it may be left out where larger ones need the space."""
         self.label(amount(value, unit), anchor, away, ink, gap)
         self.labels[-1] = replace(self.labels[-1], value=abs(value), unit=unit)
 
@@ -333,7 +333,7 @@ def norm(vector: Any) -> float:
 
 
 def left_of(flat: Array) -> Array:
-    """A flat vector turned left by a right angle."""
+    """A vector (2,) of the picture rotated by a right angle to the left, in the same unit."""
     return np.array([-flat[1], flat[0]])
 
 

@@ -1,1 +1,1 @@
-"""Many solves at once: the cases of a sweep, who solves them, and the table of what comes out."""
+"""Sweeps: many solves of one scene with other numbers, their distribution to processes, and the table of results."""

@@ -1,4 +1,4 @@
-"""The cases of a sweep: which numbers of a scene have which values; given, all combinations, or drawn at random."""
+"""The cases of a sweep: values of numbers of a scene, given, as all combinations, or drawn at random."""
 
 from __future__ import annotations
 
@@ -26,22 +26,23 @@ from .distributions import Distribution
 __all__ = ["MOST_CASES", "Cases", "cases_from", "grid", "read_cases", "sampled"]
 
 MOST_CASES = 10_000_000
-"""Cases at most."""
+"""Largest number of cases."""
 
 LARGEST = 200_000_000
-"""Bytes of a table: so many cases of one number with all its digits."""
+"""Largest size of a table file in bytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """A table of named numbers, a row for each case.
+    """A table of values of numbers of a scene, a row for each case.
 
     Attributes
     ----------
     columns : mapping of ndarray
-        By the names of :func:`~sfetcas.parametric.changing.changed`: (cases,) of a number, (cases, k) of a list of k.
+        By the names of :func:`~sfetcas.parametric.changing.changed`, in the units of the scene: (cases,) for a number,
+        (cases, k) for a list of k numbers.
     random : bool
-        Drawn at random: means and deviations over the cases say something.
+        Whether the cases are a random sample, so that statistics over them have a meaning.
 
     Raises
     ------
@@ -68,7 +69,7 @@ class Cases:
         return len(next(iter(self.columns.values())))
 
     def single(self, scene: Scene) -> Cases:
-        """The same with a column for each number: those of ``loads.tip.value`` by ``loads.tip.value.0``, ...
+        """The cases with a column for each single number: ``loads.tip.value.0``, ... instead of ``loads.tip.value``.
 
         Raises
         ------
@@ -95,18 +96,18 @@ class Cases:
 
 
 def cases_from(table: Any) -> Cases:
-    """Cases as they are, or from a table of columns.
+    """Cases from a table of columns; :class:`Cases` are returned as they are.
 
     Raises
     ------
     SceneError
-        It is none.
+        It is no table of columns.
     """
     return table if isinstance(table, Cases) else Cases(table)
 
 
 def grid(values: Mapping[str, Sequence[ArrayLike] | Array]) -> Cases:
-    """All combinations of values, the last name running fastest.
+    """All combinations of values, in the units of the scene; the last name varies fastest.
 
     ``grid({"loads.tip.value.1": [0, 5, 10], "sections.strip.EI3": [1, 2]})`` has six cases.
 
@@ -133,19 +134,19 @@ def sampled(
     seed: int = 0,
     method: Literal["random", "latin"] = "random",
 ) -> Cases:
-    """Cases drawn at random, the same for the same seed.
+    """Cases drawn at random, reproducible by the seed.
 
     Parameters
     ----------
     count : int
         Number of cases.
     distributions : mapping
-        ``{"sections.strip.EI3": Normal(1.0, 0.05), "loads.tip.value.1": Uniform(9, 11)}``; each number is drawn by
-        itself.
+        ``{"sections.strip.EI3": Normal(1.0, 0.05), "loads.tip.value.1": Uniform(9, 11)}``; numbers are drawn
+        independently.
     seed : int, optional
     method : str, optional
-        ``random``: each case by itself, the first ones of a larger ``count`` the same.  ``latin``: a Latin hypercube,
-        where each of ``count`` equally probable intervals of each number has one case; means are nearer then.
+        ``random``: independent cases; a larger ``count`` adds further ones.  ``latin``: a Latin hypercube, in which
+        each of ``count`` equally probable intervals of each number has one case; means are more accurate then.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What numbers are drawn from, each by its values at probabilities."""
+"""Distributions that numbers are drawn from, by their inverse cumulative distribution functions."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class Normal:
         _positive(self.deviation, "deviation")
 
     def at(self, probability: Array) -> Array:
-        """Values (n,) at probabilities (n,) between 0 and 1, both left out."""
+        """Inverse cumulative distribution: values (n,) at probabilities (n,) strictly between 0 and 1."""
         standard = NormalDist()
         return self.mean + self.deviation * np.array([standard.inv_cdf(p) for p in probability.tolist()])
 
 
 @dataclass(frozen=True)
 class LogNormal:
-    """What is above zero and whose logarithm is normal, of a mean and a standard deviation of itself.
+    """The log-normal distribution; mean and standard deviation are those of the number, not of its logarithm.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class LogNormal:
         _positive(self.deviation, "deviation")
 
     def at(self, probability: Array) -> Array:
-        """Values (n,) at probabilities (n,) between 0 and 1, both left out."""
+        """Inverse cumulative distribution: values (n,) at probabilities (n,) strictly between 0 and 1."""
         variance = math.log1p((self.deviation / self.mean) ** 2)
         logarithm = Normal(math.log(self.mean) - 0.5 * variance, math.sqrt(variance))
         return np.exp(logarithm.at(probability))
@@ -64,7 +64,7 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class Uniform:
-    """Anything between two bounds, as probable as anything else there.
+    """The uniform distribution between two bounds.
 
     Raises
     ------
@@ -82,12 +82,12 @@ class Uniform:
             raise SceneError(f"found {self.low:g} to {self.high:g}, accepted: a range from low to high", ("Uniform",))
 
     def at(self, probability: Array) -> Array:
-        """Values (n,) at probabilities (n,) between 0 and 1, both left out."""
+        """Inverse cumulative distribution: values (n,) at probabilities (n,) strictly between 0 and 1."""
         return self.low + (self.high - self.low) * probability
 
 
 Distribution = Normal | LogNormal | Uniform
-"""What there is."""
+"""Any of the distributions."""
 
 
 def _finite(value: float, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Cases handed to an executor in chunks, and what becomes of them gathered in their order."""
+"""Distribution of cases to an executor in chunks, and collection of their results in order."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ ROOM = 1024
 
 
 def chunk_of(count: int) -> int:
-    """Cases of a chunk."""
+    """Number of cases in a chunk, for a number of cases."""
     return min(max(count // CHUNKS, 1), LARGEST)
 
 
 def fed(
     executor: Executor, job: Job, values: Sequence[Sequence[float]], size: int, progress: Callable[[int], object]
 ) -> tuple[list[Outcome], bool]:
-    """What became of all cases, and whether it was interrupted.
+    """Solve all cases: their results, and whether it was interrupted.
 
     Raises
     ------
     SceneError
-        The first case that was solved has not what is wanted of it: none has.
+        The answer of the first case that was solved does not have a quantity that is asked for.
     """
     feeding = _Feeding(executor, job, values, size, progress)
     interrupted = feeding.run()

@@ -1,6 +1,6 @@
-"""What is kept of each answer of a sweep: quantities by their names, as numbers.
+"""The quantities that a sweep keeps of each answer.
 
-Names are those of :mod:`~sfetcas.description.answers`, of one of several answers with its key as in ``expect``:
+Names are those of :mod:`~sfetcas.description.answers`; one of several answers is selected as in ``expect``:
 ``nodes.tip.position step 2``, ``nodes.tip.velocity time 0.5``, ``factor limit_point 1``.
 """
 
@@ -22,19 +22,19 @@ from ..mathematics.arrays import Array
 __all__ = ["Wanted", "wanted_of"]
 
 COMING_AND_GOING = ("contacts", "modes")
-"""Kinds of which an answer has more or less as the numbers of the scene are."""
+"""Tables of the answer whose number of entries may differ from case to case."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A quantity that is wanted of each answer.
+    """A quantity that is kept of each answer.
 
     Attributes
     ----------
     text : str
-        As it was asked for; its name in the table.
+        The name given, which is also its name in the table.
     expect : Expect
-        Where to look.
+        The quantity, with the selection of one of several answers.
     """
 
     text: str
@@ -42,17 +42,17 @@ class Wanted:
 
     @property
     def optional(self) -> bool:
-        """Whether some answers may be without it: what touches, how many modes, critical points."""
+        """Whether some answers may lack it: it belongs to contacts, modes or critical points, whose number varies."""
         numbered = any(getattr(self.expect, key) is not None for key in COUNTED)
         return numbered or answer_name(self.expect.quantity).kind.table in COMING_AND_GOING
 
     def numbers(self, answer: Answer) -> Array:
-        """What an answer says, as numbers, (n,); none where it may be without it and is.
+        """The value in an answer, (n,), in the unit of the quantity; empty where an optional quantity is absent.
 
         Raises
         ------
         SceneError
-            It has no such quantity, or this is not made of numbers.
+            The answer lacks a quantity that is not optional, or its value does not consist of numbers.
         """
         try:
             found = asked(answer, self.expect)
@@ -70,12 +70,12 @@ class Wanted:
 
 
 def wanted_of(scene: Scene, names: Sequence[str]) -> tuple[Wanted, ...]:
-    """The quantities of some names.
+    """Quantities from their names.
 
     Raises
     ------
     SceneError
-        There is none, one is named twice, or the answers of such a scene have no such quantity.
+        There are no names, one appears twice, or the answers of such a scene have no such quantity.
     """
     if isinstance(names, str) or not names:
         raise SceneError(f"found {say(names)}, accepted: a list of names, as ['nodes.tip.position']", ("quantities",))

@@ -1,4 +1,4 @@
-"""What a sweep gives: a table with a row for each case, its failures, its statistics and its files."""
+"""The result of a sweep: a table with a row for each case, its failures, statistics and files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .work import SHORT, SOLVED, Outcome
 __all__ = ["ENDINGS", "Failure", "Sweep", "check_table", "gathered"]
 
 ENDINGS = (".csv", ".json", ".npz")
-"""Kinds of table files."""
+"""Accepted endings of table files."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class Failure:
     Attributes
     ----------
     case : int
-        Its row, from 0.
+        Its row in the table, from 0.
     values : mapping
-        Its numbers by name.
+        Values of the numbers that change, by name.
     status, reason : str
         ``refused``, ``failed`` or ``not run``, and why in a sentence.
     """
@@ -53,21 +53,22 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The cases of a sweep and what became of them, in their order.
+    """The result of :func:`~sfetcas.sweep`: the cases and their answers, in order.
 
     Attributes
     ----------
     scene : Scene
-        Before its numbers were changed.
+        The scene before its numbers were changed.
     cases : Cases
-        A column for each number.
+        A column for each single number.
     quantities : mapping of ndarray
-        By the names that were asked for, (cases, k); not a number where there is no answer.
+        By the names given, (cases, k), in their units; nan where there is no answer.
     outcomes : tuple of Outcome
+        Status, notes and time of each case.
     wall : float
-        Seconds from the first to the last.
+        Wall time of the sweep, s.
     interrupted : bool
-        The rest of the cases was not run.
+        Whether it was interrupted; the remaining cases were not run.
     """
 
     scene: Scene = field(repr=False)
@@ -82,12 +83,12 @@ class Sweep:
 
     @property
     def solved(self) -> Array:
-        """Which cases have an answer, (cases,)."""
+        """Which cases have an answer, (cases,) of bool."""
         return np.array([outcome.status in (SOLVED, SHORT) for outcome in self.outcomes], dtype=bool)
 
     @property
     def failures(self) -> tuple[Failure, ...]:
-        """The others."""
+        """The cases without an answer."""
         columns = self.cases.columns
         return tuple(
             Failure(i, {name: float(column[i]) for name, column in columns.items()}, outcome.status, outcome.reason)
@@ -97,11 +98,11 @@ class Sweep:
 
     @cached_property
     def table(self) -> Mapping[str, Array]:
-        """Columns (cases,): numbers that change, quantities (vectors as ``nodes.tip.position.0``), what became of each.
+        """All columns (cases,), in their units: numbers that change, quantities (``nodes.tip.position.0``), outcomes.
 
-        A column of a quantity that has the name of a number that changes, as where places of nodes do, begins with
-        ``answer.``.  Texts are in ``status``, ``reason`` and ``notes``; ``error_estimate`` is the largest of an answer,
-        ``seconds`` are those of its solve.
+        A quantity with the name of a number that changes, as the position of a node, has the prefix ``answer.``.
+        ``status``, ``reason`` and ``notes`` are texts; ``error_estimate`` is the largest of an answer, ``seconds`` the
+        time of its solve.
         """
         found: dict[str, Array] = dict(self.cases.columns)
         for name, values in self.quantities.items():
@@ -115,7 +116,7 @@ class Sweep:
         return MappingProxyType(found)
 
     def values(self, name: str) -> Array:
-        """A quantity as it was asked for, (cases,) of a number and (cases, k) of k, or a column of the table.
+        """A quantity by the name given, (cases,) or for vectors (cases, k), or a column of the table; in its unit.
 
         Raises
         ------
@@ -134,15 +135,15 @@ class Sweep:
         return self._solved(name, 1).mean(axis=0)
 
     def deviation(self, name: str) -> Any:
-        """Standard deviation over the solved cases, of one case less."""
+        """Sample standard deviation over the solved cases (divided by their number less one), a number or (k,)."""
         return self._solved(name, 2).std(axis=0, ddof=1)
 
     def standard_error(self, name: str) -> Any:
-        """Standard error of the mean of cases drawn at random; of a Latin hypercube it is smaller than this says."""
+        """Standard error of the mean for independent random cases; for a Latin hypercube the true one is smaller."""
         return self.deviation(name) / np.sqrt(self.solved.sum())
 
     def quantiles(self, name: str, probabilities: ArrayLike) -> Array:
-        """Quantiles over the solved cases, linear between them: (probabilities,) or (probabilities, k).
+        """Quantiles over the solved cases, by linear interpolation: (probabilities,) or (probabilities, k).
 
         Raises
         ------
@@ -166,7 +167,7 @@ class Sweep:
     def save(self, path: str | Path) -> None:
         """Write the table, whole or not at all: ``.csv``, ``.json`` or ``.npz``.
 
-        In CSV what is no number is an empty cell, in JSON null; all digits are kept.
+        A missing number is an empty cell in CSV and null in JSON; all digits are kept.
 
         Raises
         ------
@@ -177,7 +178,7 @@ class Sweep:
         write_file(Path(path), self.write)
 
     def write(self, path: Path) -> None:
-        """Write the table to a new file of one of ENDINGS; :meth:`save` leaves nothing half-written."""
+        """Write the table directly to a new file; :meth:`save` does so without leaving partial files."""
         writers = {".csv": self._write_csv, ".json": self._write_json, ".npz": self._write_npz}
         writers[path.suffix](path)
 
@@ -231,7 +232,7 @@ def gathered(
     wall: float,
     interrupted: bool,
 ) -> Sweep:
-    """The sweep of what became of its cases."""
+    """The :class:`Sweep` of the outcomes of all cases."""
     quantities = {}
     for k, one in enumerate(wanted):
         rows = [outcome.numbers[k] if outcome.numbers else np.zeros(0) for outcome in outcomes]

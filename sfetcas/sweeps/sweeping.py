@@ -1,4 +1,4 @@
-"""The sweep of a scene over cases: each solved by itself, wherever an executor has it done."""
+"""The sweep of a scene over many cases, each solved independently by an executor."""
 
 from __future__ import annotations
 
@@ -36,35 +36,35 @@ def sweep(
 ) -> Sweep:
     """Solve a scene with other numbers in each of many cases.
 
-    Each case is ``solve(changed(scene, case), settings)`` by itself, so that numbers are the same to the last bit
-    whoever solves it and after whatever else.  What fails is kept with its reason.  A script that calls this without an
-    executor does so below ``if __name__ == "__main__":``, as processes are started.
+    Each case is ``solve(changed(scene, case), settings)``, independent of all others, so that results are the same to
+    the last bit in any order and on any process.  Failures are recorded with their reason.  Without an executor
+    processes are started: a script has to call this below ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     scene : Scene
-        Of any analysis; what it expects plays no part.
+        With any analysis; its expectations are ignored.
     cases : Cases or mapping
         Columns of numbers by name; see :func:`~sfetcas.sweeps.cases.grid`, :func:`~sfetcas.sweeps.cases.sampled`.
     quantities : sequence of str
-        What is kept of each answer: ``nodes.tip.position``, ``members.beam.moment at 0.5``, ``reactions.A.force``,
+        Quantities of each answer: ``nodes.tip.position``, ``members.beam.moment at 0.5``, ``reactions.A.force``,
         ``modes.omega``, ``factor limit_point 1``, ``nodes.tip.velocity time 0.5``.
     executor : Executor, optional
         Any with the interface of :mod:`concurrent.futures`, as ``Client(...).get_executor()`` of Dask or
-        ``mpi4py.futures.MPIPoolExecutor()``; it is not shut down.  Without one processes of this machine.
+        ``mpi4py.futures.MPIPoolExecutor()``; it is not shut down.  By default local processes.
     workers : int, optional
-        How many of these; as many as there are processors.
+        Number of local processes; by default that of processors.
     settings : Settings, optional
-        How to solve.
+        As of :func:`~sfetcas.solve`.
     chunk : int, optional
-        Cases that are handed over together.
+        Number of cases that are submitted together.
     progress : callable, optional
-        Told how many more cases are done, as ``tqdm.tqdm(total=len(cases)).update`` is.
+        Called with the number of cases done since the last call, as ``tqdm.tqdm(total=len(cases)).update``.
 
     Returns
     -------
     Sweep
-        Rows in the order of the cases.  After KeyboardInterrupt with what was ready.
+        Rows in the order of the cases; after KeyboardInterrupt with the results up to then.
 
     Raises
     ------

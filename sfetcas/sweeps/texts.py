@@ -64,7 +64,7 @@ def cases_in_words(
 
 
 def usual_quantities(scene: Scene) -> list[str]:
-    """What is kept where nothing is asked for: frequencies of modes, else the positions of all nodes that can move."""
+    """Quantities kept by default: frequencies of modes, else the positions of all nodes that can move."""
     if scene.analysis.type == "modes":
         return ["modes.omega"]
     free = [name for name, node in scene.nodes.items() if node.support == "free"]

@@ -1,4 +1,4 @@
-"""What is done where the cases are solved: in other processes, on other machines."""
+"""The work on chunks of cases in worker processes or on other machines."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ ONE_AT_A_TIME = threading.Lock()
 
 @dataclass(frozen=True)
 class Job:
-    """What is the same for all cases.
+    """The data that all cases share.
 
     Attributes
     ----------
     scene : Scene
     settings : Settings
     names : tuple of str
-        Of the numbers that change.
+        Names of the numbers that change.
     wanted : tuple of Wanted
     """
 
@@ -56,20 +56,20 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a case.
+    """The outcome of a case.
 
     Attributes
     ----------
     status, reason : str
-        The reason is a sentence; empty where there is nothing to say.
-    numbers : tuple of ndarray
-        Of each quantity; empty without an answer.
+        ``solved``, ``short``, ``refused``, ``failed`` or ``not run``; why, as a sentence, or empty.
+    numbers : tuple of ndarray (k,)
+        Values of each quantity, in its unit; empty without an answer.
     notes : str
-        Those of the answer.
+        Notes of the answer.
     error_estimate : float
-        The largest of its estimates; not a number where there is none.
+        Largest relative error estimate of the answer; nan where there is none.
     seconds : float
-        Of the solve.
+        Wall time of the solve.
     """
 
     status: str
@@ -88,14 +88,14 @@ def _job(data: bytes) -> Job:
 
 
 def solve_chunk(data: bytes, values: Sequence[Sequence[float]]) -> list[Outcome]:
-    """What becomes of some cases, none of which depends on another.
+    """Solve a chunk of cases, each independently.
 
     Parameters
     ----------
     data : bytes
-        The pickled job, which a process unpacks once.
+        The pickled :class:`Job`, which a process unpacks once.
     values : sequence
-        Of each case.
+        For each case the values of the numbers that change.
     """
     with ONE_AT_A_TIME:
         return [_outcome(_job(data), case) for case in values]

@@ -1,9 +1,9 @@
-"""Processes of this machine as an executor that outlives each of them.
+"""Local processes as an executor that survives the death of any of them.
 
-Where a process of a usual pool dies, all that it had still to do is lost, and which piece of work it was is not told.
-Here each process is a pool of its own: only what it was at is affected, which is the oldest piece it had, and another
-one takes its place.  Processes are never made by copying this one, whose libraries have threads: a server process
-imports what is needed once and copies itself (``forkserver``), where the system can; elsewhere each imports for itself.
+Where a process of an ordinary pool dies, the whole pool is broken, and it is unknown which task did it.  Here each
+process is a pool of its own: only the task that it was at, its oldest one, is affected, and another process takes its
+place.  Processes are never forks of this one, whose libraries have threads: a server process imports what is needed
+once and forks itself (``forkserver``), where the system can; elsewhere each process imports for itself.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MOST = 10_000
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -85,7 +85,7 @@ class _Lane:
 
 
 class Workers(Executor):
-    """So many processes of this machine.
+    """An executor of local processes.
 
     Parameters
     ----------
@@ -119,15 +119,15 @@ class Workers(Executor):
         return ProcessPoolExecutor(1, self._context, initializer=_begin, initargs=(self._reader,))
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Have a piece of work done by the process that has least to do."""
+        """Submit a task to the process with the fewest tasks."""
         return min(self._lanes, key=lambda lane: lane.load).submit(fn, *args, **kwargs)
 
     def guilty(self, future: Future[Any]) -> bool:
-        """Whether a process was at this when it died; what only waited for it is not."""
+        """Whether a process died at this task, not at another one that this task waited for."""
         return any(future in lane.culprits for lane in self._lanes)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Let all processes end after what they have to do."""
+        """End all processes after their tasks."""
         for lane in self._lanes:
             lane.shutdown(wait, cancel_futures)
         if wait:

@@ -1,1 +1,1 @@
-"""Accuracy against time: the discretisations of one scene run, measured and weighed."""
+"""Work-precision measurement: error against time for the discretisations of one scene."""

@@ -124,7 +124,7 @@ class Measurement:
 
 
 def peak_memory() -> float | None:
-    """Largest memory of this process so far, MB; None where the system does not count it."""
+    """Largest memory of this process so far, MB; None where the system does not report it."""
     if resource is None:
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -132,9 +132,9 @@ def peak_memory() -> float | None:
 
 
 def measure(scene: Scene, variant: Variant, repeats: int = 5, longest: float = 2.0) -> Measurement:
-    """Run a variant: once cold, then so many times, as long as that takes less than so many seconds.
+    """Run a variant: once cold, then ``repeats`` times, or until ``longest`` seconds have passed.
 
-    What the scene refuses, and what has no solution, is told in ``failure``.
+    Errors, as of a scene without solution, are recorded in ``failure``.
     """
     try:
         return _measured(scene, variant, repeats, longest)

@@ -1,4 +1,4 @@
-"""A trade as Markdown, CSV and JSON."""
+"""A work-precision measurement as Markdown, CSV and JSON."""
 
 from __future__ import annotations
 

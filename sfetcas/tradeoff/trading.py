@@ -60,16 +60,16 @@ STALLED = 2
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is run.
+    """Limits of a measurement.
 
     Attributes
     ----------
     repeats : int
-        Whole runs of each variant after the first; of solves alone three times as many.
+        Number of whole runs of each variant after the first; solves alone are repeated three times as often.
     longest : float
-        s, a variant that takes longer ends its family.
+        Time, s, of a run that ends its family of variants.
     budget : float
-        s, in all: what is left out then is told.
+        Time, s, of all runs; variants that are left out then are reported.
     """
 
     repeats: int = 5
@@ -219,17 +219,17 @@ def trade(
     against: Literal["refined", "file"] = "refined",
     progress: Callable[[str], object] | None = None,
 ) -> Trade:
-    """Measure accuracy against time of a scene.
+    """Measure accuracy against time for the discretisations of a scene.
 
-    A script that calls this does so below ``if __name__ == "__main__":``, as processes are started.
+    Processes are started: a script has to call this below ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     limits : Limits, optional
     against : str
-        Errors are those against an own ``refined`` solution, or against what the ``file`` expects.
+        Reference of the errors: a ``refined`` solution, or the expected values of the ``file``.
     progress : callable, optional
-        Told the name of each variant before it is run.
+        Called with the name of each variant before it is run.
 
     Raises
     ------

@@ -78,7 +78,7 @@ class Variant:
     accuracy: float | None = None
 
     def settings(self) -> Settings:
-        """What :func:`sfetcas.solve` is told."""
+        """The settings for :func:`sfetcas.solve`."""
         return Settings(
             accuracy=self.accuracy,
             element=self.element or None,
@@ -165,7 +165,7 @@ def _moving(flexible: int) -> Iterator[list[Variant]]:
 
 
 def other_ways(scene: Scene, variant: Variant, dimension: str) -> list[Variant]:
-    """The same mesh with other assembly, solver, kernels, and a plane scene in space."""
+    """Variants on the same mesh with another assembly, solver or kernels, and of a plane scene in space."""
     moving, ways = scene.analysis.type == "dynamic", list[Variant]()
     if scene.analysis.type != "modes":
         ways += [replace(variant, kernels=kernels) for kernels in ("compiled", "interpreted")]

@@ -1,1 +1,1 @@
-"""Motions as optimal control: what drives a scene is looked for, by direct collocation and IPOPT."""
+"""Optimal control of motions by direct collocation and IPOPT, and replays of commands."""

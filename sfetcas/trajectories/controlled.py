@@ -1,11 +1,11 @@
-"""A scene as a controlled system: the equations of its motion at one time as a CasADi Function.
+"""A scene as a controlled system: its equations of motion at one time as a CasADi Function.
 
-They are those of :mod:`~sfetcas.dynamics.stages`: what is out of balance under forces of inertia and damping, and the
-quantities whose rates make these.  Written with quantities, rates and accelerations of their own,
+They are those of :mod:`~sfetcas.dynamics.stages`: the residual under forces of inertia and damping, and the quantities
+whose rates cause these.  Written with quantities, rates and accelerations of their own,
 
     0 = balance(d, v, a, numbers),    x = quantities(d, numbers),    x' = v,    v' = a,
 
-they know neither time nor a step, so that a transcription puts linear relations between x, v and a to them.
+they contain neither time nor time step; a transcription adds linear relations between x, v and a.
 """
 
 from __future__ import annotations
@@ -38,27 +38,27 @@ __all__ = ["ControlledSystem"]
 
 
 class ControlledSystem:
-    """One scene on one mesh with numbers that are controlled or looked for.
+    """One scene on one mesh, with controls and unknown constants.
 
     Parameters
     ----------
     scene : Scene
-    controls, variables : what changes with time, and what is looked for
-    answers : names of what is told
-    places : fractions of the lengths of members at which they are told of
+    controls, variables : numbers that change with time, and unknown numbers that are constant
+    answers : names of the answers that are needed
+    places : fractions of the length at which answers along members are needed
     settings : accuracy, elements
-    mesh : the mesh, of which the first of the scene's accuracy without
+    mesh : the mesh; by default the first one for the scene's accuracy
 
     Attributes
     ----------
     total : int
-        Rotations, displacements and multipliers of a time.
+        Number of rotation unknowns, displacements and multipliers.
     quantities : int
-        Those whose rates make inertia and damping.
+        Number of the quantities that carry mass or are damped.
     time : float
         Unit of time, s.
     begin : InitialState
-        Where the motion begins.
+        The initial state.
     """
 
     def __init__(
@@ -117,27 +117,27 @@ class ControlledSystem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the numbers: controls, then variables."""
+        """Names of the numbers: controls, then constant unknowns."""
         return tuple(name for one in self.arguments.arguments for name in one.names)
 
     @property
     def reference(self) -> Array:
-        """The rotations of the begin and the angles that count turns there: what rotations are counted from."""
+        """Initial rotations and turn-counting angles as one vector, see :meth:`referring`; the reference of ``d``."""
         return self.referring(self.begin.state.q, self.begin.state.wound)
 
     @staticmethod
     def referring(q: Array, near: Array) -> Array:
-        """Rotations (rotations, components) and angles as one vector."""
+        """Rotations (rotations, components) and turn-counting angles (angles,) as one vector."""
         return np.concatenate([q.ravel(), near])
 
     @functools.cached_property
     def start(self) -> Array:
-        """Displacements and multipliers of the begin in their places of ``d``; no rotation."""
+        """The vector ``d`` (total,) of the initial state, dimensionless: no rotation, displacements, multipliers."""
         state = self.begin.state
         return np.concatenate([np.zeros(self.system.equations.turning_unknowns), state.y, state.lam])
 
     def result(self, name: str) -> Result:
-        """What an answer of a name is.
+        """Shape, unit and meaning of an answer.
 
         Raises
         ------
@@ -147,18 +147,18 @@ class ControlledSystem:
         return Results(self.model, [name], self.results.places, motion=True).results[0]
 
     def picked_of(self, result: Result) -> Index:
-        """Its numbers that may change: in a plane scene z does not."""
+        """Indices of its numbers that may change: in a plane scene z does not."""
         every = np.arange(result.size, dtype=np.intp)
         flat = not self.model.space and result.shape[-1:] == (3,)
         return every[every % 3 < 2] if flat else every
 
     @functools.cached_property
     def picked(self) -> dict[str, Index]:
-        """Of each answer the numbers that may change."""
+        """For each answer the indices of its numbers that may change."""
         return {one.name: self.picked_of(one) for one in self.results.results}
 
     def unit(self, name: str) -> float:
-        """What an answer is divided by: the size of the scene for lengths, and so on."""
+        """Scale of an answer in the program, in its unit: the size of the scene for lengths, and so on."""
         scales = self.model.scales
         known = next(one.unit for one in self.results.results if one.name == name)
         units = {"m": scales.length, "N": scales.force, "N m": scales.moment, "m/s": scales.length / self.time}
@@ -185,7 +185,7 @@ class ControlledSystem:
 
     @functools.cached_property
     def stage(self) -> ca.Function:
-        """(d, v, a, numbers, reference) -> balance (total,), quantities, answers.
+        """``(d, v, a, numbers, reference) ->`` residual (total,), quantities, answers.
 
         ``d`` are rotation vectors from the reference, displacements and multipliers, dimensionless as v and a;
         numbers and answers in their own units.
@@ -200,12 +200,12 @@ class ControlledSystem:
 
     @functools.cached_property
     def told(self) -> ca.Function:
-        """(state, numbers, v) -> answers: of rotations, displacements, multipliers and counted angles as one vector."""
+        """``(state, numbers, v) -> answers``; state: rotations, displacements, multipliers, turn-counting angles."""
         return answers_of_motion(self.results, self.arguments, self.system, self.time)
 
     @functools.cached_property
     def turned(self) -> ca.Function:
-        """(d, numbers, reference) -> rotations, column by column, and angles that count turns."""
+        """``(d, numbers, reference) ->`` rotations, column by column, and angles that count turns."""
         s = self._symbols()
         q, _, _, near = self._state(s["d"], s["reference"], s["numbers"])
         counted = self.arguments.program.counted(q, near)
@@ -215,10 +215,10 @@ class ControlledSystem:
 
     @functools.cached_property
     def rest(self) -> ca.Function:
-        """(d, v, reference, numbers, impulse, lam) -> momentum, balance: what has to vanish at rest, (unknowns,) each.
+        """``(d, v, reference, numbers, impulse, lam) ->`` momentum, residual: both (unknowns,) vanish at rest.
 
-        Rates of closed structures depend on each other: at rest all momenta vanish but those that closings take up,
-        by impulses (rows,).  The state is an equilibrium with multipliers lam (rows,).
+        Rates of structures with constraints depend on each other: at rest all momenta vanish but those along the
+        constraints, given by impulses (rows,).  The state is an equilibrium with multipliers lam (rows,).
         """
         s, system = self._symbols(), self.system
         rows, free = system.layout.lam, slice(0, system.equations.unknowns)
@@ -234,12 +234,12 @@ class ControlledSystem:
         return ca.Function("rest", list(symbols.values()), results, list(symbols), ["momentum", "balance"])
 
     def shapes(self, d: Array, reference: Array, numbers: Array) -> tuple[Array, Array, Array]:
-        """Small vibrations about a state at rest: circular frequencies, momenta and elastic forces of the shapes.
+        """Small vibrations about a state at rest: angular frequencies, momenta and elastic forces of the modes.
 
         Returns
         -------
         omega : (shapes,)
-            Over the inverse unit of time, rising; infinite where a shape carries no mass.
+            Angular frequencies times the unit of time, rising; infinite where a mode has no mass.
         momenta, forces : (unknowns, shapes)
         """
         free, still = self.system.equations.unknowns, np.zeros(self.quantities)

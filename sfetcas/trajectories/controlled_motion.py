@@ -1,4 +1,4 @@
-"""The answer of an optimal control problem: commands, the motion by name, and its check by a replay."""
+"""The solution of an optimal control problem: controls, the motion by name, and its check by a replay."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ __all__ = ["Check", "ControlledMotion"]
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """How far a trajectory is from its replay.
+    """Comparison of a trajectory with its replay by a time integrator.
 
     Attributes
     ----------
     response : Response
         The replay, at the begin, the ends of the intervals, and after the end.
     difference : float
-        Largest distance of nodes from where the trajectory has them, over the size of the scene.
+        Largest distance between node positions of trajectory and replay, over the size of the scene.
     error_estimate : float
-        That of the replay itself by its steps in time.
+        Estimated error of the replay itself by its time steps, over the size of the scene.
     integrator : str
-        What it was replayed by.
+        Name of its integrator.
     residual_vibration : float
-        Largest distance of nodes from their mean places after the end, m.
+        Largest distance of nodes from their mean positions after the end, m.
     """
 
     response: Response = field(repr=False)
@@ -53,23 +53,24 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class ControlledMotion:
-    """What :meth:`~sfetcas.trajectories.optimal_control.OptimalControl.solve` found.
+    """The solution of an :class:`~sfetcas.trajectories.optimal_control.OptimalControl` problem.
 
     Attributes
     ----------
     status : Status
-        Solved, or that of the last iterate of a failure, which is no answer.
+        SOLVED; another one for the last iterate of a failed solve, which is no solution.
     scene : Scene
-        With what was found for its variables.
+        The scene with the values found for the variables.
     time : float
-        When the motion ends, s.
+        End time, s.
     cost : float
-        As asked for, in its own unit.
+        Value of the objective.
     variables : mapping of str to float
+        In the units of the scene.
     iterations : int
         Of IPOPT, all rounds.
     seconds : mapping
-        Time spent on the warm start, on building, solving and replaying.
+        Wall time of the warm start, of building, solving and replaying, s.
     notes : tuple of str
     check : Check or None
         The replay; None where it was not asked for.
@@ -91,50 +92,57 @@ class ControlledMotion:
 
     @property
     def ends(self) -> Array:
-        """Begin and ends of the intervals, (intervals + 1,) s."""
+        """Times of the begin and of the ends of the intervals, (intervals + 1,) s."""
         shares = self.transcription.statement.shares
         return self.time * np.append(0.0, np.cumsum(shares))
 
     @property
     def times(self) -> Array:
-        """Times at which answers are told: the begin and all stages, s."""
+        """Times of :meth:`answer`: the begin and all stages of all intervals, (1 + stages,) s."""
         return self.time * np.append(0.0, self.transcription.statement.fractions.ravel())
 
     # -- what was found ---------------------------------------------------------------------------------
 
     def control(self, name: str) -> Array:
-        """A control: in the intervals where it is constant there, else at their ends."""
+        """Values of a control, in its unit: (intervals,) where it is constant in each, else (intervals + 1,) at
+        :attr:`ends`.
+
+        Raises
+        ------
+        SceneError
+            There is no such control.
+        """
         names = [one.name for one in self.transcription.statement.controls]
         if name not in names:
             raise SceneError(f"control: {unknown(name, names, 'such controls')}")
         return self.course.controls[:, names.index(name)]
 
     def at_rest(self, name: str) -> float:
-        """The control that holds the scene where it has come to rest."""
+        """Value of a control that keeps the scene at rest after the end; SceneError if rest was not asked for."""
         rests = self.transcription.resting
         if name not in rests:
             raise SceneError(f"control at rest: {unknown(name, list(rests), 'such controls')}")
         return float(self.transcription.pieces.value(rests[name], self.x).flat[0])
 
     def answer(self, name: str) -> Array:
-        """An answer that the problem reads, at :attr:`times`, (times, numbers)."""
+        """An answer that the problem uses, at :attr:`times`, (times, numbers), SI units; SceneError for others."""
         names = [one.name for one in self.transcription.system.results.results]
         if name not in names:
             raise SceneError(f"answer: {unknown(name, names, 'answers in the problem')}")
         return self.transcription.answer(name, self.x)
 
     def value(self, expression: ca.MX) -> float:
-        """What the problem knows as one number: ``time``, an integral, ``at_tf(...)``."""
+        """Value of an expression of the problem that is one number: ``time``, an integral, ``at_tf(...)``."""
         return self.transcription.value(expression, self.x)
 
     @functools.cached_property
     def course(self) -> GridMotion:
-        """The motion on the grid, dimensionless: also where another search may begin."""
+        """The motion on the grid, dimensionless; it may start another search."""
         return self.transcription.course(self.x)
 
     @property
     def commands(self) -> dict[str, History]:
-        """Controls as histories, by their names; after the end what holds the scene at rest, else as it is."""
+        """Controls as histories by their names; after the end the values at rest, or else those of the scene."""
         statement, found = self.transcription.statement, {}
         defaults = self.transcription.system.arguments.defaults
         ends = self.ends
@@ -155,15 +163,14 @@ class ControlledMotion:
     def replayed(
         self, tail: float | None = None, accuracy: float = 1e-5, integrator: str | None = None, **more: Any
     ) -> Check:
-        """Replay the commands through another integrator on a finer mesh.
+        """Replay the commands by a time integrator on a finer mesh.
 
         Parameters
         ----------
-        tail : how long to follow what is left after the end, s; as long as the motion without
-        accuracy : of the replay's own steps in time
-        integrator : that which conserves energy and momenta without, or where this refuses or its order is too low
-            for the accuracy, radau-3
-        more : as of :func:`~sfetcas.trajectories.replay.respond`
+        tail : time after the end during which the motion is followed, s; by default as long as the motion
+        accuracy : wanted error by the time steps of the replay, over the size of the scene
+        integrator : by default ``conserving``, or radau-3 where that is refused or its order is too low
+        more : further arguments of :func:`~sfetcas.trajectories.replay.respond`
         """
         system = self.transcription.system
         tail = self.time if tail is None else tail
@@ -201,7 +208,7 @@ class ControlledMotion:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The replay as the answer of a motion, for pictures and films.
+        """The replay as the answer of a dynamic analysis, for pictures and animations.
 
         Raises
         ------
@@ -227,14 +234,14 @@ class ControlledMotion:
         return found
 
     def positions(self, node: str) -> Array:
-        """Positions of a node at the begin and the ends of the intervals, (intervals + 1, 3) m."""
+        """Positions of a node at :attr:`ends`, (intervals + 1, 3) m; SceneError if there is no such node."""
         found = self._node_positions()
         if node not in found:
             raise SceneError(f"node: {unknown(node, list(found), 'nodes')}")
         return found[node]
 
     def with_variables(self, scene: Scene) -> Scene:
-        """A scene with what was found for the variables."""
+        """A scene with the values found for the variables."""
         found: dict[str, ArrayLike] = {}
         for one in self.transcription.statement.variables:
             value = self.variables[one.name]

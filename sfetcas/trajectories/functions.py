@@ -1,11 +1,11 @@
-"""A scene in motion as plain CasADi Functions with named inputs and outputs, for anyone's own optimal control.
+"""The equations of motion of a scene as plain CasADi Functions with named inputs and outputs, for other programs.
 
     x' = ode(x, z, u, p),      0 = alg(x, z, u, p),      y = outputs(x, u, p)
 
-of index 1, in SI units and seconds, differentiable as often as wanted: what rockit, do-mpc, acados and Opti take.
-States are rotations (quaternions or angles), displacements, their rates (angular velocities about the fixed axes), and
-angles that count turns; algebraic ones are accelerations and multipliers.  Closings and their rates are invariants:
-they hold if they hold at the begin, up to the error of the integration.
+of index 1, in SI units and seconds, arbitrarily often differentiable: the form that rockit, do-mpc, acados and Opti
+take.  States are rotations (quaternions or angles), displacements, their rates (angular velocities about the fixed
+axes), and angles that count turns; algebraic variables are accelerations and multipliers.  The constraints of joints
+and loops, and their rates, are invariants: met if they are met at the begin, up to errors of the integration.
 """
 
 from __future__ import annotations
@@ -60,19 +60,22 @@ class MotionFunctions:
     inputs, parameters, outputs : tuple of str
         Names of the numbers of the scene in ``u`` and ``p``, and of the answers in ``y``, in this order.
     begin : ndarray (states,)
-        Where the motion begins.
+        Initial state, SI units.
     sizes : mapping of str to int
-        Of ``x``, ``z``, ``u``, ``p`` and ``y``.
+        Sizes of ``x``, ``z``, ``u``, ``p`` and ``y``.
     parts : mapping of str to slice
-        Of the states: ``q``, ``y``, ``w`` and ``near``; of the algebraic ones ``a`` and ``lam``.
+        Parts of ``x``: rotations ``q``, displacements ``y``, rates ``w``, turn-counting angles ``near``; of ``z``:
+        accelerations ``a``, multipliers ``lam``.
     default : mapping of str to ndarray
-        ``u`` and ``p`` as the scene has them.
+        Values of ``u`` and ``p`` in the scene, in its units.
     shapes : mapping of str to tuple of int
-        Of the outputs, which stand in ``y`` row by row.
+        Shapes of the outputs, which are flattened into ``y`` row by row.
     dae : Function
-        (x, z, u, p) -> ode, alg
+        ``(x, z, u, p) -> ode, alg``
     outputs_of : Function
-        (x, u, p) -> y
+        ``(x, u, p) -> y``
+    invariants : Function
+        ``(x, u, p) ->`` gaps of the constraints, their rates, squared norms of quaternions less 1.
     """
 
     inputs: tuple[str, ...]
@@ -92,26 +95,26 @@ class MotionFunctions:
 
     @functools.cached_property
     def ode(self) -> ca.Function:
-        """(x, z, u, p) -> x', per s."""
+        """``(x, z, u, p) -> x'``, per s."""
         s = self._symbols()
         return ca.Function("ode", s, [self.dae(*s)[0]], ["x", "z", "u", "p"], ["ode"])
 
     @functools.cached_property
     def alg(self) -> ca.Function:
-        """(x, z, u, p) -> what is out of balance, and accelerations of the closings; dimensionless."""
+        """``(x, z, u, p) ->`` residual of the equations of motion, accelerations of the constraints; dimensionless."""
         s = self._symbols()
         return ca.Function("alg", s, [self.dae(*s)[1]], ["x", "z", "u", "p"], ["alg"])
 
     @functools.cached_property
     def implicit(self) -> ca.Function:
-        """(xdot, x, z, u, p) -> x' - ode and alg: the residual of an implicit equation."""
+        """``(xdot, x, z, u, p) -> xdot - ode``, then alg: the residual of the implicit DAE."""
         rate, s = ca.MX.sym("xdot", self.sizes["x"]), self._symbols()
         ode, alg = self.dae(*s)
         return ca.Function("implicit", [rate, *s], [ca.vertcat(rate - ode, alg)], ["xdot", "x", "z", "u", "p"], ["f"])
 
     @functools.cached_property
     def explicit(self) -> ca.Function:
-        """(x, u, p) -> x', per s, and z: the algebraic equations, which are linear in z, solved."""
+        """``(x, u, p) -> x'``, per s, and z: the algebraic equations, which are linear in z, are solved."""
         x, z, u, p = self._symbols()
         missed = self.alg(x, z, u, p)
         matrix = ca.substitute(ca.jacobian(missed, z), z, ca.MX.zeros(z.shape))
@@ -121,7 +124,7 @@ class MotionFunctions:
 
     @functools.cached_property
     def jacobians(self) -> ca.Function:
-        """(x, z, u, p) -> derivatives of ode and alg by x, z, u: ``ode_x``, ``ode_z``, ``ode_u``, ``alg_x``, ..."""
+        """``(x, z, u, p) ->`` derivatives of ode and alg by x, z, u: ``ode_x``, ``ode_z``, ``ode_u``, ``alg_x``, ..."""
         s = self._symbols()
         results = dict(zip(("ode", "alg"), self.dae(*s), strict=True))
         by = dict(zip(("x", "z", "u"), s, strict=False))
@@ -138,21 +141,21 @@ def motion_functions(
     places: Place | None = None,
     settings: Settings | None = None,
 ) -> MotionFunctions:
-    """The motion of a scene as plain CasADi Functions.
+    """The equations of motion of a scene as plain CasADi Functions.
 
     Parameters
     ----------
     scene : Scene
     inputs : numbers of the scene that change with time: components of loads, or ``histories.NAME``
     outputs : names of answers: positions, velocities, angles, springs, ``energy.elastic``
-    parameters : further numbers of the scene, with ranges where the model is no power of them; not masses
-    places : fractions of the length at which outputs along members are told
+    parameters : further numbers of the scene, by name or with ranges ``(low, high)``; not masses
+    places : fractions of the length at which outputs along members are given
     settings : accuracy or elements of the mesh
 
     Raises
     ------
     SceneError
-        The scene has no such numbers or answers, or something in it turns without inertia.
+        The scene has no such numbers or answers, or a rotation in it has no inertia.
     """
     check_scene(scene, "motion_functions({}, ...)")
     spans = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, (-np.inf, np.inf))

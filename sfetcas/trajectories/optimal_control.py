@@ -1,4 +1,4 @@
-"""Motions as optimal control problems, in the words of that field: controls, costs, path and end constraints."""
+"""Optimal control of the motion of a scene: controls, costs, path constraints and end constraints."""
 
 from __future__ import annotations
 
@@ -32,36 +32,38 @@ __all__ = ["OptimalControl", "moving"]
 
 
 class OptimalControl(Problem):
-    """A motion of a scene that is looked for.
+    """An optimal control problem for the motion of a scene.
+
+    Symbols of controls and answers, as :meth:`control` and :meth:`answer` give them, stand for functions of time.
 
     Parameters
     ----------
     scene : Scene
-        What moves; it begins as its ``analysis`` says (undeformed, or in the equilibrium of its loads).
+        Its initial state is that of its ``analysis``: undeformed, or in the equilibrium of its loads.
     controls : mapping of str to (low, high)
-        Numbers of the scene that change with time, and their limits: a component of the value of a load, as
+        Numbers of the scene that change with time, and their bounds: a component of the value of a load, as
         ``loads.motor.value`` or ``loads.tip.value.1``, or ``histories.NAME`` of a load.
     time : float or (float, float)
-        The time of the end, s, or the shortest and the longest one.
+        End time, s, or its bounds.
     intervals : int or sequence of float
-        Their number, or their shares of the time.
+        Number of intervals, or their fractions of the time.
     order : int
-        Of the controls in an interval: 1 linear and continuous, 0 constant with jumps.
+        Controls in an interval: 1 linear and continuous, 0 constant with jumps.
     rates : mapping of str to float
-        Largest rates of controls, per s.
+        Largest rates of controls, in their unit per s.
     variables : mapping of str to (low, high) or Parameter
-        Numbers of the scene that are looked for and do not change: stiffness, loads, not masses.
+        Unknown numbers of the scene that are constant in time, with bounds: stiffness, loads, not masses.
     stages : int
-        Of Radau IIA in an interval, 3 (order 5) or 2 (order 3).
+        Stages of Radau IIA collocation in an interval: 3 (order 5) or 2 (order 3).
     places : mapping of str to sequence of float
-        Fractions of the length at which answers along members are told.
+        Fractions of the length at which answers along members are given.
     settings : Settings
         Accuracy or elements of the mesh.
 
     Raises
     ------
     SceneError
-        The scene has no such numbers, they cannot be controlled, or what is given contradicts itself.
+        The scene has no such numbers, they cannot be controlled, or arguments contradict each other.
 
     Example
     -------
@@ -116,28 +118,28 @@ class OptimalControl(Problem):
     # -- what a problem is made of ------------------------------------------------------------------------
 
     def control(self, name: str) -> ca.MX:
-        """A control along the motion."""
+        """The symbol of a control, in its unit, as a function of time; SceneError if there is no such control."""
         self.statement.control(name)
         return self.statement.signal("control", name).along
 
     def rate(self, name: str) -> ca.MX:
-        """The rate of a control, per s."""
+        """The symbol of the rate of a control, in its unit per s; SceneError if controls jump (order 0)."""
         self.statement.control(name)
         if not self.statement.order:
             raise SceneError(f"rate of {name!r}: found controls that jump, accepted: order = 1")
         return self.statement.signal("rate", name).along
 
     def variable(self, name: str) -> ca.MX:
-        """A variable."""
+        """The symbol of a variable, in its unit; SceneError if there is none of this name."""
         known = self.statement.constants
         if name not in known:
             raise SceneError(f"variable {name!r}: accepted: {', '.join(known) or 'none, as there are none'}")
         return known[name]
 
     def answer(self, name: str) -> ca.MX:
-        """An answer along the motion, as ``nodes.tip.position`` (3,), ``nodes.tip.velocity``, ``energy.elastic``.
+        """The symbol of an answer as a function of time: ``nodes.tip.position`` (3,), ``energy.elastic``; SI units.
 
-        Along a member (places, 3).
+        A vector along a member is (places, 3).
         """
         result = self._plain.result(name)
         picked = self._plain.picked_of(result)
@@ -151,20 +153,20 @@ class OptimalControl(Problem):
 
     @property
     def t(self) -> ca.MX:
-        """Time along the motion, s."""
+        """The symbol of time, s, as a function of time."""
         return self.statement.signal("time", "t").along
 
     @property
     def time(self) -> ca.MX:
-        """Time of the end, s."""
+        """The symbol of the end time, s."""
         return self.statement.end_time
 
     def at_t0(self, expression: ca.MX) -> ca.MX:
-        """An expression at the begin."""
+        """The value of an expression at the begin."""
         return self.statement.at(expression, "begin")
 
     def at_tf(self, expression: ca.MX) -> ca.MX:
-        """An expression at the end."""
+        """The value of an expression at the end."""
         return self.statement.at(expression, "end")
 
     def integral(self, expression: ca.MX) -> ca.MX:
@@ -172,9 +174,9 @@ class OptimalControl(Problem):
         return self.statement.integral(expression)
 
     def rest_at_end(self) -> dict[str, ca.MX]:
-        """Ask for rest at the end: no velocity, and an equilibrium under controls that then stay; these by name.
+        """Require rest at the end: zero velocity, and equilibrium under constant controls; returns their symbols.
 
-        Vibrations too fast for the intervals are left out of it: the replay tells what is left of them.
+        Vibrations too fast for the intervals are excepted; the replay shows what remains of them.
         """
         self.statement.resting = True
         for one in self.statement.controls:
@@ -193,15 +195,15 @@ class OptimalControl(Problem):
         replay: bool = True,
         ipopt: Ipopt | None = None,
     ) -> ControlledMotion:
-        """The best motion near where the search begins.
+        """Find a locally optimal motion.
 
         Parameters
         ----------
-        guess : the motion of the scene with rigid members, which is looked for first; or the scene at rest; or
-            another answer
-        time : time of the end to begin with, s
-        values : of controls, evenly in time, and of variables, to begin with
-        replay : check the answer by a replay
+        guess : start: ``rigid``, the solution for the scene with rigid members, which is found first; ``rest``, the
+            scene at rest; or an earlier solution
+        time : start value of the end time, s
+        values : start values of controls, at evenly spaced times, and of variables
+        replay : check the solution by a replay
         ipopt : settings of IPOPT
 
         Raises
@@ -209,7 +211,7 @@ class OptimalControl(Problem):
         SceneError
             The problem contradicts itself.
         SolveError
-            IPOPT did not succeed: the sentence says what is violated; ``last`` is the last iterate, no answer.
+            IPOPT did not succeed; the message says what is violated, ``last`` is the last iterate.
         """
         solver = ipopt or Ipopt(1e-8, 150)
         solver = replace(solver, extra={**EXTRA, **solver.extra})
@@ -261,7 +263,7 @@ MOVED = 0.2
 
 @dataclass
 class Search:
-    """One search."""
+    """One solution process of an optimal control problem."""
 
     problem: OptimalControl
     solver: Ipopt
@@ -275,7 +277,7 @@ class Search:
     # -- where it begins ----------------------------------------------------------------------------------
 
     def begun(self, guess: Any, end: float | None, values: Mapping[str, ArrayLike]) -> GridMotion:
-        """A course on the mesh of the scene."""
+        """The start of the search on the mesh of the scene; SceneError for a wrong guess or wrong values."""
         begin, problem = clock.perf_counter(), self.problem
         statement = problem.statement
         if isinstance(guess, ControlledMotion):
@@ -320,7 +322,7 @@ class Search:
     # -- rounds -------------------------------------------------------------------------------------------
 
     def solved(self, scene: Scene, course: GridMotion) -> ControlledMotion:
-        """The answer, made again about itself until it stands."""
+        """The solution, in rounds about the solution before until it no longer changes; SolveError if IPOPT fails."""
         problem = self.problem
         system = problem._system(scene, self.names, problem._mesh)
         for number in range(ROUNDS):
@@ -457,7 +459,7 @@ def _shares(given: Any) -> Array:
 
 
 def moving(scene: Scene, end: float) -> Scene:
-    """The scene as one in motion."""
+    """The scene with a dynamic analysis up to an end time, s."""
     kept = ("accuracy", "initial", "cut", "release")
     given = {key: getattr(scene.analysis, key) for key in kept if key in scene.analysis.model_fields_set}
     if scene.analysis.type != "dynamic":

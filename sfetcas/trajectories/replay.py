@@ -1,8 +1,8 @@
-"""A command run through an integrator of its own: what a trajectory is checked by, and what any command does.
+"""Replay of commands by time integration, to check a trajectory, or to see what any command does.
 
-The integrator is none of collocation but the one that conserves energy and momenta, its mesh is finer, and its step is
-halved until the positions, extrapolated to no step at all, stand: what is left between them and a trajectory is the
-error of the trajectory.
+The time integration is independent of the collocation: by default it is the energy-momentum scheme, on a finer mesh,
+and its step is halved until the positions, extrapolated to zero step, no longer change.  The remaining difference is
+the error of the trajectory.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ ORDERS = {"conserving": 2, "radau-2": 3, "radau-3": 5, "generalised-alpha": 2}
 
 
 HALVINGS = 7
-"""Of the step at most."""
+"""How often the step is halved, at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What a command does to a scene.
+    """The motion of a scene under commands.
 
     Attributes
     ----------
     times : ndarray (times,)
-        s
+        Times of the answer, s.
     places : mapping of str to ndarray (times, 3)
-        Positions of the nodes, m, extrapolated from two lengths of the steps.
+        Positions of the nodes, m, extrapolated from two step lengths.
     instants : tuple of MotionState
-        The states at these times, of the shorter steps.
+        The states at these times, computed with the shorter steps.
     end : float
-        When the command ends, s.
+        Time at which the command ends, s.
     error_estimate : float
-        Of the positions by the steps in time, over the size of the scene.
+        Estimated error of the positions by the time steps, over the size of the scene.
     count : int
-        Steps of the last run.
+        Number of steps of the last run.
     """
 
     times: Array
@@ -64,18 +64,18 @@ class Response:
     count: int
 
     def positions(self, node: str) -> Array:
-        """Positions of a node, (times, 3) m."""
+        """Positions of a node, (times, 3) m; SceneError if there is no such node."""
         if node not in self.places:
             raise SceneError(f"node: {unknown(node, list(self.places), 'nodes')}")
         return self.places[node]
 
     def energies(self, kind: str = "total") -> Array:
-        """Energies, (times,) N m: kinetic, elastic, loads or total."""
+        """Energies over the times, (times,) N m; ``kind`` is kinetic, elastic, loads or total."""
         return np.array([one.energy[kind] for one in self.instants])
 
     @property
     def trajectory(self) -> Trajectory:
-        """The states as the answer of a motion, for pictures and films."""
+        """The states as the answer of a dynamic analysis, for pictures and animations."""
         first = self.instants[0].model
         return Trajectory(
             scene=first.scene,
@@ -95,7 +95,7 @@ class Response:
         return np.asarray(self.times >= self.end * (1.0 - tolerances.DECIMAL))
 
     def residual_vibration(self, node: str | None = None) -> float:
-        """Largest distance from their mean place that nodes, or one, have after the end, m."""
+        """Largest distance of nodes (of one or all) from their mean position after the end, m."""
         names = list(self.places) if node is None else [node]
         after = self.after
         found = 0.0
@@ -173,28 +173,29 @@ def respond(
     halvings: int = HALVINGS,
     settings: Settings | None = None,
 ) -> Response:
-    """What a scene does under commands, and for a while after them.
+    """Integrate the motion of a scene under commands, and for a while after them.
 
     Parameters
     ----------
     scene : Scene
     commands : histories by the names of numbers: ``{"loads.motor.value": History(t=[0, 1], value=[2, 0])}``
-    end : when the command ends, s
-    tail : how long to follow it after that, s
-    times : when it is told, s; a hundred times before the end and in the tail without
-    step : first step of the integrator, s; it is halved until the positions stand
-    mesh : that of the scene's accuracy, refined, without
-    accuracy : by which positions over the size of the scene may still change when the step is halved
-    integrator : conserving (not with loads that follow), radau-2, radau-3 or generalised-alpha
-    against : positions of nodes at the first times, (some times, 3) m; a tenth of what they are off is accurate enough
-    halvings : of the step at most
+    end : time at which the commands end, s
+    tail : time for which the motion is followed after that, s
+    times : (n,), times of the answer, s; by default a hundred before the end and a hundred in the tail
+    step : first time step, s; it is halved until the positions no longer change
+    mesh : by default the one for the scene's accuracy, refined
+    accuracy : permitted change of positions, over the size of the scene, when the step is halved
+    integrator : conserving (without follower loads), radau-2, radau-3 or generalised-alpha
+    against : positions of nodes to compare with at the first times, (n, 3) m; a tenth of the difference is accurate
+        enough
+    halvings : how often the step is halved, at most
 
     Raises
     ------
     SceneError
         There is no such number or integrator.
     SolveError
-        A step does not converge, other than the last halved ones.
+        A time step does not converge.
     """
     check_scene(scene, "respond({}, ...)")
     for name, history in commands.items():

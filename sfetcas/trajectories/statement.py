@@ -1,8 +1,8 @@
-"""What is asked of a controlled motion: signals, limits, costs and constraints as CasADi expressions.
+"""Statement of an optimal control problem: signals, bounds, costs and constraints as CasADi expressions.
 
-A *signal* is something that has a value at each time: a control, its rate, an answer of the scene by its name, time
-itself.  It has three symbols: along the motion, at its begin, at its end.  A *quantity* has one value: the end time, a
-variable of the scene, an integral, a control at which the motion comes to rest.
+A *signal* is a function of time: a control, its rate, an answer of the scene by its name, time itself.  It has three
+symbols: along the motion, at its begin, at its end.  A *quantity* has one value: the end time, a variable of the scene,
+an integral, a control at rest.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from ..parametric.arguments import Parameter
 __all__ = ["Control", "Kind", "MotionStatement", "Signal", "Variable", "controls_of", "variable_of"]
 
 Kind = Literal["control", "rate", "answer", "time"]
-"""What a signal is of."""
+"""Kinds of signals."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """A number of the scene that changes with time, within limits.
+    """A number of the scene that changes with time, within bounds.
 
     Attributes
     ----------
     name : str
-        Of one number, as ``loads.motor.value.2`` or ``histories.torque``.
+        Name of a single number, as ``loads.motor.value.2`` or ``histories.torque``.
     low, high : float
-        In its own unit.
+        Bounds, in its unit.
     rate : float
-        Largest rate by which it changes, per s.
+        Largest rate, in its unit per s.
     """
 
     name: str
@@ -49,14 +49,15 @@ class Control:
 
 @dataclass(frozen=True)
 class Variable:
-    """A number of the scene that is looked for and constant in time.
+    """An unknown number of the scene that is constant in time.
 
     Attributes
     ----------
     name : str
     low, high : float
+        Bounds, in its unit.
     parameter : Parameter or None
-        What numbers of the scene follow a name of one's own.
+        For a user-defined name: the numbers of the scene that depend on it.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """Something that has a value at each time.
+    """A function of time, by its symbols.
 
     Attributes
     ----------
@@ -75,7 +76,7 @@ class Signal:
     name : str
     size : int
     along, begin, end : MX (size,)
-        Its symbols.
+        Symbols along the motion, at its begin and at its end.
     """
 
     kind: Kind
@@ -87,29 +88,29 @@ class Signal:
 
 
 class MotionStatement(Statement):
-    """Everything that is asked of a motion; of which scene it does not know.
+    """The statement of an optimal control problem, independent of the scene.
 
     Parameters
     ----------
     controls : sequence of Control
     variables : sequence of Variable
     duration : (float, float)
-        Shortest and longest time, s.
+        Bounds of the end time, s.
     shares : ndarray (intervals,)
-        Of the intervals in the time.
+        Length of each interval over the end time.
     order : int
-        Of the controls in an interval: 0 constant, 1 linear and continuous.
+        Controls in an interval: 0 constant, 1 linear and continuous.
     stages : int
-        Of Radau IIA in an interval, 2 or 3.
+        Stages of Radau IIA in an interval, 2 or 3.
 
     Attributes
     ----------
     signals : dict
     end_time : MX
     integrals : list of (MX, MX)
-        Their symbols, and what is integrated.
+        Symbols of integrals, and their integrands.
     rests : dict of str to MX
-        Controls at which the motion comes to rest.
+        Symbols of the controls at rest.
     resting : bool
     constants : dict of str to MX
         Symbols of the variables.
@@ -136,14 +137,14 @@ class MotionStatement(Statement):
 
     @property
     def fractions(self) -> Array:
-        """Of the time, at which the stages are, (intervals, stages)."""
+        """Times of the stages over the end time, (intervals, stages)."""
         before = np.cumsum(self.shares) - self.shares
         return np.asarray(before[:, None] + self.shares[:, None] * RADAU[self.stages])
 
     # -- symbols --------------------------------------------------------------------------------------
 
     def signal(self, kind: Kind, name: str, size: int = 1) -> Signal:
-        """A signal, made when it is first asked for."""
+        """The signal of a kind and name, made at its first use."""
         key = (kind, name)
         if key not in self.signals:
             symbols = [self.known(ca.MX.sym(f"{kind} {name}{where}", size)) for where in ("", " at t0", " at tf")]
@@ -151,19 +152,19 @@ class MotionStatement(Statement):
         return self.signals[key]
 
     def control(self, name: str) -> Control:
-        """A control by its name."""
+        """A control by its name; SceneError if there is none."""
         known = {one.name: one for one in self.controls}
         if name not in known:
             raise SceneError(f"control {name!r}: {unknown(name, list(known), 'such controls')}")
         return known[name]
 
     def at(self, expression: ca.MX, where: Literal["begin", "end"]) -> ca.MX:
-        """An expression of signals at the begin or the end."""
+        """The value of an expression of signals at the begin or the end."""
         signals = list(self.signals.values())
         return ca.substitute([ca.MX(expression)], [s.along for s in signals], [getattr(s, where) for s in signals])[0]
 
     def integral(self, expression: ca.MX) -> ca.MX:
-        """The integral of an expression over the time, by a symbol."""
+        """The symbol of the integral of an expression over the whole time."""
         given = self.one(expression, "integral")
         self.refuse_strange("integral", given)
         symbol = self.known(ca.MX.sym(f"integral {len(self.integrals)}"))
@@ -171,16 +172,16 @@ class MotionStatement(Statement):
         return symbol
 
     def along(self, expression: ca.MX) -> bool:
-        """Whether an expression changes with time."""
+        """Whether an expression depends on time."""
         own = {signal.along.__hash__() for signal in self.signals.values()}
         return any(symbol.__hash__() in own for symbol in ca.symvar(expression))
 
     def rest(self, name: str) -> ca.MX:
-        """What a control is at rest."""
+        """The symbol of the value of a control at rest."""
         return self.rests.setdefault(name, self.known(ca.MX.sym(f"{name} at rest")))
 
     def minimise(self, cost: Any) -> None:
-        """A term of the cost, which has one value."""
+        """Add a term to the cost; SceneError for an expression that depends on time."""
         expression = self.one(cost, "minimise")
         if self.along(expression):
             accepted = "integral(...), at_t0(...) or at_tf(...) of it"
@@ -204,7 +205,7 @@ def variable_of(name: str, given: Bounds | Parameter) -> Variable:
 
 
 def controls_of(given: Mapping[str, object], rates: Mapping[str, float]) -> list[Control]:
-    """Controls by their bounds and largest rates."""
+    """Controls from their bounds and largest rates; SceneError for rates of other names, or not above zero."""
     for name, rate in rates.items():
         if name not in given:
             raise SceneError(f"rates: {unknown(name, list(given), 'such controls')}")

@@ -5,7 +5,7 @@ Unknowns are, at each stage of each interval, rotations, displacements and multi
 
     h v_i = sum_j D_ij x_j,      h a_i = sum_j D_ij v_j,      0 = balance(d_i, v_i, a_i),      x_i = X(d_i)
 
-where j = 0 is the last stage before: x and v are continuous, and the equations of index 3 hold at the stages, as in the
+where j = 0 is the last stage before: x and v are continuous, and the index-3 equations are met at the stages, as in the
 integrators of the same name.  Everything nonlinear is the function of one stage.
 """
 
@@ -32,7 +32,7 @@ __all__ = ["GridMotion", "Transcription"]
 
 @dataclass(frozen=True, eq=False)
 class GridMotion:
-    """A motion on the grid of a transcription: a guess, or what became of one.
+    """A motion on the grid of a transcription, as a start or as a solution; dimensionless but for ``end`` and controls.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class GridMotion:
         Time at the end, s.
     q : ndarray (stages of all intervals, rotations, components)
     d : ndarray (stages, total)
-        Displacements and multipliers in their places, beside rotation vectors that count nothing.
+        Displacements and multipliers in their positions; the entries of rotation vectors are not used.
     x, v, a : ndarray (stages, quantities)
     near : ndarray (stages, angles that count turns)
     controls : ndarray (points, controls)
@@ -60,13 +60,14 @@ class GridMotion:
 
 
 class Transcription:
-    """The program of one statement on one system.
+    """The nonlinear program of one statement on one system.
 
     Parameters
     ----------
     statement : MotionStatement
     system : ControlledSystem
     guess : GridMotion
+        The start; rotations are counted from its rotations.
     """
 
     def __init__(self, statement: MotionStatement, system: ControlledSystem, guess: GridMotion) -> None:
@@ -430,7 +431,7 @@ class Transcription:
         return np.array(told).ravel()[first : first + size]
 
     def expression(self, name: str, expression: ca.MX) -> tuple[ca.Function, Index]:
-        """An expression as a function of the unknowns that it reads, and their places (instances, w)."""
+        """An expression as a function of its unknowns, and the indices of these (instances, w)."""
         symbols = ca.symvar(expression)
         places = []
         for symbol in symbols:
@@ -450,7 +451,7 @@ class Transcription:
     # -- answers ------------------------------------------------------------------------------------------
 
     def course(self, x: Array) -> GridMotion:
-        """The motion of an answer ``x`` of the program."""
+        """The motion of a solution x (n,) of the program."""
         value, n = self.pieces.value, self.intervals * self.stages
         d = value(self.d, x).reshape(n, -1)
         q, near = self.rotations(d, x)
@@ -468,7 +469,7 @@ class Transcription:
         )
 
     def value(self, expression: ca.MX, x: Array) -> float:
-        """What does not change with time, integrals among it, in an answer ``x`` of the program."""
+        """The value of an expression that does not depend on time, in a solution x (n,) of the program."""
         physical = x * self.pieces.units
         known, values = [], []
         for number, (symbol, _) in enumerate(self.statement.integrals):
@@ -480,7 +481,7 @@ class Transcription:
         return float(function(physical[index[0]]))
 
     def rotations(self, d: Array, x: Array) -> tuple[Array, Array]:
-        """Rotations (stages, rotations, components) and angles that count turns."""
+        """Rotations (stages, rotations, components) and angles that count turns, in a solution x (n,)."""
         n = self.system.system.layout
         numbers = (x * self.pieces.units)[self.numbers].reshape(len(d), -1)
         turned = np.array(self.system.turned.map(len(d))(d.T, numbers.T, self.references.T)).T
@@ -488,7 +489,7 @@ class Transcription:
         return turned[:, :size].reshape(len(d), n.rotations, n.components), turned[:, size:]
 
     def answer(self, name: str, x: Array) -> Array:
-        """An answer at the begin and all stages, (1 + stages of all intervals, size)."""
+        """An answer at the begin and all stages, (1 + stages, size), SI units, in a solution x (n,)."""
         result = next(one for one in self.system.results.results if one.name == name)
         found = np.zeros((1 + self.intervals * self.stages, result.size))
         picked = self.system.picked[name]

@@ -1,4 +1,4 @@
-"""Where a search for a controlled motion begins: at rest, or with the motion of the scene as if it were rigid."""
+"""Starts for optimal control: at rest, or the solution for the scene with rigid members."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = ["at_rest", "carried_over", "restaged", "rigid", "straight"]
 
 
 def rigid(scene: Scene) -> Scene | None:
-    """The scene with rigid members in the place of flexible ones; None where no member is flexible."""
+    """The scene with its flexible members made rigid; None where no member is flexible."""
     flexible = [name for name, member in scene.members.items() if member.type == "flexible"]
     if not flexible:
         return None
@@ -45,12 +45,12 @@ def rigid(scene: Scene) -> Scene | None:
 def at_rest(
     statement: MotionStatement, system: ControlledSystem, end: float, controls: Mapping[str, ArrayLike]
 ) -> GridMotion:
-    """The scene as it begins, at all times.
+    """A start in which the initial state stays for all times.
 
     Parameters
     ----------
-    end : time at the end, s
-    controls : values of controls at times that share the time evenly, those of the scene without; and of variables
+    end : end time, s
+    controls : start values (n,) of controls, at n evenly spaced times, and of variables, in the units of the scene
 
     Raises
     ------
@@ -87,10 +87,10 @@ def at_rest(
 
 
 def straight(statement: MotionStatement, system: ControlledSystem, start: GridMotion) -> GridMotion:
-    """A motion that turns evenly from the begin to a shape that meets what is asked of answers at the end.
+    """A motion with uniform rotation from the initial state to one that meets the end constraints on answers.
 
-    It is the shape nearest to the begin, and obeys joints and closings only; without one, or where nothing is asked,
-    the start itself.
+    It is the nearest such state that meets the constraints of joints and loops, not an equilibrium; where there is
+    none, or no end constraint, the start is returned.
     """
     turned = _end_shape(statement, system)
     if turned is None:
@@ -153,7 +153,7 @@ def _still(statement: MotionStatement, system: ControlledSystem, start: GridMoti
 def carried_over(
     statement: MotionStatement, stiff: ControlledSystem, course: GridMotion, system: ControlledSystem
 ) -> GridMotion:
-    """The motion of the rigid scene as one of the flexible scene, whose members stay as they were made."""
+    """The motion of the rigid scene as one of the flexible scene, with undeformed members."""
     source = _sources(stiff, system)
     q = np.stack(
         [
@@ -166,7 +166,7 @@ def carried_over(
 
 
 def restaged(statement: MotionStatement, system: ControlledSystem, course: GridMotion, stages: int) -> GridMotion:
-    """A motion told at so many stages of each interval, at the stages of the statement instead."""
+    """A motion given at ``stages`` stages of each interval, interpolated to the stages of the statement."""
     n, begin = len(statement.shares), system.begin
     old, new = np.append(0.0, RADAU[stages]), RADAU[statement.stages]
     through, among = evaluation(old, new), evaluation(RADAU[stages], new)
