@@ -113,7 +113,7 @@ def _free(load_: dict[str, Any], flat: Array) -> Array:
 
 
 @dataclass
-class _Told:
+class _Outputs:
     """What is compared of an answer: words, and numbers with their tolerance."""
 
     words: dict[str, Any] = field(default_factory=dict)
@@ -124,9 +124,9 @@ class _Told:
         self.numbers[name] = np.atleast_1d(np.asarray(values, dtype=float)), tolerance
 
 
-def _told(answer: Answer, how: Jittered) -> _Told:
+def _outputs(answer: Answer, how: Jittered) -> _Outputs:
     """An answer in the axes and units of the first scene."""
-    told = _Told({"status": answer.status.value})
+    told = _Outputs({"status": answer.status.value})
     size = how.scene.size / how.length
     if isinstance(answer, Solution):
         entries = list(answer.steps)
@@ -165,7 +165,7 @@ def _told(answer: Answer, how: Jittered) -> _Told:
     return told
 
 
-def _equilibrium(told: _Told, name: str, step: Equilibrium, how: Jittered, size: float) -> None:
+def _equilibrium(told: _Outputs, name: str, step: Equilibrium, how: Jittered, size: float) -> None:
     proof, error = step.certificate, step.certificate.error_estimate or 0.0
     told.words[f"{name} stable"], told.words[f"{name} negative"] = str(proof.stable), proof.negative
     told.words[f"{name} notes"] = said(step.notes)
@@ -217,7 +217,7 @@ def differences(scene: Scene, change: Jittered, answer: Answer | str | None = No
     if isinstance(one, str) or isinstance(other, str):
         kinds = [found if isinstance(found, str) else found.status.value for found in (one, other)]
         return [] if kinds[0] == kinds[1] else [f"{kinds[0]} / {kinds[1]}"]
-    mine, its = _told(one, Jittered(scene, np.eye(3), 1.0, 1.0, 1.0)), _told(other, change)
+    mine, its = _outputs(one, Jittered(scene, np.eye(3), 1.0, 1.0, 1.0)), _outputs(other, change)
     found = [f"{n}: {word} / {its.words.get(n)}" for n, word in mine.words.items() if word != its.words.get(n)]
     for name, (values, allowed) in mine.numbers.items():
         theirs, too = its.numbers.get(name, (np.zeros(0), 0.0))

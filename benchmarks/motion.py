@@ -111,7 +111,7 @@ def _memory(system: StageEquations, method: Method) -> Memory:
     """At rest, undeformed."""
     state = at_rest(system.model)
     x, _ = system.rates(state, system.factors(0.0), np.zeros(system.equations.unknowns))
-    return Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.wound)
+    return Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.unwrapped)
 
 
 def _run(scene: Scene, name: str, mesh: tuple[str, int], tolerance: float) -> tuple[Array, float, float, int]:

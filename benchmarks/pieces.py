@@ -95,7 +95,7 @@ def _moving(inertia: tuple[float, float, float] | None, dimension: str) -> tuple
     method = Radau(3)
     stepper, state = Stepper(system, method), at_rest(model)
     x, _ = system.rates(state, system.factors(0.0), np.zeros(system.equations.unknowns))
-    memory = Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.wound)
+    memory = Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.unwrapped)
     stepper.step(memory, 0.01)
     return str(system.total), "", "", f"{1e3 * _median(lambda: stepper.step(memory, 0.01)):.2f}"
 

@@ -148,7 +148,7 @@ def with_rigid_rows(members: int) -> Scene:
     return _of_types(woven(members), lambda i, level: "rigid" if level else "flexible")
 
 
-def of_small_members(members: int) -> Scene:
+def of_superelements(members: int) -> Scene:
     """The net of small members."""
     return _of_types(woven(members), lambda i, level: "small")
 
@@ -208,7 +208,7 @@ def large(kind: str, members: int) -> Scene:
     made = {
         "wavy strips": woven,
         "rigid rows": with_rigid_rows,
-        "small": of_small_members,
+        "small": of_superelements,
         "all types": of_all_types,
         "lattice": lattice,
         "tree": tree,

@@ -76,7 +76,7 @@ def smooth() -> History:
     return History(t=[0.0, TIME, 2.0 * TIME], polynomial=[[0.0, 60.0 * size, -180.0 * size, 120.0 * size], [0.0]])
 
 
-class Found(NamedTuple):
+class EquilibriumResult(NamedTuple):
     """A motion that was looked for, and the work of its torque, N m."""
 
     motion: ControlledMotion
@@ -84,7 +84,7 @@ class Found(NamedTuple):
 
 
 @functools.cache
-def optimal(elements: int = ELEMENTS, intervals: int = INTERVALS, effort: bool = False) -> Found:
+def optimal(elements: int = ELEMENTS, intervals: int = INTERVALS, effort: bool = False) -> EquilibriumResult:
     """The torque of least rate, 0 at both ends, or of least effort, that brings the arm to rest at the angle."""
     problem = OptimalControl(arm(elements), {TORQUE: (-5.0, 5.0)}, time=TIME, intervals=intervals)
     torque, angle = problem.control(TORQUE), problem.answer("nodes.hub.angle")
@@ -99,7 +99,7 @@ def optimal(elements: int = ELEMENTS, intervals: int = INTERVALS, effort: bool =
     # Of torque over angle, by parts.
     work = problem.at_tf(torque * angle) - problem.integral(problem.rate(TORQUE) * angle)
     motion = problem.solve(replay=False, ipopt=Ipopt(1e-9, 100))
-    return Found(motion, motion.value(work))
+    return EquilibriumResult(motion, motion.value(work))
 
 
 @functools.cache

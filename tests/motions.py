@@ -79,7 +79,7 @@ class Flight:
         x, v = self.system.rates(state, self.system.factors(0.0), rates)
         kept = np.zeros((self.stepper.method.kept, len(x)))
         kept[0] = v
-        self.memory = Memory(0.0, state.q, state.y, state.lam, x, kept, state.wound)
+        self.memory = Memory(0.0, state.q, state.y, state.lam, x, kept, state.unwrapped)
 
     def steps(self, h, count):
         """States after steps of a length, s; the first is the begin."""
@@ -99,7 +99,7 @@ class Flight:
 
     def energy(self, memory):
         """Kinetic energy and potential of springs, bending and dead loads, dimensionless."""
-        state = State(memory.q, memory.y, np.zeros(len(self.model.row_names)), memory.near)
+        state = State(memory.q, memory.y, np.zeros(len(self.model.row_names)), memory.unwrapped)
         return self.inertia.kinetic(memory.rates[0]) + self.equations.at(state, self.loading).potential
 
     def momentum(self, memory):

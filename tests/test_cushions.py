@@ -12,14 +12,14 @@ from sfetcas.contact.cushions import Cushions
 from sfetcas.equilibria.meshing import Meshing
 from sfetcas.equilibria.statics import Settings
 from sfetcas.mechanics.contact_joints import CushionedPlane, CushionedRound
-from sfetcas.mechanics.terms import by_turning
+from sfetcas.mechanics.terms import rotation_gradient
 
 FLAT, ROUND = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]
 
 
 def push(kind, data, u):
     """Force of a cushion on a place, by its energy."""
-    values = by_turning(kind)(ca.DM(1, 0), ca.DM(u), ca.DM(data), ca.DM(0, 1), ca.DM(0, 1))
+    values = rotation_gradient(kind)(ca.DM(1, 0), ca.DM(u), ca.DM(data), ca.DM(0, 1), ca.DM(0, 1))
     return -np.array(values[3]).ravel()
 
 
@@ -141,7 +141,7 @@ def test_flattened_ring_rolls_away_and_says_so():
     step = solve(made(ring_on_floor(52.0, [np.pi]))).last
     assert step.certificate.stable is True
     assert step.notes[0].startswith("jumped near factor")
-    assert step.notes[0].endswith("left an unstable equilibrium there along its escape shape")
+    assert step.notes[0].endswith("left an unstable equilibrium there along its unstable mode")
 
 
 def test_a_ring_that_rolls_to_one_side_stays_there():

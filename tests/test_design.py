@@ -262,7 +262,7 @@ def test_what_cannot_be_met_is_named_and_the_last_iterate_is_there():
     assert caught.value.status is Status.UNMET
     # As high as it gets: at the bound of the stiffness.
     assert caught.value.last.values["sections.strip.EI3"] == pytest.approx(0.5, rel=1e-3)
-    assert caught.value.last.told["", "nodes.tip.position", None][1] < 0.9
+    assert caught.value.last.outputs["", "nodes.tip.position", None][1] < 0.9
 
 
 def contradicted():

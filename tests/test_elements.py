@@ -12,7 +12,7 @@ from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
-from sfetcas.mechanics.terms import by_turning, curvatures_of, energies_of, rows_of, slopes_of
+from sfetcas.mechanics.terms import curvatures_of, energies_of, rotation_gradient, rows_of, slopes_of
 from sfetcas.solvers.newton import AtLoads, Limits, correct
 from sfetcas.solvers.stability import StabilityTest
 
@@ -60,12 +60,12 @@ def arguments(element, q, stiffness, tangent, pull):
     return q, np.zeros((element.axes, 0)), data, (pull - constant[:, None]).ravel(order="F"), constant
 
 
-def turning(element, q, stiffness, tangent, pull):
+def evaluated(element, q, stiffness, tangent, pull):
     """Strain energy, work of the pull, moments, stiffness, chord and its derivative."""
     given = arguments(element, q, stiffness, tangent, pull)
-    energy, strain, gained, moments, matrix, spin = by_turning(element)(*given)
+    energy, strain, gained, moments, matrix, rotation_jacobian = rotation_gradient(element)(*given)
     work = float(energy - strain) + CONSTANT[: element.axes] @ gained.full().ravel() + (pull * tangent).sum()
-    return strain, ca.DM(work), moments, matrix, gained + tangent.sum(axis=1), spin
+    return strain, ca.DM(work), moments, matrix, gained + tangent.sum(axis=1), rotation_jacobian
 
 
 def energy_of(element, q, stiffness, tangent, pull):
@@ -99,7 +99,7 @@ def test_rigid_rotation_of_an_unloaded_element_costs_nothing(element):
     _, stiffness, tangent, pull = data(element)
     one = quat.from_rotation_vector([0.7, -1.1, 2.0]) if element.space else np.array([2.0])
     q = np.tile(one[:, None], element.order + 1)
-    out = turning(element, q, stiffness, tangent, 0.0 * pull)
+    out = evaluated(element, q, stiffness, tangent, 0.0 * pull)
     # The differentiation matrix annihilates constants up to rounding, which grows with the order.
     scale = np.abs(stiffness).max()
     assert float(out[0]) == pytest.approx(0.0, abs=1e-22 * scale)
@@ -109,11 +109,11 @@ def test_rigid_rotation_of_an_unloaded_element_costs_nothing(element):
 
 
 @each
-def test_undeformed_element_has_no_strain_and_its_own_reach(element):
+def test_undeformed_element_has_no_strain_and_its_own_chord(element):
     _, stiffness, tangent, pull = data(element, 3)
     q = np.zeros((element.components, element.order + 1))
     q[0] = 1.0 if element.space else 0.0
-    out = turning(element, q, stiffness, tangent, pull)
+    out = evaluated(element, q, stiffness, tangent, pull)
     assert float(out[0]) == pytest.approx(0.0, abs=1e-25)  # squares of rounding
     np.testing.assert_allclose(out[4].full().ravel(), tangent.sum(axis=1), atol=1e-14)
     assert float(out[1]) == pytest.approx((pull * tangent).sum(), abs=1e-13)
@@ -144,7 +144,9 @@ def test_gradient_and_hessian_against_complex_and_central_differences(element):
 def test_turning_is_the_derivative_along_rotations(element):
     """Gradient and Hessian of phi -> energy(exp(phi) q) by differences, and through E of gradient and hessian."""
     q, stiffness, tangent, pull = data(element, 2)
-    strain, work, moments, matrix, reach, spin = (a.full() for a in turning(element, q, stiffness, tangent, pull))
+    strain, work, moments, matrix, length, rotation_jacobian = (
+        a.full() for a in evaluated(element, q, stiffness, tangent, pull)
+    )
     n, turns = element.order + 1, element.turns
 
     def energy(vector):
@@ -152,7 +154,7 @@ def test_turning_is_the_derivative_along_rotations(element):
 
     assert strain[0, 0] + work[0, 0] == pytest.approx(energy(np.zeros(turns * n)), rel=1e-14)
     assert work[0, 0] == pytest.approx((pull * turned_tangents(element, q, tangent)).sum(), rel=1e-12, abs=1e-13)
-    np.testing.assert_allclose(reach.ravel(), turned_tangents(element, q, tangent).sum(axis=1), atol=1e-13)
+    np.testing.assert_allclose(length.ravel(), turned_tangents(element, q, tangent).sum(axis=1), atol=1e-13)
     h, rng = 1e-3, np.random.default_rng(5)
     for _ in range(3):
         v = rng.normal(size=turns * n)
@@ -168,17 +170,17 @@ def test_turning_is_the_derivative_along_rotations(element):
             chord(element, moved(element, q, (k * h * v).reshape(turns, n, order="F")), tangent) for k in (-2, -1, 1, 2)
         ]
         slope = (reached[0] - 8 * reached[1] + 8 * reached[2] - reached[3]) / (12 * h)
-        np.testing.assert_allclose(spin @ v, slope, atol=1e-10)
+        np.testing.assert_allclose(rotation_jacobian @ v, slope, atol=1e-10)
     gradient = gradient_of(element, q, stiffness, tangent, pull)
     hessian = hessian_of(element, q, stiffness, tangent, pull)
-    e_map, radial = spin_map(element, q), np.repeat((q * gradient.reshape(q.shape, order="F")).sum(axis=0), 3)
+    e_map, radial = basis_of(element, q), np.repeat((q * gradient.reshape(q.shape, order="F")).sum(axis=0), 3)
     expected = e_map.T @ hessian @ e_map - (0.25 * np.diag(radial) if element.space else 0.0)
     size = max(1.0, np.abs(hessian).max())
     np.testing.assert_allclose(moments.ravel(), e_map.T @ gradient, atol=1e-14 * size)
     np.testing.assert_allclose(matrix, expected, atol=1e-14 * size)
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-14 * size)
     jacobian = slopes_of(element)(*arguments(element, q, stiffness, tangent, pull)[:4])[1]
-    np.testing.assert_allclose(jacobian.full() @ e_map, spin, atol=1e-13)
+    np.testing.assert_allclose(jacobian.full() @ e_map, rotation_jacobian, atol=1e-13)
 
 
 def turned_tangents(element, q, tangent):
@@ -189,7 +191,7 @@ def turned_tangents(element, q, tangent):
     return np.stack([c * tangent[0] - s * tangent[1], s * tangent[0] + c * tangent[1]])
 
 
-def spin_map(element, q):
+def basis_of(element, q):
     """dq/dphi: half of (0, phi) q at each node."""
     n = element.order + 1
     if not element.space:
@@ -227,9 +229,9 @@ def test_strain_energy_does_not_see_a_superposed_rotation(element):
     turn = quat.from_rotation_vector([1.3, 0.4, -0.9]) if element.space else 1.7
     turned = quat.multiply(turn, q.T).T if element.space else q + turn
     matrix = quat.matrix(turn) if element.space else turned_about([0, 0, 1], 1.7)[:2, :2]
-    before = turning(element, q, stiffness, tangent, pull)
-    after = turning(element, turned, stiffness, tangent, matrix @ pull)
-    # The rotated scene with rotated pulls: same energies, turned moments and reach; rounding only.
+    before = evaluated(element, q, stiffness, tangent, pull)
+    after = evaluated(element, turned, stiffness, tangent, matrix @ pull)
+    # The rotated scene with rotated pulls: same energies, turned moments and chord; rounding only.
     scale = np.abs(stiffness).max() * element.order**2
     assert float(after[0]) == pytest.approx(float(before[0]), rel=1e-12)
     assert float(after[1]) == pytest.approx(float(before[1]), abs=1e-13 * scale)
@@ -243,7 +245,7 @@ def test_strain_energy_does_not_see_a_superposed_rotation(element):
 def test_sum_of_moments_is_the_moment_of_the_pulls(element):
     """A common small rotation does no elastic work: the moments at the nodes add up to sum t x pull."""
     q, stiffness, tangent, pull = data(element, 6)
-    moments = turning(element, q, stiffness, tangent, pull)[2].full().reshape(-1, element.turns).sum(axis=0)
+    moments = evaluated(element, q, stiffness, tangent, pull)[2].full().reshape(-1, element.turns).sum(axis=0)
     t = turned_tangents(element, q, tangent)
     expected = np.cross(t.T, pull.T).sum(axis=0) if element.space else (t[0] * pull[1] - t[1] * pull[0]).sum()
     np.testing.assert_allclose(
@@ -356,8 +358,8 @@ def test_names():
 
 def test_functions_are_made_once():
     element = element_by_name("SFET4", True)
-    assert by_turning(element) is by_turning(element)
-    assert isinstance(by_turning(element), ca.Function)
+    assert rotation_gradient(element) is rotation_gradient(element)
+    assert isinstance(rotation_gradient(element), ca.Function)
 
 
 @pytest.mark.filterwarnings("error")

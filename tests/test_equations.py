@@ -12,7 +12,7 @@ from sfetcas.mathematics import quaternion as quat
 from sfetcas.mathematics.interpolation import differentiation, evaluation
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
-from sfetcas.mechanics.rotations import Turn
+from sfetcas.mechanics.rotations import RotationFreedom
 from sfetcas.solvers.prepared import Prepared
 from sfetcas.solvers.residuals import relative_residual
 
@@ -29,7 +29,7 @@ def trial(name, assembly="closing", gauss=False, order=2, elements=2):
     start = equations.start(loading)
     start = replace(start, y=rng.normal(size=start.y.shape), lam=rng.normal(size=start.lam.shape))
     step = np.zeros(equations.total)
-    step[: equations.turning_unknowns] = 0.5 * rng.normal(size=equations.turning_unknowns)
+    step[: equations.rotation_unknowns] = 0.5 * rng.normal(size=equations.rotation_unknowns)
     return equations, loading, equations.moved(start, step)
 
 
@@ -158,7 +158,7 @@ def test_assemblies_are_the_same_mechanics(name):
 def test_positive_part_and_elastic_entries(name, assembly, gauss):
     equations, loading, state = trial(name, assembly, gauss)
     convex = full(equations, equations.at(state, loading, convex=True))
-    n = equations.turning_unknowns
+    n = equations.rotation_unknowns
     values = np.linalg.eigvalsh(convex[:n, :n])
     hinged = bool(equations.model.connections)
     assert values.min() > -1e-11 * np.abs(values).max() or hinged  # a hinge's own part is left as it is
@@ -178,16 +178,18 @@ def test_positive_part_and_elastic_entries(name, assembly, gauss):
 @pytest.mark.parametrize("name", ZOO)
 def test_holding_start_and_moved(name):
     equations, _, state = trial(name)
-    held = equations.model.rotations.kind == Turn.HELD
+    held = equations.model.rotations.kind == RotationFreedom.FIXED
     moved = equations.moved(state, np.ones(equations.total))
     np.testing.assert_array_equal(moved.q[held], state.q[held])
     put = equations.holding(state, equations.model.loading(0.3))
-    np.testing.assert_allclose(put.q[held], equations.model.held(equations.model.loading(0.3))[held], atol=0)
+    np.testing.assert_allclose(
+        put.q[held], equations.model.prescribed_rotations(equations.model.loading(0.3))[held], atol=0
+    )
     np.testing.assert_array_equal(put.q[~held], state.q[~held])
     if equations.model.space:
         np.testing.assert_allclose(np.linalg.norm(moved.q, axis=1), 1.0, atol=1e-15)
         # Rotations about a held axis stay about it.
-        about = equations.model.rotations.kind == Turn.AXIS
+        about = equations.model.rotations.kind == RotationFreedom.AXIS
         vector = quat.multiply(moved.q[about], quat.conjugate(state.q[about]))[:, 1:]
         np.testing.assert_allclose(np.cross(vector, equations.model.rotations.axis[about]), 0.0, atol=1e-15)
 

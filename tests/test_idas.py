@@ -109,8 +109,13 @@ def any_state(table, seed=0):
     rng = np.random.default_rng(seed)
     factors = rng.uniform(-1, 1, (3, one.system.layout.factors))
     loading = one.system.loading(factors[0])
-    state = State(model.held(loading), rng.uniform(-0.1, 0.1, one.states[1]), np.zeros(equations.rows), np.zeros(0))
-    state = replace(state, wound=np.zeros(model.winding.count))
+    state = State(
+        model.prescribed_rotations(loading),
+        rng.uniform(-0.1, 0.1, one.states[1]),
+        np.zeros(equations.rows),
+        np.zeros(0),
+    )
+    state = replace(state, unwrapped=np.zeros(model.unwrapping.count))
     step = np.concatenate([rng.uniform(-0.5, 0.5, equations.unknowns), rng.uniform(-1, 1, equations.rows)])
     state = equations.moved(state, step)
     w, a = rng.uniform(-1, 1, (2, equations.unknowns))
@@ -126,7 +131,7 @@ def along(one, equations, state, w, a, factors, t):
 
 def residual(one, state, w, a, factors):
     q = state.q[one.turning].ravel()
-    given = (q, state.y, w, state.wound, a, state.lam, *factors)
+    given = (q, state.y, w, state.unwrapped, a, state.lam, *factors)
     return np.array(one.balance(*given)).ravel()
 
 
@@ -154,7 +159,7 @@ def test_matrix_is_the_derivative_but_for_centripetal_shares(name):
     one, equations, state, w, a, factors = any_state(dynamic(SCENES[name]()))
     n, rest = equations.unknowns, 0.0 * factors
     rest[0] = factors[0]
-    given = (state.q[one.turning].ravel(), state.y, 0.0 * w, state.wound, 0.0 * a, state.lam, *rest)
+    given = (state.q[one.turning].ravel(), state.y, 0.0 * w, state.unwrapped, 0.0 * a, state.lam, *rest)
     symbols = [ca.MX.sym(f"s{i}", len(part)) for i, part in enumerate(given)]
     found = {}
     for i, key in ((0, "q"), (1, "y"), (2, "w"), (4, "a"), (5, "lam")):
@@ -199,7 +204,7 @@ def test_driven_rotations_have_their_centripetal_acceleration_where_their_angle_
     table["motions"] = {"turn": {"node": "A", "rotation": [0.0, 0.0, 1.0], "history": "on"}}
     one = any_state(table)[0]
     model = one.system.model
-    rest = model.held(model.loading(0.0, 0.0))[one.turning].ravel()
+    rest = model.prescribed_rotations(model.loading(0.0, 0.0))[one.turning].ravel()
     groups = list(one.system.model.groups)
     rate = np.array([2.0 if name == "on" else 0.0 for name in groups])
     zero = np.zeros(len(groups))

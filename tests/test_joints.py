@@ -194,10 +194,10 @@ def columns(kind, q, u):
 
 
 def evaluated(kind, q, u, data, load, lam):
-    """Energy, stored energy, rows, gradient, stiffness, spin as arrays."""
-    result = terms.by_turning(kind)(*columns(kind, q, u), data, load, lam)
-    energy, stored, rows, gradient, stiffness, spin = (part.full() for part in result)
-    return float(energy[0, 0]), float(stored[0, 0]), rows.ravel(), gradient.ravel(), stiffness, spin
+    """Energy, stored energy, rows, gradient, stiffness, rotation Jacobian as arrays."""
+    result = terms.rotation_gradient(kind)(*columns(kind, q, u), data, load, lam)
+    energy, stored, rows, gradient, stiffness, rotation_jacobian = (part.full() for part in result)
+    return float(energy[0, 0]), float(stored[0, 0]), rows.ravel(), gradient.ravel(), stiffness, rotation_jacobian
 
 
 def moved(kind, q, u, step):
@@ -226,10 +226,10 @@ def test_rank_is_what_the_freedoms_leave(name):
     for seed in range(5):
         rng = np.random.default_rng(seed)
         q, u, freedoms = case.state(rng)
-        *_, rows, _, _, spin = evaluated(kind, q, u, *numbers(case, rng))
+        *_, rows, _, _, rotation_jacobian = evaluated(kind, q, u, *numbers(case, rng))
         np.testing.assert_allclose(rows, 0.0, atol=1e-14)
         relative = kind.turns if len(q) == 2 else kind.axes
-        values = np.linalg.svd(spin, compute_uv=False)
+        values = np.linalg.svd(rotation_jacobian, compute_uv=False)
         # The rows are of the size of angles and lengths, none much smaller.
         assert values.min() > 0.3
         assert kind.sizes[2] == relative - len(freedoms)
@@ -241,8 +241,8 @@ def test_reactions_do_no_work_on_freedoms_and_rigid_motions(name):
     for seed in range(5):
         rng = np.random.default_rng(seed)
         q, u, freedoms = case.state(rng)
-        *_, spin = evaluated(kind, q, u, *numbers(case, rng))
-        assert spin.shape == (kind.sizes[2], width(kind))
+        *_, rotation_jacobian = evaluated(kind, q, u, *numbers(case, rng))
+        assert rotation_jacobian.shape == (kind.sizes[2], width(kind))
         turned = kind.turns * len(q)
         for freedom in freedoms:
             motion = np.zeros(width(kind))
@@ -250,11 +250,11 @@ def test_reactions_do_no_work_on_freedoms_and_rigid_motions(name):
                 motion[kind.turns : turned] = freedom[1]
             else:
                 motion[turned + kind.axes :] = freedom
-            np.testing.assert_allclose(spin @ motion, 0.0, atol=2e-15 * 8)
+            np.testing.assert_allclose(rotation_jacobian @ motion, 0.0, atol=2e-15 * 8)
         for w in np.eye(3) if kind.space else [np.array([0.0, 0.0, 1.0])]:
             turn = np.tile(w if kind.space else w[2:], len(q))
             carried = [np.cross(w, np.pad(v, (0, 3 - len(v))))[: kind.axes] for v in u]
-            np.testing.assert_allclose(spin @ np.concatenate([turn, *carried]), 0.0, atol=2e-15 * 8)
+            np.testing.assert_allclose(rotation_jacobian @ np.concatenate([turn, *carried]), 0.0, atol=2e-15 * 8)
 
 
 @pytest.mark.parametrize("name", [n for n in CASES if n not in BODIES and "universal joint" not in n])
@@ -288,7 +288,7 @@ def test_derivatives_of_the_lagrangian(name):
     rng = np.random.default_rng(4)
     q, u, _ = anywhere(kind)(rng)
     data, load, lam = numbers(case, rng)
-    _, _, _, gradient, stiffness, spin = evaluated(kind, q, u, data, load, lam)
+    _, _, _, gradient, stiffness, rotation_jacobian = evaluated(kind, q, u, data, load, lam)
 
     def lagrangian(q, u):
         energy, _, rows, *_ = evaluated(kind, q, u, data, load, lam)
@@ -300,18 +300,18 @@ def test_derivatives_of_the_lagrangian(name):
         # h^4 = 1e-12 of the fifth derivative; rounding of the energy over h.
         assert gradient[i] == pytest.approx(slope(lagrangian, kind, q, u, i), abs=3e-11 * scale)
         there = slope(lambda *s: evaluated(kind, *s, data, load, lam)[2], kind, q, u, i)
-        np.testing.assert_allclose(spin[:, i], there, atol=3e-11 * scale)
+        np.testing.assert_allclose(rotation_jacobian[:, i], there, atol=3e-11 * scale)
     np.testing.assert_allclose(stiffness, 0.5 * (change + change.T), atol=3e-11 * scale)
 
 
 @each
 def test_components_and_turning_are_one_function(name):
-    """Derivatives by components of quaternions, along rotations, are those by turning."""
+    """Derivatives by components of quaternions, along rotations, are those by rotation vectors."""
     case, kind = CASES[name], CASES[name].kind
     rng = np.random.default_rng(5)
     q, u, _ = anywhere(kind)(rng)
     data, load, lam = numbers(case, rng)
-    energy, _, rows, gradient, _, spin = evaluated(kind, q, u, data, load, lam)
+    energy, _, rows, gradient, _, rotation_jacobian = evaluated(kind, q, u, data, load, lam)
     sides = columns(kind, q, u)
     gradient_of, jacobian = (part.full() for part in terms.slopes_of(kind)(*sides, data, load))
     hessian = terms.curvatures_of(kind)(*sides, data, load, lam, 1.3).full()
@@ -323,7 +323,7 @@ def test_components_and_turning_are_one_function(name):
 
     along = np.array([slope(components, kind, q, u, i) for i in range(width(kind))])
     np.testing.assert_allclose(along @ (gradient_of.ravel() + jacobian.T @ lam), gradient, atol=1e-10)
-    np.testing.assert_allclose(jacobian @ along.T, spin, atol=1e-11)
+    np.testing.assert_allclose(jacobian @ along.T, rotation_jacobian, atol=1e-11)
     np.testing.assert_allclose(hessian, hessian.T, atol=1e-13 * max(1.0, np.abs(hessian).max()))
 
 

@@ -11,10 +11,10 @@ import pytest
 
 from sfetcas.mathematics import kernels
 from sfetcas.mechanics.elements import Element
-from sfetcas.mechanics.terms import by_turning, curvatures_of, energies_of, forces_by_turning, slopes_of
+from sfetcas.mechanics.terms import curvatures_of, energies_of, rotation_forces, rotation_gradient, slopes_of
 
 ELEMENT = Element(True, 2)
-TURNING = by_turning(ELEMENT)
+ROTATION_GRADIENT = rotation_gradient(ELEMENT)
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def files(folder):
     return sorted(p.name for p in folder.iterdir()) if folder.exists() else []
 
 
-@pytest.mark.parametrize("made", [energies_of, slopes_of, curvatures_of, forces_by_turning, by_turning])
+@pytest.mark.parametrize("made", [energies_of, slopes_of, curvatures_of, rotation_forces, rotation_gradient])
 def test_compiled_equals_virtual_machine(cache, compiler, made):
     function = made(ELEMENT)
     machine = kernels.compiled(function)
@@ -180,7 +180,7 @@ def test_where_it_pays(cache, compiler, monkeypatch):
     assert len(files(cache)) == 1
     # Once it is there it is taken as soon as time is spent at all, and compiling alone would not pay.
     calls = 0.5 * kernels.COMPILE_SECONDS_PER_INSTRUCTION / kernels.SECONDS_PER_INSTRUCTION
-    large = TURNING
+    large = ROTATION_GRADIENT
     assert kernels.chosen(large, calls) is large
     kernels.compiled(large)
     assert kernels.chosen(large, calls) is not large
@@ -218,12 +218,12 @@ def test_without_a_home_nothing_is_compiled(monkeypatch):
     for name in ("SFETCAS_CACHE", "XDG_CACHE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", nobody)
-    assert kernels.chosen(TURNING, 1e9) is kernels.compiled(TURNING) is TURNING
+    assert kernels.chosen(ROTATION_GRADIENT, 1e9) is kernels.compiled(ROTATION_GRADIENT) is ROTATION_GRADIENT
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_batch_is_the_function_n_times(n):
-    function = TURNING
+    function = ROTATION_GRADIENT
     batch = kernels.Batch(function, n)
     rng = np.random.default_rng(n)
     for _ in range(2):

@@ -11,7 +11,7 @@ from scenes import cantilever
 from sfetcas import Prepared, Scene, solve
 from sfetcas.mathematics import kernels
 from sfetcas.mathematics.keeping import kept
-from sfetcas.solvers.between_states import unheld
+from sfetcas.solvers.between_states import free_parts
 
 
 def test_an_answer_ends_with_all_that_was_made_for_it():
@@ -23,7 +23,7 @@ def test_an_answer_ends_with_all_that_was_made_for_it():
         last.along(member, np.array([0.5]))
         prepared = Prepared(last.model)
         prepared.minimise(last.model.loading(1.0), last.state)
-        unheld(last.model)
+        free_parts(last.model)
         alive += [weakref.ref(part) for part in (answer, last.model, prepared)]
         del answer, last, prepared
     gc.collect()

@@ -20,7 +20,7 @@ from sfetcas.equilibria.several import Search, search
 from sfetcas.equilibria.single import cold
 from sfetcas.equilibria.statics import Settings
 from sfetcas.mathematics import quaternion
-from sfetcas.solvers.between_states import turned_between, unheld
+from sfetcas.solvers.between_states import free_parts, turned_between
 from sfetcas.solvers.deflation import deflated
 from sfetcas.solvers.prepared import Prepared
 
@@ -389,10 +389,10 @@ def test_rotations_between_states_in_space_and_plane():
         ready, loading = prepared(table)
         equations = ready.equations
         step = np.zeros(equations.total)
-        step[: equations.turning_unknowns] = 0.3 * rng.standard_normal(equations.turning_unknowns)
+        step[: equations.rotation_unknowns] = 0.3 * rng.standard_normal(equations.rotation_unknowns)
         state = equations.start(loading)
         between = turned_between(equations, equations.moved(state, step), state)
-        np.testing.assert_allclose(between, step[: equations.turning_unknowns], atol=1e-12)
+        np.testing.assert_allclose(between, step[: equations.rotation_unknowns], atol=1e-12)
 
 
 def test_a_whole_turn_counts_only_where_something_holds():
@@ -403,10 +403,10 @@ def test_a_whole_turn_counts_only_where_something_holds():
         ready, loading = prepared(table)
         state = ready.equations.start(loading)
         step = np.zeros(ready.equations.total)
-        step[: ready.equations.turning_unknowns] = 2.0 * math.pi
+        step[: ready.equations.rotation_unknowns] = 2.0 * math.pi
         between = turned_between(ready.equations, ready.equations.moved(state, step), state)
         np.testing.assert_allclose(between, turn, atol=1e-12)
-        assert bool(unheld(ready.model)) == (support == "ball")
+        assert bool(free_parts(ready.model)) == (support == "ball")
 
 
 def test_mirror_images_of_an_equilibrium_of_a_symmetric_scene_are_equilibria():

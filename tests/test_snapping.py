@@ -12,7 +12,7 @@ from sfetcas import Scene, SceneError, assemble, solve, solve_model, switch, uni
 from sfetcas.cli import main
 from sfetcas.equilibria.mirrors import mirrored, mirrors
 from sfetcas.mathematics import quaternion
-from sfetcas.mechanics.rotations import Turn
+from sfetcas.mechanics.rotations import RotationFreedom
 from sfetcas.solvers.prepared import Prepared
 
 SPAN, STIFFNESS = 0.4, 0.35
@@ -296,7 +296,7 @@ def test_mirrored_rotations_of_hinges_in_space_stay_about_their_axes():
     state = prepared.equations.start(loading)
     state = prepared.equations.moved(state, rng.standard_normal(prepared.equations.total))
     rotations = prepared.model.rotations
-    about = rotations.kind == Turn.AXIS
+    about = rotations.kind == RotationFreedom.AXIS
     assert about.any()
     images = mirrors(prepared.model)
     assert len(images) > 1

@@ -81,7 +81,7 @@ def test_unloaded_cantilever_has_the_eigenvalue_of_a_quarter_wave():
 
 
 @pytest.mark.parametrize("name", ["clamped-free", "pinned-pinned", "clamped-clamped"])
-def test_escape_shape_is_the_mode(name):
+def test_unstable_mode_is_the_mode(name):
     table, critical = CRITICAL[name]
     result, prepared = straight(table, 1.2 * critical)
     s = prepared.model.along("m")
@@ -97,7 +97,7 @@ def test_escape_shape_is_the_mode(name):
     np.testing.assert_allclose(sign * shape, mode / scale, atol=1e-6)
 
 
-def test_escape_shape_by_name_in_the_certificate():
+def test_unstable_mode_by_name_in_the_certificate():
     step = sfetcas.solve(made(column(guided=False, load=5.0) | {"analysis": {"unstable": "stay"}})).last
     shape = step.certificate.escape["m"]
     s = step.model.along("m")
@@ -209,14 +209,14 @@ def test_what_the_leaving_finds_has_less_energy():
 
 
 @pytest.mark.parametrize("name", ["four_bar", "tripod", "guided"])
-def test_smallest_is_the_rayleigh_quotient_of_the_escape_shape(name):
+def test_smallest_is_the_rayleigh_quotient_of_the_unstable_mode(name):
     """Second variation by the shape over the integral of its square, members of unlike stiffness and length."""
     prepared = Prepared(model_of(ZOO[name](), 2, 4, assembly="closing"))
     equations, step = prepared.equations, solve_model(prepared)
     point = equations.at(step.state, step.loading)
     matrix = np.zeros((equations.total, equations.total))
     matrix[equations.row, equations.column] = point.entries
-    n = equations.turning_unknowns
+    n = equations.rotation_unknowns
     shape = prepared._test.test(point).shape
     quotient = shape @ matrix[:n, :n] @ shape / (shape @ (equations.mass * shape))
     assert step.certificate.smallest == pytest.approx(quotient * step.model.scales.force, rel=1e-9)
@@ -328,7 +328,7 @@ def test_bordered_count_is_the_dense_count_on_random_frames(seed, monkeypatch):
     assert max(counts) > 0
 
 
-@pytest.mark.parametrize("soft", stability_module.SOFTER_BORDERS)
+@pytest.mark.parametrize("soft", stability_module.BORDER_REGULARISATIONS)
 @pytest.mark.parametrize("kind", ["all types", "lattice"])
 def test_bordered_count_of_nets_is_the_dense_count(kind, soft, monkeypatch):
     """With each softness, at the answer and far from it, where hundreds of eigenvalues are negative."""
@@ -336,8 +336,8 @@ def test_bordered_count_of_nets_is_the_dense_count(kind, soft, monkeypatch):
     equations, loading = prepared.equations, prepared.model.loading(1.0)
     found = prepared.correct(equations.start(loading), loading, iterations=30)
     assert found.converged
-    monkeypatch.setattr(stability_module, "SOFT_BORDER", soft)
-    monkeypatch.setattr(stability_module, "SOFTER_BORDERS", (soft,))
+    monkeypatch.setattr(stability_module, "BORDER_REGULARISATION", soft)
+    monkeypatch.setattr(stability_module, "BORDER_REGULARISATIONS", (soft,))
     monkeypatch.setattr(StabilityTest, "_below_dense", None)  # the bordered matrix alone is meant
     counts = []
     for factor in (1.0, 100.0, -100.0, -1000.0):

@@ -76,7 +76,7 @@ def test_positive_matrix_is_positive_and_exact_where_nothing_pulls(name, gauss):
 
     def matrices(given):
         found = program.at(flat, given)[4], program.convex(flat, given)
-        n = equations.turning_unknowns
+        n = equations.rotation_unknowns
         return [np.array(ca.DM(program.sparsity, np.array(part).ravel()))[:n, :n] for part in found]
 
     exact, positive = matrices(program.given_of(equations.model.loading(50.0)))

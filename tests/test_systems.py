@@ -29,7 +29,7 @@ def spring_wrench(step, name):
         sides = np.array([rotation_of(step, spring, party) for party in spring.between or ("ground", spring.node)])
         data = np.array([*axis, spring.stiffness, spring.rest, state.travel])
         # Where the joint turns about other axes as well, the moment is not quite along the spring's.
-        moment = -terms.by_turning(joints.TurnSpring(True))(sides.T, [], data, [], [])[3].full()[3:, 0]
+        moment = -terms.rotation_gradient(joints.TurnSpring(True))(sides.T, [], data, [], [])[3].full()[3:, 0]
         assert moment @ quat.rotate(sides[0], axis) == pytest.approx(state.effort, abs=1e-9)
         return "moment", moment
     if spring.direction is not None:

@@ -123,7 +123,7 @@ def derivatives(
     prepared = Prepared(model)
     near = prepared.equations.start(loading)
     problem = EquilibriumProblem(model, loading, near, kernels="interpreted")
-    parameters = problem.parameters_by(program.given, near.wound)
+    parameters = problem.parameters_by(program.given, near.unwrapped)
     none = Results(model, [], {})
     guess = problem.unknowns(state)
     if not np.isfinite(guess).all():

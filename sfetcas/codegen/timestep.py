@@ -74,7 +74,7 @@ class TimeStep:
             "shifts": n.y * stages,
             "x": n.x,
             "rates": n.x * self.method.kept,
-            "near": n.near,
+            "near": n.unwrapped,
             "last": 1,
         }
 
@@ -98,8 +98,8 @@ class TimeStep:
         lam = ca.reshape(found["lam_stages"], n.lam, self.method.stages)[:, -1]
         x = ca.reshape(found["x_stages"], n.x, self.method.stages)[:, -1]
         rest = [found["turns_stages"], found["shifts_stages"], x, found["rates_next"]]
-        near = program.counted(q, parts["near"])
-        after = ca.vertcat(ca.vec(q), found["y_next"], lam, *[ca.vec(part) for part in rest], near, span)
+        unwrapped = program.counted(q, parts["near"])
+        after = ca.vertcat(ca.vec(q), found["y_next"], lam, *[ca.vec(part) for part in rest], unwrapped, span)
         results = [ca.densify(after), found["size"], found["iterations"], found["gap"]]
         names = ["after", "size", "iterations", "gap"]
         return ca.Function(f"{self.name}_advance", [state, h, p], results, ["state", "h", "arguments"], names)
@@ -178,13 +178,13 @@ def time_step(
     rates = np.zeros((method.kept, len(begun.x)))
     rates[0] = begun.v
     state = begun.state
-    memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.wound)
+    memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped)
     if method.kept > 1:
         step = scene.analysis.step or scene.analysis.duration / 1000.0
         memory = Stepper(own, method).refreshed(memory, step / own.masses.time)
     stages, layout = method.stages, system.layout
     still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
-    moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.near]
+    moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.unwrapped]
     return TimeStep(name, scene, known, told, system, method, own.masses.time, np.concatenate([*moved, np.zeros(1)]))
 
 

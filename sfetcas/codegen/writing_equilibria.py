@@ -116,10 +116,10 @@ class EquilibriumWriter(Writer):
         constants: dict[str, object] = {
             "TOTAL": program.expressions.total,
             "UNKNOWNS": equations.unknowns,
-            "TURNING": equations.turning_unknowns,
+            "TURNING": equations.rotation_unknowns,
             "ENTRIES": program.sparsity.nnz(),
             "STATE": program.states,
-            "MULTIPLIERS": program.states - program.expressions.layout.near - equations.rows,
+            "MULTIPLIERS": program.states - program.expressions.layout.unwrapped - equations.rows,
             "GIVEN": program.symbol.shape[0],
             "LOADS": loads.start,
             "MOMENT": moments.start,

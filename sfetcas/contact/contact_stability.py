@@ -11,7 +11,7 @@ from ..solvers.stability import Stability
 from .rolling import rolling
 from .settling import Held, Settler, Way
 
-__all__ = ["ContactStability", "can_leave"]
+__all__ = ["ContactStability", "can_switch_branch"]
 
 IDLE = 1e-7
 """Share of the force on a stretch below which it is without pressure between its ends."""
@@ -20,7 +20,7 @@ STRAIGHT = 1e-4
 """Curvatures, times the length of the scene, below this are those of a straight member on a coarse mesh."""
 
 
-def can_leave(held: Held) -> bool:
+def can_switch_branch(held: Held) -> bool:
     """Whether there is an energy and anything left to move."""
     equations = held.prepared.equations
     return held.prepared.model.minimisable and equations.rows < equations.unknowns

@@ -30,10 +30,10 @@ from .touching import Toucher
 
 __all__ = ["ContactRun", "Pressed"]
 
-STAYS = "unstable, and no stable equilibrium was found along its escape shape"
+STAYS = "unstable, and no stable equilibrium was found along its unstable mode"
 """A note."""
 
-LEFT = "left an unstable equilibrium in contact along its escape shape"
+LEFT = "left an unstable equilibrium in contact along its unstable mode"
 """Another."""
 
 ELSEWHERE = (
@@ -257,7 +257,7 @@ class ContactRun:
                     detail = f"node {node} is held {-gap:.3g} m inside contacts.{contact}"
                     raise SolveError(Status.INFEASIBLE, detail)
 
-    def refuse_unheld(self, pilot: Prepared) -> None:
+    def refuse_unsupported(self, pilot: Prepared) -> None:
         """Say why there can be no state where nothing holds a direction.
 
         Raises

@@ -161,12 +161,12 @@ class Cushions:
         return self._settled(prepared, state, model.loading(factors[-1]))
 
     def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
-        leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
+        switch_branch = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
 
         def allowed(before: State, at: Loading, after: State, there: Loading) -> bool:
             return self._passes(prepared, before, after, there, at)
 
-        result = follow(prepared, way, state, leave=leave, allowed=allowed)
+        result = follow(prepared, way, state, switch_branch=switch_branch, allowed=allowed)
         self._parts = result.left
         return result.state if result.reached else None
 
@@ -219,11 +219,11 @@ class Cushions:
 
     def _rolled(self, prepared: Prepared, found: Corrected, loading: Loading) -> Corrected:
         """Where an unstable state goes to, if that is not over an obstacle; else the state."""
-        leave = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
-        if not leave or not prepared.negative(found):
+        switch_branch = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
+        if not switch_branch or not prepared.negative(found):
             return found
         try:
-            there = prepared.leave(found.state, prepared.stability(found), loading)[0]
+            there = prepared.switch_branch(found.state, prepared.stability(found), loading)[0]
         except SolveError:
             return found
         return there if self._passes(prepared, found.state, there.state, loading) else found

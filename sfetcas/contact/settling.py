@@ -173,15 +173,17 @@ def balanced(equations: Equations, state: State, loading: Loading) -> State:
 
 def _carried(source: tuple[Model, State], loading: Loading, model: Model, state: State) -> State:
     """The state with nodes where they were: of a body without support another node may lead its places now."""
-    kept, known = model.positions.kept[: len(model.nodes)], set(source[0].positions.unknowns)
-    new = [i for i in np.flatnonzero((kept >= 0).all(axis=1)) if model.positions.unknowns[kept[i, 0]] not in known]
+    retained, known = model.positions.retained[: len(model.nodes)], set(source[0].positions.unknowns)
+    new = [
+        i for i in np.flatnonzero((retained >= 0).all(axis=1)) if model.positions.unknowns[retained[i, 0]] not in known
+    ]
     if not new:
         return state
     fields, y = Fields(Equations(source[0]), source[1], loading), state.y.copy()
     for i in new:
         start = np.asarray(model.scene.nodes[model.nodes[i]].position, dtype=float)
         moved_by = (fields.position(model.nodes[i]) - start) / model.scales.length
-        y[kept[i]] = moved_by[: kept.shape[1]]
+        y[retained[i]] = moved_by[: retained.shape[1]]
     return replace(state, y=y)
 
 

@@ -20,7 +20,7 @@ from ..errors import SolveError, Status
 from ..mechanics.mesh import Mesh, Touch
 from ..solvers.continuation import NARROW
 from ..solvers.prepared import Prepared
-from .contact_stability import ContactStability, can_leave
+from .contact_stability import ContactStability, can_switch_branch
 from .cushions import Cushioned, Cushions
 from .passing import Passing
 from .revising import Reviser, Tried
@@ -60,7 +60,7 @@ NEARER = 0.3
 """How much slower it has to be than where it was found not to rest yet, to be asked again."""
 
 NUDGE = 0.05
-"""Angle, rad, by which an unstable equilibrium is moved along its escape shape to begin to fall."""
+"""Angle, rad, by which an unstable equilibrium is moved along its unstable mode to begin to fall."""
 
 SUDDEN, STEEP = 0.02, 4.0
 """A step is sudden that turns a place by more than this angle, rad, and by so many times what the one before tells."""
@@ -98,7 +98,7 @@ class Toucher:
         self.stability = ContactStability(self.settler)
         self.cushions = Cushions(scene, prepare, sides)
         self.passing = Passing(scene, self.cushions.obstacles)
-        self.leave = scene.analysis.unstable == "leave"
+        self.switch_branch = scene.analysis.unstable == "leave"
         self.snapped: list[float] = []
 
     def resolved(
@@ -221,7 +221,7 @@ class Toucher:
 
     def unstable(self, held: Held, way: Way) -> bool:
         """Whether a state is unstable, and such states are to be left."""
-        return self.leave and can_leave(held) and self.stability.judged(held, way).negative > 0
+        return self.switch_branch and can_switch_branch(held) and self.stability.judged(held, way).negative > 0
 
     def left(self, base: Mesh, held: Held, way: Way) -> Held | None:
         """A stable state that an unstable one goes to, past no obstacle; None where none is found."""
@@ -229,7 +229,7 @@ class Toucher:
         loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
         source = pressing.prepared.model, pressing.corrected.state
         for start in (pressing, self.settler.solved(replace(pressing.mesh, touches=loose), source, way)):
-            found = None if start is None else self._along_escape(start, way, loose)
+            found = None if start is None else self._along_unstable_mode(start, way, loose)
             if found is not None and not self.unstable(found, way) and not self._passed(held, found, way):
                 return found
         return self._fallen(base, self._nudged(pressing), loose, way)
@@ -242,7 +242,7 @@ class Toucher:
         self, base: Mesh, now: Held | None, done: float, way: Callable[[float], Way]
     ) -> tuple[float, Held] | None:
         """A part of the way shortly beyond one at which a state ceases to be, or to be stable, and where it goes."""
-        if now is None or not self.leave or not can_leave(now) or len(self.snapped) >= MOST_SNAPS:
+        if now is None or not self.switch_branch or not can_switch_branch(now) or len(self.snapped) >= MOST_SNAPS:
             return None
         ways_out = self.unstable(now, way(done))
         for beyond in SNAPS:
@@ -251,7 +251,9 @@ class Toucher:
             there = self.resolved(base, now, now.mesh.touches, at) if ways_out else None
             if there is not None and self.passing.possible(now, there, at.offsets):
                 there = None
-            found = self._along_escape(now, at, now.mesh.touches) if there is None else self.left(base, there, at)
+            found = (
+                self._along_unstable_mode(now, at, now.mesh.touches) if there is None else self.left(base, there, at)
+            )
             if there is None and (found is None or self._passed(now, found, at)):
                 found = self._fallen(base, now, now.mesh.touches, at)
             if found is not None:
@@ -260,15 +262,17 @@ class Toucher:
                 break
         return None
 
-    def _along_escape(self, start: Held, way: Way, touches: tuple[Touch, ...]) -> Held | None:
-        """Downhill from a state along its escape shape, then what touches is looked at again."""
+    def _along_unstable_mode(self, start: Held, way: Way, touches: tuple[Touch, ...]) -> Held | None:
+        """Downhill from a state along its unstable mode, then what touches is looked at again."""
         prepared = start.prepared
         if way.offsets:
             mesh_touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in start.mesh.touches)
             prepared = self.prepare(replace(start.mesh, touches=mesh_touches))
         loading = way.loading(prepared.model)
         try:
-            corrected, _ = prepared.leave(start.corrected.state, start.prepared.stability(start.corrected), loading)
+            corrected, _ = prepared.switch_branch(
+                start.corrected.state, start.prepared.stability(start.corrected), loading
+            )
             touched = Touched(prepared.equations, corrected.state, loading)
             there = Held(prepared, corrected, loading, touched)
             return self.resolved(replace(start.mesh, touches=()), there, touches, way)
@@ -306,7 +310,7 @@ class Toucher:
 
     @staticmethod
     def _nudged(held: Held) -> Held:
-        """An unstable equilibrium moved along its escape shape, so that it begins to fall."""
+        """An unstable equilibrium moved along its unstable mode, so that it begins to fall."""
         prepared, loading = held.prepared, held.loading
         stability = prepared.stability(held.corrected)
         state = prepared.nudged(held.corrected.state, stability, loading, NUDGE)

@@ -38,7 +38,7 @@ def drives(node: Node, displacement: Triple | None) -> bool:
     return bool(abs(np.dot(unit(displacement), unit(node.direction))) > tolerances.DECIMAL)
 
 
-def held_directions(node: Node, displacement: Triple | None = None) -> Floats:
+def fixed_directions(node: Node, displacement: Triple | None = None) -> Floats:
     """Unit directions (k, 3) in which the ground restrains a node's displacement; all for a driven slider."""
     if node.support == "free":
         return np.zeros((0, 3))
@@ -98,7 +98,7 @@ def check_floating(
             along = spring.direction
             sprung[spring.node].append(np.eye(3) if along is None else np.array([unit(along)]))
     for part in components(nodes, members, springs):
-        held = np.vstack([held_directions(nodes[name], moved.get(name)) for name in part])
+        held = np.vstack([fixed_directions(nodes[name], moved.get(name)) for name in part])
         held = np.vstack([held, *(rows for name in part for rows in sprung[name])])
         free = free_directions(held, dimension)
         if len(free):

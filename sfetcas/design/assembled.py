@@ -181,14 +181,14 @@ class Assembled:
         return [first + every.index(x) * width + k for x in asked.at for k in range(width)]
 
     def _add_answers(self) -> None:
-        told = self.tell(np.zeros((self.cases, self.equations.total)))
-        tell = self.equations.tell
-        varies = np.zeros(tell.numel_out(0), dtype=bool)
-        varies[np.unique(np.array(tell.jac_sparsity(0, 0).row(), dtype=np.intp))] = True
+        values = self.outputs(np.zeros((self.cases, self.equations.total)))
+        function = self.equations.outputs
+        varies = np.zeros(function.numel_out(0), dtype=bool)
+        varies[np.unique(np.array(function.jac_sparsity(0, 0).row(), dtype=np.intp))] = True
         blocks = []
         for number, asked in enumerate(self.formulation.asked.values()):
             rows = self._rows_of(asked)
-            start = told[np.ix_(asked.cases, rows)]
+            start = values[np.ix_(asked.cases, rows)]
             unit = self._unit(asked.unit, start)
             block = self.pieces.unknowns(f"answer {number}", start.reshape(asked.shape), unit=unit, symbol=asked.symbol)
             index = block.index.reshape(len(asked.cases), -1)
@@ -313,11 +313,11 @@ class Assembled:
         found[self._steps.index] = 0.0
         return found
 
-    def tell(self, steps: Array, values: Array | None = None) -> Array:
+    def outputs(self, steps: Array, values: Array | None = None) -> Array:
         """All results (cases, results), SI units, after steps (cases, total); ``values`` are all free numbers."""
         x = self.pieces.guess if values is None else values
         w = np.concatenate([steps, x[self._numbers]], axis=1)
-        return np.stack([np.array(self.equations.tell(a, b)).ravel() for a, b in zip(w, self._c, strict=True)])
+        return np.stack([np.array(self.equations.outputs(a, b)).ravel() for a, b in zip(w, self._c, strict=True)])
 
     def unknowns(self, x: Array) -> Array:
         """All unknowns (n,) in their own units from a scaled solution x."""
@@ -339,8 +339,8 @@ class Assembled:
 
     def turned(self, x: Array, y: Array) -> float:
         """Largest rotation of a node between two solutions, rad."""
-        turning = self.equations.program.equations.turning_unknowns
-        return float(np.abs(self.steps(y) - self.steps(x))[:, :turning].max(initial=0.0))
+        rotation_unknowns = self.equations.program.equations.rotation_unknowns
+        return float(np.abs(self.steps(y) - self.steps(x))[:, :rotation_unknowns].max(initial=0.0))
 
     def arrived(self, x: Array) -> Array:
         """States after the steps, (cases, states), dimensionless."""

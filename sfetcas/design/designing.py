@@ -25,7 +25,7 @@ from .solving import Iterate, Solved, Solving
 
 __all__ = ["Design", "DesignAnswer", "DesignIterate", "find"]
 
-Told = Mapping[tuple[str, str, tuple[float, ...] | None], Array]
+Outputs = Mapping[tuple[str, str, tuple[float, ...] | None], Array]
 """Answers by case, name and places."""
 
 ONE = ""
@@ -40,7 +40,7 @@ class DesignIterate:
     ----------
     values : mapping of str to ndarray
         All unknowns, in the units of the scene; inputs of a case are called ``case: name``.
-    told : mapping of (case, name, places) to ndarray
+    outputs : mapping of (case, name, places) to ndarray
         The answers that expressions use.
     objective : float
     iterations : int
@@ -48,7 +48,7 @@ class DesignIterate:
     """
 
     values: Mapping[str, Array]
-    told: Told
+    outputs: Outputs
     objective: float
     iterations: int
 
@@ -77,7 +77,7 @@ class DesignAnswer:
     multipliers: Mapping[str, Array] = field(repr=False)
     notes: tuple[str, ...]
     iterations: int
-    told: Told = field(repr=False)
+    outputs: Outputs = field(repr=False)
     scenes: Mapping[str, Scene] = field(repr=False)
 
     @property
@@ -94,10 +94,10 @@ class DesignAnswer:
             They do not use it.
         """
         key = case, name, None if at is None else tuple(at)
-        if key not in self.told:
-            known = [labelled(one, what) for one, what, _ in self.told]
+        if key not in self.outputs:
+            known = [labelled(one, what) for one, what, _ in self.outputs]
             raise SceneError(not_known(labelled(case, name), known, "answers"), ("answers",))
-        return self.told[key]
+        return self.outputs[key]
 
     def scene(self, case: str = ONE) -> Scene:
         """The scene of a case with the values found, for instance for ``solve(answer.scene("open"))``.
@@ -260,10 +260,10 @@ class Design(Cases):
         except SolveError as error:
             last = error.last
             if isinstance(last, Iterate):
-                last = DesignIterate(last.values, self._told(last), last.objective, solving.iterations)
+                last = DesignIterate(last.values, self._outputs(last), last.objective, solving.iterations)
             raise SolveError(error.status, error.detail, last) from None
 
-    def _told(self, iterate: Iterate) -> Told:
+    def _outputs(self, iterate: Iterate) -> Outputs:
         cases = self.statement.cases
         return {(cases[key[1][0]], key[0], key[2]): value for key, value in iterate.asked.items()}
 
@@ -277,7 +277,7 @@ class Design(Cases):
             multipliers=solved.multipliers,
             notes=solved.notes,
             iterations=iterations,
-            told=self._told(iterate),
+            outputs=self._outputs(iterate),
             scenes={name: formulation.case_scene(i, iterate.values) for i, name in enumerate(names)},
         )
 

@@ -124,29 +124,29 @@ class CaseEquations:
         return self._function("balance", [], self._at(self.program.stationarity.residual))
 
     @functools.cached_property
-    def _told(self) -> ca.MX:
+    def _outputs(self) -> ca.MX:
         """All results, flat."""
         undeformed = ca.MX.sym("undeformed", self.arguments.undeformed(self._numbers).numel())
         program = self.program
         symbols = [program.state_symbol, program.symbol, undeformed]
-        told = ca.Function("told", symbols, [ca.densify(self.results.expression(program, undeformed))])
+        told = ca.Function("outputs", symbols, [ca.densify(self.results.expression(program, undeformed))])
         return told(self._there, self._given, self.arguments.undeformed(self._numbers))
 
     @functools.cached_property
-    def tell(self) -> ca.Function:
+    def outputs(self) -> ca.Function:
         """``(w, c) ->`` all results, flat, in SI units."""
-        return self._function("tell", [], self._told)
+        return self._function("outputs", [], self._outputs)
 
     def lifted(self, part: Sequence[int]) -> ca.Function:
         """``(w, c) ->`` some of the results less unknowns that stand for them, which come last in w."""
         said = ca.MX.sym("said", len(part))
-        return self._function("lifted", [said], said - self._told[list(part)])
+        return self._function("lifted", [said], said - self._outputs[list(part)])
 
     @functools.cached_property
     def mass(self) -> Array:
         """Weights (total,) of the eigenvalue problem of stability, as in certificates; only rotations have any."""
         equations = self.program.equations
-        return np.concatenate([equations.mass, np.zeros(self.total - equations.turning_unknowns)])
+        return np.concatenate([equations.mass, np.zeros(self.total - equations.rotation_unknowns)])
 
     @functools.cached_property
     def eigen(self) -> ca.Function:
@@ -173,18 +173,20 @@ class CaseEquations:
         """``(numbers) ->`` data and loads of the equations."""
         return self.arguments.prepare("design_prepare")
 
-    def equilibrium(self, numbers: Array, start: State | None, *, leave: bool = True) -> tuple[Array | None, bool]:
+    def equilibrium(
+        self, numbers: Array, start: State | None, *, switch_branch: bool = True
+    ) -> tuple[Array | None, bool]:
         """The equilibrium (states,) for values of all numbers (None where none was found), and whether it is stable.
 
         Parameters
         ----------
         numbers : (numbers,), in the units of the scene
         start : state to start from; by default the undeformed one
-        leave : leave an unstable equilibrium for a stable one
+        switch_branch : leave an unstable equilibrium for a stable one
         """
         given = np.array(self.prepare(numbers)).ravel()
         flat = None if start is None else self.program.flat(start)
-        method = self.method if leave else self._near
+        method = self.method if switch_branch else self._near
         outcome = method(given, flat)
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return None, False

@@ -40,7 +40,7 @@ class QuasiStaticIterate:
         In the units of the scene.
     values : mapping of str to ndarray
         All other unknowns.
-    told : mapping of str to ndarray (points, n)
+    outputs : mapping of str to ndarray (points, n)
         The answers that expressions use, SI units.
     objective : float
     iterations : int
@@ -48,7 +48,7 @@ class QuasiStaticIterate:
 
     inputs: Mapping[str, Array]
     values: Mapping[str, Array]
-    told: Mapping[str, Array]
+    outputs: Mapping[str, Array]
     objective: float
     iterations: int
 
@@ -65,7 +65,7 @@ class QuasiStaticAnswer:
         In the units of the scene.
     values : mapping of str to ndarray
         Variables that are the same at all points.
-    told : mapping of str to ndarray (points, n)
+    outputs : mapping of str to ndarray (points, n)
         The answers that expressions use, SI units.
     objective : float
     cases : tuple of Equilibrium
@@ -80,7 +80,7 @@ class QuasiStaticAnswer:
     s: Array = field(repr=False)
     inputs: Mapping[str, Array] = field(repr=False)
     values: Mapping[str, Array] = field(repr=False)
-    told: Mapping[str, Array] = field(repr=False)
+    outputs: Mapping[str, Array] = field(repr=False)
     objective: float
     cases: tuple[Equilibrium, ...] = field(repr=False)
     jumps: tuple[int, ...]
@@ -102,9 +102,9 @@ class QuasiStaticAnswer:
         SceneError
             They do not use it.
         """
-        if name not in self.told:
-            raise SceneError(not_known(name, list(self.told), "answers"), ("answers",))
-        return self.told[name]
+        if name not in self.outputs:
+            raise SceneError(not_known(name, list(self.outputs), "answers"), ("answers",))
+        return self.outputs[name]
 
     def scene(self, point: int) -> Scene:
         """The scene with the values found at a point, given by its index."""
@@ -271,15 +271,15 @@ class QuasiStatic(Cases):
             last = error.last
             if isinstance(last, Iterate):
                 inputs, values = self._parted(last)
-                told = self._told(last)
-                last = QuasiStaticIterate(inputs, values, told, last.objective, solving.iterations)
+                outputs = self._outputs(last)
+                last = QuasiStaticIterate(inputs, values, outputs, last.objective, solving.iterations)
             raise SolveError(error.status, error.detail, last) from None
 
     def _parted(self, iterate: Iterate) -> tuple[dict[str, Array], dict[str, Array]]:
         inputs = {name: x for name, x in iterate.values.items() if name in self._inputs}
         return inputs, {name: x for name, x in iterate.values.items() if name not in self._inputs}
 
-    def _told(self, iterate: Iterate) -> dict[str, Array]:
+    def _outputs(self, iterate: Iterate) -> dict[str, Array]:
         return {key[0]: value for key, value in iterate.asked.items()}
 
     def _answered(self, solved: Solved, iterations: int) -> QuasiStaticAnswer:
@@ -294,7 +294,7 @@ class QuasiStatic(Cases):
             s=self.s,
             inputs=inputs,
             values=values,
-            told=self._told(solved.iterate),
+            outputs=self._outputs(solved.iterate),
             objective=solved.iterate.objective,
             cases=tuple(case.equilibrium for case in solved.cases),
             jumps=jumps,

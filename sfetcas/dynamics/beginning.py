@@ -102,7 +102,7 @@ def at_rest(model: Model) -> State:
     q = np.zeros((len(model.rotations.kind), model.element.components))
     q[:, 0] = 1.0 if model.space else 0.0
     y, lam = np.zeros(len(model.positions.unknowns)), np.zeros(len(model.row_names))
-    return State(q, y, lam, np.zeros(model.winding.count))
+    return State(q, y, lam, np.zeros(model.unwrapping.count))
 
 
 def posed(model: Model, source: Equilibrium) -> State:
@@ -130,14 +130,14 @@ def posed(model: Model, source: Equilibrium) -> State:
         weights=model.positions.Y.value * u[model.positions.Y.row],
         minlength=len(model.positions.unknowns),
     )
-    wound = model.winding.angles(q, _wound(model, source))
-    return State(q, y, state.lam, wound)
+    unwrapped = model.unwrapping.angles(q, _unwrapped(model, source))
+    return State(q, y, state.lam, unwrapped)
 
 
-def _wound(model: Model, source: Equilibrium) -> Array:
+def _unwrapped(model: Model, source: Equilibrium) -> Array:
     """Counted angles by their names."""
-    known = dict(zip(source.model.winding.names, source.state.wound, strict=True))
-    return np.array([known.get(name, 0.0) for name in model.winding.names])
+    known = dict(zip(source.model.unwrapping.names, source.state.unwrapped, strict=True))
+    return np.array([known.get(name, 0.0) for name in model.unwrapping.names])
 
 
 def _along_members(model: Model) -> list[tuple[str, list[int], Array]]:
@@ -176,12 +176,12 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
         return rates, ()
     n, closings = equations.unknowns, equations.rows
     # Without loads: theirs depend on what a rotation is measured by, and what is left open must not.
-    free = State(state.q, state.y, np.zeros(closings), state.wound)
+    free = State(state.q, state.y, np.zeros(closings), state.unwrapped)
     full = np.zeros((equations.total, equations.total))
     full[equations.row, equations.column] = equations.at(free, model.loading(0.0).scaled(0.0)).entries
     stiffness = 0.5 * (full[:n, :n] + full[:n, :n].T)
     values, vectors = np.linalg.eigh(stiffness)
-    small = np.where(np.arange(n) < equations.turning_unknowns, TURNING, MOVING)
+    small = np.where(np.arange(n) < equations.rotation_unknowns, TURNING, MOVING)
     root = np.vstack([np.sqrt(np.abs(values))[:, None] * vectors.T, np.diag(small)])
     held = full[n:, :n]
     both = np.vstack([held, rows])
@@ -237,7 +237,7 @@ def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, 
     names: list[tuple[str, ...]] = []
     moving_of = np.zeros((len(model.segments.places) * axes, equations.unknowns))
     y = model.positions.Y
-    moving_of[y.row, equations.turning_unknowns + y.column] = y.value
+    moving_of[y.row, equations.rotation_unknowns + y.column] = y.value
     turning_of = np.zeros((system.of_places, equations.unknowns))
     used = np.flatnonzero(system.unknown[: system.of_places] >= 0)
     turning_of[used, system.unknown[used]] = system.weight[used]

@@ -67,7 +67,7 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
 
     inverse, _ = largest(apply, equations.total, BOTH_SIDES * count)
     sizes = np.abs(inverse)
-    turned = float(np.abs(start.tangent.z[: equations.turning_unknowns]).max(initial=0.0)) / abs(start.tangent.factor)
+    turned = float(np.abs(start.tangent.z[: equations.rotation_unknowns]).max(initial=0.0)) / abs(start.tangent.factor)
     told = sizes > FAR * max(turned, sizes.max(initial=0.0))
     real = inverse[(np.abs(inverse.imag) <= IMAGINARY * sizes) & told].real
     factors = 1.0 / real
@@ -78,12 +78,12 @@ def _change(curve: Curve, start: Standing) -> SparseMap:
     """Derivative of the Newton matrix by the factor along the path."""
     equations = curve.equations
     rate, loads = start.tangent.z / start.tangent.factor, curve.rate(start.factor)
-    turned = float(np.abs(rate[: equations.turning_unknowns]).max(initial=0.0))
+    turned = float(np.abs(rate[: equations.rotation_unknowns]).max(initial=0.0))
     h = 1.0 / max(turned / TURN, float(np.abs(rate).max(initial=0.0)), TINY)
 
     def entries(w: float) -> Array:
         loading = start.loading.plus(loads.scaled(w))
-        return equations.at(curve.held(equations.moved(start.state, w * rate), loading), loading).entries
+        return equations.at(curve.with_prescribed(equations.moved(start.state, w * rate), loading), loading).entries
 
     near, far = ((entries(w) - entries(-w)) / (2.0 * w) for w in (h, 2.0 * h))
     return SparseMap(equations.row, equations.column, (4.0 * near - far) / 3.0, (equations.total,) * 2)

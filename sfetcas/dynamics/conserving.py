@@ -60,7 +60,7 @@ class Conserving(Method):
             name = next(name for name, load in model.scene.loads.items() if load.frame != "fixed")
             message = "found a follower with the integrator 'conserving', accepted: loads with a potential"
             raise SceneError(message, ("loads", name))
-        if model.spinning is not None:
+        if model.rotating_frame is not None:
             message = "found with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
             raise SceneError(message, ("rotating",))
         n = system.layout
@@ -70,18 +70,18 @@ class Conserving(Method):
             ca.MX.sym("y0", n.y),
             ca.MX.sym("x0", n.x),
             ca.MX.sym("rates", n.x),
-            ca.MX.sym("near", n.near),
+            ca.MX.sym("unwrapped", n.unwrapped),
         )
         h, factors = ca.MX.sym("h"), ca.MX.sym("factors", n.factors, 2)
         found = _Middle(system, begin, h, factors, q, y, lam)
         step = system.solved(found.entries, [2.0 / h**2], found.residual)
         (there,), shift, more, size = system.moved([q], step)
-        constants = [begin.q, begin.y, begin.x, begin.rates, begin.near, h, factors]
+        constants = [begin.q, begin.y, begin.x, begin.rates, begin.unwrapped, h, factors]
         return ca.Function("middle", [q, y, lam, *constants], [there, y + shift, lam + more, size])
 
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
         """The state at the begin of the step, its length h, and the factors of loads in the middle and at the end."""
-        return [begin.q, begin.y, begin.x, begin.rates, begin.near, h, factors]
+        return [begin.q, begin.y, begin.x, begin.rates, begin.unwrapped, h, factors]
 
     def after(self, h: ca.MX, rates: ca.MX, moved: ca.MX) -> ca.MX:
         """The velocity at the end: its mean with the velocity at the begin is the mean velocity of the step."""
@@ -97,7 +97,7 @@ class _Middle:
         model, n = system.model, len(system.model.positions.rows)
         middle, end = (system.given(part) for part in ca.horzsplit(factors))
         places, before = system.displacements(q, y, end), begin.x[: system.axes * system.places]
-        moved = system.quantities(q, places, end, begin.near) - begin.x
+        moved = system.quantities(q, places, end, begin.unwrapped) - begin.x
         forces = system.forces(moved / h, 2.0 * (moved / h - begin.rates) / h)
         c, b = 1.0 / h, 2.0 / h**2
         linear, tables = forces[: system.linear], system.tables
@@ -113,40 +113,42 @@ class _Middle:
             if element:
                 loads[0] += ca.reshape(times(system.by_tangent.T, linear), *loads[0].shape)
             function = system.many(_element(group.kind) if element else _between(group.kind), count)
-            data, own = system.data(number, end, begin.near), system.multipliers(number, lam)
-            gradient, stiffness, values, mean, spin = function(q0, u0, q1, u1, data, *loads, own)
+            data, own = system.data(number, end, begin.unwrapped), system.multipliers(number, lam)
+            gradient, stiffness, values, mean, rotation_jacobian = function(q0, u0, q1, u1, data, *loads, own)
             full.append((sides, gradient))
             entries.append(ca.vec(stiffness))
             if element:
                 gaps += times(system.closing, ca.vec(values))
                 signs, chosen = ca.DM(tables.closed.value), tables.closed.entry
-                entries += [picked(ca.vec(part), chosen) * signs for part in (spin, mean)]
+                entries += [picked(ca.vec(part), chosen) * signs for part in (rotation_jacobian, mean)]
                 massive = system.massive_columns
-                coupled += self._inner(system, mean[:, massive], spin[:, massive], c, b)
+                coupled += self._inner(system, mean[:, massive], rotation_jacobian[:, massive], c, b)
             elif group.rows:
                 rows.append(ca.vec(values))
-                entries += [ca.vec(spin), ca.vec(mean)]
+                entries += [ca.vec(rotation_jacobian), ca.vec(mean)]
         observed = []
         for seen, sides, (first, last) in zip(system.masses.observables, system.observed, system.ranges, strict=True):
             count, width = len(seen.data), seen.kind.sizes[2]
             own = ca.reshape(forces[first:last], width, count)
             sides_of = *system.sides(seen, begin.q, before), *system.sides(seen, q, places)
-            nothing, data = ca.MX(0, count), system.seen_data(seen, begin.near)
+            nothing, data = ca.MX(0, count), system.seen_data(seen, begin.unwrapped)
             function = system.many(_between(seen.kind), count)
-            gradient, stiffness, _, mean, spin = function(*sides_of, data, nothing, nothing, own)
+            gradient, stiffness, _, mean, rotation_jacobian = function(*sides_of, data, nothing, nothing, own)
             full.append((sides, gradient))
             entries.append(ca.vec(stiffness))
             weight = b * ca.DM(seen.mass.T) + c * ca.DM(seen.damping.T)
-            observed.append(ca.vec(system.paired(width, mean.shape[1] // count, count)(mean, spin, weight)))
+            observed.append(
+                ca.vec(system.paired(width, mean.shape[1] // count, count)(mean, rotation_jacobian, weight))
+            )
         on_places = times(system.by_place.T, linear) - middle.force
         self.residual = system.gathered(full, on_places, lam[:n, :], [gaps, *rows])
         places_of = [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
         self.entries = [*entries, ca.MX(1), *observed, *coupled, *places_of]
 
     @staticmethod
-    def _inner(system: StageEquations, mean: ca.MX, spin: ca.MX, c: ca.MX, b: ca.MX) -> list[ca.MX]:
+    def _inner(system: StageEquations, mean: ca.MX, rotation_jacobian: ca.MX, c: ca.MX, b: ca.MX) -> list[ca.MX]:
         """What masses within elements add."""
-        return system.hung(mean, spin, c, b) if len(system.massive) else []
+        return system.hung(mean, rotation_jacobian, c, b) if len(system.massive) else []
 
 
 # -- functions of single things, made once a process ---------------------------------------------------
@@ -220,7 +222,7 @@ def _crossed(a: ca.SX, b: ca.SX) -> ca.SX:
 
 @functools.cache
 def _element(element: Element) -> ca.Function:
-    """What :func:`_between` gives of an element: moments, their derivative, chord, mean spins, spins at the end.
+    """What :func:`_between` gives of an element: moments, their derivative, chord, rotation Jacobians (mean, end).
 
     The derivative is that of elastic moments at the mean state, which differs from the exact one by the square of what
     nodes turn in a step; that of all else is exact.
@@ -245,13 +247,16 @@ def _element(element: Element) -> ca.Function:
     work = ca.vertcat(*[_crossed(mean[k], pull[:, k]) for k in range(n)])
     basis = _basis(q1)
     near = ca.mtimes(ca.jacobian(_at_mean(element, q0, q1, stiffness) + work, ca.vec(q1)), basis)
-    mean_spin = ca.jacobian(work, lam).T
+    mean_rotation_jacobian = ca.jacobian(work, lam).T
     gained = sum(
         (now - rest for now, rest in zip(_vectors(element, q1, tangent), ca.horzsplit(tangent), strict=True)),
         ca.SX.zeros(axes),
     )
-    spin = ca.mtimes(ca.jacobian(gained, ca.vec(q1)), basis)
-    results = [ca.densify(part) for part in (ca.vertcat(*moments) + work, near, gained, mean_spin, spin)]
+    rotation_jacobian = ca.mtimes(ca.jacobian(gained, ca.vec(q1)), basis)
+    results = [
+        ca.densify(part)
+        for part in (ca.vertcat(*moments) + work, near, gained, mean_rotation_jacobian, rotation_jacobian)
+    ]
     u0, u1, end = ca.SX.sym("u0", axes, 0), ca.SX.sym("u1", axes, 0), ca.SX.sym("load_end", load_size)
     return ca.Function(f"between_{name_of(element)}", [q0, u0, q1, u1, data, load, end, lam], results)
 
@@ -306,10 +311,10 @@ def _by_relative(values: Callable[[ca.SX], tuple[ca.SX, ca.SX]], q0: ca.SX, q1: 
 
 @functools.cache
 def _between(kind: Term) -> ca.Function:
-    """(q0, u0, q1, u1, data, load, load_end, lam) -> gradient, its derivative, rows at the end, both spins.
+    """(q0, u0, q1, u1, data, load, load_end, lam) -> gradient, its derivative, rows at the end, both Jacobians.
 
-    The gradient is that of ``energy + lam.rows``; spins are the derivatives of the rows, mean ones (rows, width) and
-    those at the end, by rotations about the fixed axes and displacements.
+    The gradient is that of ``energy + lam.rows``; Jacobians are the derivatives of the rows, mean ones (rows, width)
+    and those at the end, by rotations about the fixed axes and displacements.
     """
     turns, places, rows, data_size, loads = kind.sizes
     q0, q1 = ca.SX.sym("q0", kind.components, turns), ca.SX.sym("q1", kind.components, turns)
@@ -321,30 +326,32 @@ def _between(kind: Term) -> ca.Function:
         sides = _sides(q, u)
         return kind.energy(*sides, data, given), ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, data, given))
 
-    def spins(at: ca.SX, moved: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def derivatives(at: ca.SX, moved: ca.SX) -> tuple[ca.SX, ca.SX]:
         q, u = ca.SX.sym("q", *at.shape), ca.SX.sym("u", *moved.shape)
         energy, found = values(q, u, load)
         x, basis = ca.vertcat(ca.vec(q), ca.vec(u)), ca.diagcat(_basis(q), ca.SX.eye(u.numel()))
         results = [ca.mtimes(basis.T, ca.gradient(energy, x)), ca.mtimes(ca.jacobian(found, x), basis)]
-        gradient, spin = ca.substitute(results, [q, u], [at, moved])
-        return gradient, spin
+        gradient, rotation_jacobian = ca.substitute(results, [q, u], [at, moved])
+        return gradient, rotation_jacobian
 
     middle = 0.5 * (q0 + q1), 0.5 * (u0 + u1)
     if kind.space and turns:
         middle = ca.horzcat(*[side / ca.norm_2(side) for side in ca.horzsplit(middle[0])]), middle[1]
     if kind.discrete == "ends":
-        derivative, mean_spin = (0.5 * (a + b) for a, b in zip(spins(q0, u0), spins(q1, u1), strict=True))
+        derivative, mean_rotation_jacobian = (
+            0.5 * (a + b) for a, b in zip(derivatives(q0, u0), derivatives(q1, u1), strict=True)
+        )
     elif kind.discrete == "relative":
-        derivative, mean_spin = _by_relative(lambda q: values(q, u0, load), q0, q1)
+        derivative, mean_rotation_jacobian = _by_relative(lambda q: values(q, u0, load), q0, q1)
     else:
-        derivative, mean_spin = spins(*middle)
+        derivative, mean_rotation_jacobian = derivatives(*middle)
     # Moments that are dead do not change when what they act on turns.
     forces = kind.forces(*_sides(*middle), data, load)
     derivative += ca.vertcat(*forces) if forces else 0.0
-    gradient = derivative + ca.mtimes(mean_spin.T, lam)
+    gradient = derivative + ca.mtimes(mean_rotation_jacobian.T, lam)
     end, of_end = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u1.numel()))
     changed = ca.mtimes(ca.jacobian(gradient, end), of_end)
-    results = [ca.densify(part) for part in (gradient, changed, values(q1, u1, load_end)[1], mean_spin)]
-    spin = ca.densify(ca.mtimes(ca.jacobian(values(q1, u1, load_end)[1], end), of_end))
+    results = [ca.densify(part) for part in (gradient, changed, values(q1, u1, load_end)[1], mean_rotation_jacobian)]
+    rotation_jacobian = ca.densify(ca.mtimes(ca.jacobian(values(q1, u1, load_end)[1], end), of_end))
     arguments = [q0, u0, q1, u1, data, load, load_end, lam]
-    return ca.Function(f"between_{name_of(kind)}", arguments, [*results, spin])
+    return ca.Function(f"between_{name_of(kind)}", arguments, [*results, rotation_jacobian])

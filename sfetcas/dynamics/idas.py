@@ -22,7 +22,7 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.quaternion import angular_velocity
 from ..mechanics.equations import State
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from ..stopping import noted
 from .beginning import at_rest
 from .index_one import LINEAR, IndexOne
@@ -177,9 +177,9 @@ class _Solver:
         self._made: dict[tuple[float, ...], ca.Function] = {}
         tolerance = OF_STEP * FINER**course.rounds * course.accuracy
         rate = USUAL / course.end
-        q, y, w, near = one.states
+        q, y, w, unwrapped = one.states
         a, lam = one.algebraic
-        sizes, tolerances = (q, y, w, near, a, lam), (1.0, course.size, rate, 1.0, rate**2, rate**2)
+        sizes, tolerances = (q, y, w, unwrapped, a, lam), (1.0, course.size, rate, 1.0, rate**2, rate**2)
         absolute = np.repeat(np.array(tolerances) * tolerance, sizes)
         self._options = {
             "reltol": tolerance,
@@ -217,7 +217,7 @@ class _Projection:
 
     def packed(self, state: State, rates: Array) -> Array:
         """A state with its rates as differential unknowns."""
-        return np.concatenate([state.q[self._one.turning].ravel(), state.y, rates, state.wound])
+        return np.concatenate([state.q[self._one.turning].ravel(), state.y, rates, state.unwrapped])
 
     def _spin(self, rates: Array, turn: Array, faster: Array) -> Array:
         """Angular velocities (rotations, turns) of the rates of all unknowns, and of what motions turn."""
@@ -225,20 +225,20 @@ class _Projection:
         unknown, weight = (part[: system.of_places] for part in (system.unknown, system.weight))
         free = np.where(unknown >= 0, weight * rates[unknown], 0.0).reshape(-1, system.turns)
         driven = angular_velocity(turn, faster)[:, 3 - system.turns :]
-        return free + np.where(system.model.rotations.kind[:, None] == Turn.HELD, driven, 0.0)
+        return free + np.where(system.model.rotations.kind[:, None] == RotationFreedom.FIXED, driven, 0.0)
 
     def projected(self, x: Array, piece: _Piece, t: float, p: Array) -> tuple[Array, Sample]:
         """The unknowns and the sample at a time; what norms and closings missed before is kept."""
         one, equations = self._one, self._one.system.equations
-        q, y, w, near = np.split(x, np.cumsum(one.states)[:-1])
+        q, y, w, unwrapped = np.split(x, np.cumsum(one.states)[:-1])
         s = 1.0 if t == piece.end else (t - piece.begin) / piece.length
         loading = one.system.loading(piece.factors(s))
         turned, norm = of_unit_length(q.reshape(len(one.turning), -1))
         rotations = at_rest(equations.model).q
         rotations[one.turning] = turned
-        state = State(rotations, y, np.zeros(equations.rows), near)
+        state = State(rotations, y, np.zeros(equations.rows), unwrapped)
         state, gap = closed(equations, equations.holding(state, loading), loading)
-        state = replace(state, wound=equations.model.winding.angles(state.q, state.wound))
+        state = replace(state, unwrapped=equations.model.unwrapping.angles(state.q, state.unwrapped))
         opening = np.array(one.answers(self.packed(state, w), s, p)[-1]).ravel()
         if equations.rows:
             w = w + shortest(equations, opening)
@@ -246,4 +246,4 @@ class _Projection:
         _, there, v, a, _ = (np.array(part).ravel() for part in one.answers(x, s, p))
         self.norm, self.gap = max(self.norm, norm), max(self.gap, gap)
         spin = self._spin(w, loading.turn, one.system.loading(piece.rates(s)).turn)
-        return x, Sample(t, state.q, state.y, there, v, a, spin, state.wound)
+        return x, Sample(t, state.q, state.y, there, v, a, spin, state.unwrapped)

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.quaternion import product, turned
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from .stages import StageEquations
 
 __all__ = ["LINEAR", "IndexOne"]
@@ -46,10 +46,10 @@ class IndexOne:
     def __init__(self, system: StageEquations, degree: int) -> None:
         self.system, self.degree = system, degree
         model, n = system.model, system.layout
-        self.turning = np.flatnonzero(model.rotations.kind != Turn.HELD)
+        self.turning = np.flatnonzero(model.rotations.kind != RotationFreedom.FIXED)
         self.unknowns = system.equations.unknowns
         self.q_size = n.components * len(self.turning)
-        self.states = [self.q_size, n.y, self.unknowns, n.near]
+        self.states = [self.q_size, n.y, self.unknowns, n.unwrapped]
         self.algebraic = [self.unknowns, n.lam]
         self.parameters = 1 + n.factors * (degree + 1)
 
@@ -62,21 +62,21 @@ class IndexOne:
         columns = np.full(n.rotations, len(self.turning))
         columns[self.turning] = np.arange(len(self.turning))
         q = ca.horzcat(ca.reshape(q, n.components, len(self.turning)), still)[:, columns.tolist()]
-        return self.system.held(q, self.system.given(factors))
+        return self.system.with_prescribed_rotations(q, self.system.given(factors))
 
     @functools.cached_property
     def _seen(self) -> ca.Function:
-        """(place, rate, acceleration, near) -> quantities and gaps with their rates and accelerations."""
+        """(place, rate, acceleration, unwrapped) -> quantities and gaps with their rates and accelerations."""
         system, n = self.system.interpreted, self.system.layout
         size = self.q_size + n.y + n.factors
         at, rate, second = (ca.MX.sym(name, size) for name in ("at", "rate", "second"))
-        near = ca.MX.sym("near", n.near)
+        unwrapped = ca.MX.sym("unwrapped", n.unwrapped)
         q, y, factors = ca.vertsplit(at, np.cumsum([0, self.q_size, n.y, n.factors]).tolist())
         q, given = self._full(q, factors), system.given(factors)
-        seen = ca.vertcat(system.moving(q, y, given, near), system.gaps(q, y, given, near))
+        seen = ca.vertcat(system.moving(q, y, given, unwrapped), system.gaps(q, y, given, unwrapped))
         first = ca.jtimes(seen, at, rate)
         bend = ca.jtimes(first, ca.vertcat(at, rate), ca.vertcat(rate, second))
-        return ca.Function("seen", [at, rate, second, near], [seen, first, bend])
+        return ca.Function("seen", [at, rate, second, unwrapped], [seen, first, bend])
 
     def _curve(self, q: ca.MX, w: ca.MX, a: ca.MX) -> tuple[ca.MX, ca.MX]:
         """First and second derivatives of the rotations."""
@@ -91,23 +91,25 @@ class IndexOne:
 
     @functools.cached_property
     def balance(self) -> ca.Function:
-        """``(q, y, w, near, a, lam, f, f1, f2) ->`` residual of the equations of motion, then accelerations of the
+        """``(q, y, w, unwrapped, a, lam, f, f1, f2) ->`` residual of the equations of motion, then accelerations of the
         constraints.
 
         q rotations, y displacements, w their rates, near the angles that count turns, a accelerations, lam multipliers,
         f, f1, f2 the factors of the loads and their rates; dimensionless.
         """
         system = self.system
-        names = ["q", "y", "w", "near", "a", "lam", "f", "f1", "f2"]
+        names = ["q", "y", "w", "unwrapped", "a", "lam", "f", "f1", "f2"]
         sizes = [*self.states, *self.algebraic, *[system.layout.factors] * 3]
         symbols = [ca.MX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
-        q, y, w, near, a, lam, f, f1, f2 = symbols
+        q, y, w, unwrapped, a, lam, f, f1, f2 = symbols
         n, first = system.layout, slice(0, self.unknowns)
         spin, faster = self._curve(q, w, a)
-        moved = slice(system.equations.turning_unknowns, self.unknowns)
-        seen = self._seen(ca.vertcat(q, y, f), ca.vertcat(spin, w[moved], f1), ca.vertcat(faster, a[moved], f2), near)
+        moved = slice(system.equations.rotation_unknowns, self.unknowns)
+        seen = self._seen(
+            ca.vertcat(q, y, f), ca.vertcat(spin, w[moved], f1), ca.vertcat(faster, a[moved], f2), unwrapped
+        )
         forces = system.forces(seen[1][: n.x], seen[2][: n.x])
-        stage = system.stage(self._full(q, f), y, lam, forces, f, near)
+        stage = system.stage(self._full(q, f), y, lam, forces, f, unwrapped)
         out = ca.vertcat(stage.residual[first], seen[2][n.x :])
         static = system.static_matrix(stage)
         mass, damping = (system.coupling_matrix(stage, *weights)[first, first] for weights in ((0.0, 1.0), (1.0, 0.0)))
@@ -147,7 +149,7 @@ class IndexOne:
         rows = (3 * self.turning[:, None, None] + np.arange(3)[None, None, :]) + np.zeros((1, 4, 1), np.intp)
         columns = np.arange(4 * count).reshape(count, 4, 1) + np.zeros((1, 1, 3), np.intp)
         unknown, weight = system.unknown[rows.ravel()], system.weight[rows.ravel()]
-        size = equations.turning_unknowns
+        size = equations.rotation_unknowns
         places, entry = np.unique(columns.ravel() * size + unknown, return_inverse=True)
         sums = ca.DM.triplet(
             entry.ravel().tolist(), np.arange(entry.size).tolist(), ca.DM(weight), len(places), entry.size
@@ -173,29 +175,29 @@ class IndexOne:
         """The DAE over the fraction of an interval, as :func:`casadi.integrator` takes it: x, z, p, t, ode, alg."""
         x, z = ca.MX.sym("x", sum(self.states)), ca.MX.sym("z", sum(self.algebraic))
         s, p = ca.MX.sym("s"), ca.MX.sym("p", self.parameters)
-        q, y, w, near = ca.vertsplit(x, np.cumsum([0, *self.states]).tolist())
+        q, y, w, unwrapped = ca.vertsplit(x, np.cumsum([0, *self.states]).tolist())
         a, lam = ca.vertsplit(z, np.cumsum([0, *self.algebraic]).tolist())
         factors = self.factors(s, p)
-        rates = ca.vertcat(self._curve(q, w, a)[0], w[self.system.equations.turning_unknowns :], a)
+        rates = ca.vertcat(self._curve(q, w, a)[0], w[self.system.equations.rotation_unknowns :], a)
         rates = ca.vertcat(rates, self._counted(q, w, *factors[:2]))
-        missed = self.balance(q, y, w, near, a, lam, *factors)
+        missed = self.balance(q, y, w, unwrapped, a, lam, *factors)
         return {"x": x, "z": z, "p": p, "t": s, "ode": p[0] * rates, "alg": missed}
 
     @functools.cached_property
     def _counted(self) -> ca.Function:
         """(q, w, f, f1) -> rates of the angles that count turns."""
-        system, n, winding = self.system, self.system.layout, self.system.model.winding
+        system, n, unwrapping = self.system, self.system.layout, self.system.model.unwrapping
         q, w = ca.MX.sym("q", self.q_size), ca.MX.sym("w", self.unknowns)
         f, rate = ca.MX.sym("f", n.factors), ca.MX.sym("f1", n.factors)
-        if not n.near:
+        if not n.unwrapped:
             return ca.Function("counted", [q, w, f, rate], [ca.MX(0, 1)])
         driven = self._full(q, f)
         turned = ca.reshape(ca.jtimes(driven, f, rate), driven.shape)
         still, ground = ca.DM([1.0, 0.0, 0.0, 0.0]), ca.DM.zeros(3)
         spin = ca.horzcat(_spins().map(n.rotations)(driven, turned) + system.spins(w), ground)
-        sides = np.where(winding.sides < 0, n.rotations, winding.sides).T.tolist()
+        sides = np.where(unwrapping.sides < 0, n.rotations, unwrapping.sides).T.tolist()
         here = ca.horzcat(driven, still)[:, sides[0]]
-        rates = _about().map(n.near)(here, ca.DM(winding.axis.T), spin[:, sides[1]] - spin[:, sides[0]])
+        rates = _about().map(n.unwrapped)(here, ca.DM(unwrapping.axis.T), spin[:, sides[1]] - spin[:, sides[0]])
         return ca.Function("counted", [q, w, f, rate], [rates.T])
 
     @functools.cached_property
@@ -203,18 +205,18 @@ class IndexOne:
         """``(x, s, p) ->`` z, quantities, their rates and accelerations, and the rates of the constraints."""
         x, s, p = ca.MX.sym("x", sum(self.states)), ca.MX.sym("s"), ca.MX.sym("p", self.parameters)
         n = self.system.layout
-        q, y, w, near = ca.vertsplit(x, np.cumsum([0, *self.states]).tolist())
+        q, y, w, unwrapped = ca.vertsplit(x, np.cumsum([0, *self.states]).tolist())
         factors = self.factors(s, p)
         z = -ca.solve(self.matrix(x, s, p), self._missed(x, ca.MX.zeros(sum(self.algebraic)), s, p), LINEAR)
         a = z[: self.unknowns]
         spin, faster = self._curve(q, w, a)
-        moved = slice(self.system.equations.turning_unknowns, self.unknowns)
+        moved = slice(self.system.equations.rotation_unknowns, self.unknowns)
         at = (
             ca.vertcat(q, y, factors[0]),
             ca.vertcat(spin, w[moved], factors[1]),
             ca.vertcat(faster, a[moved], factors[2]),
         )
-        seen = self._seen(*at, near)
+        seen = self._seen(*at, unwrapped)
         parts = [z, *(part[: n.x] for part in seen), seen[1][n.x :]]
         return ca.Function("answers", [x, s, p], parts, ["x", "s", "p"], ["z", "quantities", "v", "a", "opening"])
 

@@ -14,7 +14,7 @@ from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, State
 from ..mechanics.load_terms import carried
 from ..mechanics.loading import Loading
-from ..mechanics.terms import by_turning
+from ..mechanics.terms import rotation_gradient
 from .stages import StageEquations
 
 __all__ = ["Inertia"]
@@ -44,7 +44,8 @@ class Inertia:
             self._place(name)
         self._rest /= model.scales.length
         self._batches = [
-            GroupBatch(model, group, by_turning(group.kind), system.angles_of(group)) for group in masses.observables
+            GroupBatch(model, group, rotation_gradient(group.kind), system.angles_of(group))
+            for group in masses.observables
         ]
 
     def _place(self, name: str) -> None:
@@ -135,7 +136,7 @@ class Inertia:
         couple, jump = loading.couple.copy(), loading.jump.copy()
         places = equations.places(state, loading).reshape(system.places, system.axes)
         for group, batch, (begin, end) in zip(self._masses.observables, self._batches, system.ranges, strict=True):
-            shares = -batch(state.q, places, state.wound, None, forces[begin:end])[3]
+            shares = -batch(state.q, places, state.unwrapped, None, forces[begin:end])[3]
             width = system.turns
             for side, turns in enumerate(group.turns.T):
                 used = turns >= 0

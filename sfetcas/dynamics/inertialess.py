@@ -113,6 +113,6 @@ def _without_inertia(equations: Equations, unknowns: Array) -> tuple[str, str]:
             f"'rhoI', or {OTHERS}",
         )
     y, axes = model.positions.Y, model.element.axes
-    moving = np.unique(y.row[np.isin(equations.turning_unknowns + y.column, unknowns)] // axes)
+    moving = np.unique(y.row[np.isin(equations.rotation_unknowns + y.column, unknowns)] // axes)
     names = [*members, *(model.segments.places[i] for i in moving)]
     return f"what turns or moves at {', '.join(names)} has no inertia", OTHERS

@@ -35,7 +35,7 @@ class Memory:
         The quantities that carry mass or are damped, see :mod:`~sfetcas.mechanics.observed`.
     rates : ndarray (kept, quantities)
         Their rates that the method keeps, velocities first.
-    near : ndarray
+    unwrapped : ndarray
         Values of the angles that count turns.
     origin : tuple of ndarray
         Offsets of ``y`` and ``x``, moved along with a structure that flies far, so that no digits are lost.
@@ -49,7 +49,7 @@ class Memory:
     lam: Array
     x: Array
     rates: Array
-    near: Array
+    unwrapped: Array
     origin: tuple[Array, Array] = (np.zeros(1), np.zeros(1))
     last: Taken | None = None
 
@@ -142,7 +142,7 @@ class Stepper:
         shifts = np.zeros((stages, n.y)) if last is None else last.shifts
         ratio = np.array([0.0 if last is None else h / last.h])
         given = (memory.q, memory.y, memory.lam, turns, shifts, memory.x, memory.rates)
-        for i, values in enumerate((*given, ratio, np.array([h]), factors, memory.near)):
+        for i, values in enumerate((*given, ratio, np.array([h]), factors, memory.unwrapped)):
             if values.size:
                 self._batch.set(i, values)
         # Stopped by a matrix without an inverse, a step leaves no numbers.
@@ -151,8 +151,8 @@ class Stepper:
         q, y, lam, turns, shifts, x, rates, size, iterations, gap = (part.ravel().copy() for part in self._batch())
         self.count += 1
         q, lam, x = q.reshape(n.rotations, -1), lam.reshape(stages, n.lam), x.reshape(stages, n.x)
-        near = system.model.winding.angles(q, memory.near) if n.near else memory.near
-        after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), near, memory.origin)
+        unwrapped = system.model.unwrapping.angles(q, memory.unwrapped) if n.unwrapped else memory.unwrapped
+        after = Memory(memory.t + h, q, y, lam[-1], x[-1], rates.reshape(method.kept, n.x), unwrapped, memory.origin)
         change = float(size[0]) if np.isfinite(x).all() else np.inf
         parts = turns.reshape(stages, n.rotations, -1), shifts.reshape(stages, n.y), x, lam
         taken = Taken(memory, after, h, method.places, *parts, change, int(np.nan_to_num(iterations[0])), float(gap[0]))

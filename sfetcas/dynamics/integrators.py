@@ -139,7 +139,7 @@ class Stages(Integrator):
         stepper, method, state = self._stepper, self._stepper.method, begun.state
         rates = np.zeros((method.kept, len(begun.x)))
         rates[0] = begun.v
-        memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.wound)
+        memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped)
         self._sampler = Sampler(course.times, method.stages)
         steps = integrate(
             stepper,

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..mathematics.linear import SparseMap
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from .small_motion import SmallMotion
 
 __all__ = ["Matrices", "matrices_of"]
@@ -73,7 +73,7 @@ def matrices_of(motion: SmallMotion) -> Matrices:
     length, moment = model.scales.length, model.scales.moment
     # Displacements are in units of length.
     unit = np.ones(motion.unknowns)
-    unit[equations.turning_unknowns :] = 1.0 / length
+    unit[equations.rotation_unknowns :] = 1.0 / length
     kinetic = masses.mass * length**2
     parts = {
         "mass": _scaled(motion.mass, kinetic * unit, unit),
@@ -104,9 +104,9 @@ def _names(motion: SmallMotion) -> tuple[str, ...]:
     for name, ends in model.rotations.ends.items():
         for i, turn in enumerate(ends):
             places.setdefault(turn, f"{name} at end {i + 1}")
-    names = [""] * equations.turning_unknowns
+    names = [""] * equations.rotation_unknowns
     for turn, place in places.items():
-        held = model.space and model.rotations.kind[turn] == Turn.AXIS
+        held = model.space and model.rotations.kind[turn] == RotationFreedom.AXIS
         for axis, number in enumerate(equations.number[turn]):
             if number >= 0:
                 about = "its axis" if held else "xyz"[axis + 3 - equations.number.shape[1]]

@@ -100,7 +100,7 @@ class Begin:
     y: ca.MX
     x: ca.MX
     rates: ca.MX
-    near: ca.MX
+    unwrapped: ca.MX
 
 
 class StageMethod(Method):
@@ -117,7 +117,7 @@ class StageMethod(Method):
     def constants(self, begin: Begin, h: ca.MX, factors: ca.MX) -> list[ca.MX]:
         """The relations, and the factors of the loads."""
         given = self.relations(h, begin.rates)
-        return [begin.x, given.v, given.a, given.C, given.B, factors, begin.near]
+        return [begin.x, given.v, given.a, given.C, given.B, factors, begin.unwrapped]
 
 
 @final

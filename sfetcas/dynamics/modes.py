@@ -318,7 +318,7 @@ def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
     corrected = Corrected(motion.state, motion.point, True, 0, 0.0, 0.0, 0.0)
     if free:
         equations = prepared.equations
-        shapes = np.zeros(equations.turning_unknowns), np.zeros(equations.displacement_unknowns)
+        shapes = np.zeros(equations.rotation_unknowns), np.zeros(equations.displacement_unknowns)
         stability = Stability("neutral", 0, 0.0, *shapes)
     else:
         stability = prepared.stability(corrected)
@@ -385,7 +385,7 @@ def _by_rule(motion: SmallMotion, found: Eigenmotions, count: int) -> Eigenmotio
     """The first motions, the shapes of those with the same frequency as :mod:`~sfetcas.solvers.sides` takes them."""
     shapes = found.shapes
     if not np.iscomplexobj(shapes) and len(found.omega):
-        metric = np.append(motion.equations.mass, np.zeros(motion.unknowns - motion.equations.turning_unknowns))
+        metric = np.append(motion.equations.mass, np.zeros(motion.unknowns - motion.equations.rotation_unknowns))
         shapes = Sides(motion.equations).in_groups(found.omega, shapes, metric, 0.0)
     return replace(found, exponents=found.exponents[:count], shapes=shapes[:, :count])
 

@@ -41,11 +41,11 @@ class Mover:
         """The state by name of a dimensionless sample; multipliers balance all forces in least squares."""
         model, equations = self.model, self.equations
         loading = self.inertia.system.loading(self.factors(sample.t))
-        free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.near)
+        free = State(sample.q, sample.y, np.zeros(len(model.row_names)), sample.unwrapped)
         point = equations.at(free, loading)
         forces = self.inertia.forces(sample.v, sample.a)
         balanced = self.inertia.loading(equations, free, equations.effective(free, loading), forces)
-        state = State(sample.q, sample.y, self._multipliers(free, balanced), sample.near)
+        state = State(sample.q, sample.y, self._multipliers(free, balanced), sample.unwrapped)
         kinetic = self.inertia.kinetic(sample.v)
         return MotionState(
             factor=sample.t * self.time,

@@ -42,7 +42,7 @@ class Sample:
         Quantities that carry mass or are damped, and their first and second rates.
     spin : ndarray (rotations, turns)
         Angular velocities about the fixed axes.
-    near : ndarray
+    unwrapped : ndarray
         Angles that count turns.
     """
 
@@ -53,7 +53,7 @@ class Sample:
     v: Array
     a: Array
     spin: Array
-    near: Array
+    unwrapped: Array
 
 
 class Sampler:
@@ -137,7 +137,7 @@ def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -
     near = np.delete(np.arange(len(at)), int(np.abs(at - here).argmax()))
     doubt = np.abs(a - _rates(at[near], here, quantities[near])[1]).max(initial=0.0) if len(at) > 2 else 0.0
     position = middle + (row @ quantities)[0]
-    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, own.after.near)
+    sample = Sample(t, q, (row @ np.array(y))[0], position, v / h, a / h**2, spin, own.after.unwrapped)
     return sample, float(doubt) / h**2
 
 
@@ -157,7 +157,7 @@ def between(samples: Sequence[Sample], t: float) -> Sample:
         return np.tensordot(row, np.array([getattr(sample, part) for sample in samples]), 1)
 
     q = _turned(near.q, np.einsum("n,nra->ra", row, turns))
-    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.near)
+    return Sample(t, q, mean("y"), mean("x"), mean("v"), mean("a"), mean("spin"), near.unwrapped)
 
 
 def _turned(q: Array, turn: Array) -> Array:

@@ -16,7 +16,7 @@ from ..description.scene import Scene
 from ..equilibria.meshing import WHERE, Meshing
 from ..equilibria.quantities import Quantity
 from ..equilibria.settings import Settings
-from ..equilibria.solution import Equilibrium, not_small
+from ..equilibria.solution import Equilibrium, superelement_notes
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.threads import single_threaded
@@ -112,7 +112,7 @@ class Simulation:
     def __init__(self, scene: Scene, settings: Settings, progress: Callable[[float], Any] | None = None) -> None:
         self.given, self.settings, self.progress = scene, settings, progress
         self.scene = moving(scene)
-        self.small = [name for name, member in scene.members.items() if member.type == "small"]
+        self.superelements = [name for name, member in scene.members.items() if member.type == "small"]
         if settings.gauss:
             raise SceneError("integration: found 'gauss', accepted with type 'dynamic': integration at the nodes")
         analysis = scene.analysis
@@ -205,7 +205,7 @@ class Simulation:
         return run
 
     def _refuse_large(self, instant: MotionState) -> None:
-        told = instant.fields.too_large() if self.small else ""
+        told = instant.fields.too_large() if self.superelements else ""
         if told:
             raise SolveError(Status.BENT, f"at {instant.time:.6g} s: {told}")
 
@@ -331,7 +331,7 @@ class Simulation:
             error_estimate=error,
             error_of="" if self.quantity is None else self.quantity.text,
             violation={"norms": run.norm, "closings": run.gap},
-            notes=(*run.notes, *self._unlikely(run), *self._not_small(run)),
+            notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run)),
             failure="" if run.failure is None else run.failure.detail,
         )
         if run.failure is not None:
@@ -340,12 +340,14 @@ class Simulation:
             raise run.failure
         return motion
 
-    def _not_small(self, run: MeshRun) -> tuple[str, ...]:
+    def _superelement_notes(self, run: MeshRun) -> tuple[str, ...]:
         """Notes of small members where they bend most beyond linear elasticity."""
-        if not self.small:
+        if not self.superelements:
             return ()
-        worst = max(run.instants, key=lambda instant: max(map(instant.fields.bent, self.small)), default=None)
-        return () if worst is None else tuple(f"at {worst.time:.6g} s {note}" for note in not_small(worst.fields))
+        worst = max(run.instants, key=lambda instant: max(map(instant.fields.bent, self.superelements)), default=None)
+        return (
+            () if worst is None else tuple(f"at {worst.time:.6g} s {note}" for note in superelement_notes(worst.fields))
+        )
 
     def _unlikely(self, run: MeshRun) -> tuple[str, ...]:
         """Notes where a prescribed step, of which nothing estimates the error, is far too short or too long."""
@@ -419,9 +421,9 @@ def _resistance(system: StageEquations, begun: InitialState) -> Array:
     """Stiffness, masses and closings at the begin."""
     n, state = system.layout, begun.state
     q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
-    factors, near = ca.MX.sym("factors", n.factors), ca.MX.sym("near", n.near)
-    stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, near)
+    factors, unwrapped = ca.MX.sym("factors", n.factors), ca.MX.sym("unwrapped", n.unwrapped)
+    stage = system.stage(q, y, lam, ca.MX.zeros(n.x), factors, unwrapped)
     whole = system.static_matrix(stage) + system.coupling_matrix(stage, 0.0, 1.0)
-    matrix = ca.Function("resistance", [q, y, lam, factors, near], [whole])
+    matrix = ca.Function("resistance", [q, y, lam, factors, unwrapped], [whole])
     # Without loads, which are not yet in balance.
-    return np.array(matrix(state.q.T, state.y, np.zeros(n.lam), np.zeros(n.factors), state.wound))
+    return np.array(matrix(state.q.T, state.y, np.zeros(n.lam), np.zeros(n.factors), state.unwrapped))

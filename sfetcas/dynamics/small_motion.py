@@ -28,15 +28,15 @@ from ..mechanics.batches import GroupBatch
 from ..mechanics.equations import Equations, Point, State, turned_tangents
 from ..mechanics.loading import Loading
 from ..mechanics.masses import masses_of
-from ..mechanics.terms import by_turning
+from ..mechanics.terms import rotation_gradient
 from .stages import StageEquations
 
 __all__ = ["Eigenmotions", "SmallMotion"]
 
-SOFT_ROWS = 1e-14
-"""Softness of rows that may depend on each other, beside entries of the size of one."""
+DUAL_REGULARISATION = 1e-14
+"""Dual regularisation of rows that may depend on each other, beside entries of the size of one."""
 
-HELD_BY_NOTHING = 1e-13
+UNRESISTED = 1e-13
 """Stiffness, over that of the rotation itself, of what neither mass nor stiffness holds, as a straight rod's spin."""
 
 RIGID = 3e-14
@@ -69,7 +69,7 @@ WAVES = 1e-3
 NOTHING = 1e-4
 """Exponents below this may be zeros, of which two that fall together are known to the root of rounding."""
 
-HELD = 1e-4
+ROWS_MISSED = 1e-4
 """Share of a shape by which it may miss the rows: they are a little soft in the factors."""
 
 OWN = 1e-5
@@ -170,13 +170,13 @@ class SmallMotion:
         q = self.state.q
         turned = turned_tangents(model, q).reshape(-1, axes)
         # The derivative of a turned vector by a rotation vector is the cross product with it.
-        spin = -cross_matrix(turned) if model.space else (turned[:, ::-1] * [-1.0, 1.0])[:, :, None]
+        rotation_jacobian = -cross_matrix(turned) if model.space else (turned[:, ::-1] * [-1.0, 1.0])[:, :, None]
         turns = model.element.turns
         points = np.arange(len(turned))
-        row = np.broadcast_to((points[:, None] * axes + np.arange(axes))[:, :, None], spin.shape)
+        row = np.broadcast_to((points[:, None] * axes + np.arange(axes))[:, :, None], rotation_jacobian.shape)
         cells = model.rotations.turns.ravel()[:, None] * turns + np.arange(turns)
-        column = np.broadcast_to(cells[:, None, :], spin.shape)
-        tangents = sparse(row, column, spin, (len(turned) * axes, system.full))
+        column = np.broadcast_to(cells[:, None, :], rotation_jacobian.shape)
+        tangents = sparse(row, column, rotation_jacobian, (len(turned) * axes, system.full))
         # Displacements of the places stand after the rotations in full coordinates.
         width = axes * system.places
         onto = sparse(np.arange(width), system.of_places + np.arange(width), np.ones(width), (width, system.full))
@@ -185,8 +185,8 @@ class SmallMotion:
             parts[0] += ca.mtimes(system.by_tangent, tangents)
         for group, sides in zip(self.masses.observables, system.observed, strict=True):
             rows, n = group.kind.sizes[2], len(group.data)
-            batch = GroupBatch(model, group, by_turning(group.kind), system.angles_of(group))
-            slopes = batch(q, self._nodal, self.state.wound)[5].reshape(n, sides.shape[1], rows)
+            batch = GroupBatch(model, group, rotation_gradient(group.kind), system.angles_of(group))
+            slopes = batch(q, self._nodal, self.state.unwrapped)[5].reshape(n, sides.shape[1], rows)
             r = np.broadcast_to(np.arange(n * rows).reshape(n, 1, rows), slopes.shape)
             c = np.broadcast_to(sides[:, :, None], slopes.shape)
             used = c >= 0
@@ -259,7 +259,7 @@ class SmallMotion:
         found = np.abs(inverse) > VANISHING * np.abs(inverse).max(initial=0.0)
         # Where nothing with mass can move, rounding of the rows is all that is left.
         missed = np.abs(self._missed(shapes)).max(axis=0) if self.equations.rows else np.zeros(len(inverse))
-        found &= missed <= HELD * np.abs(shapes).max(axis=0, initial=TINY)
+        found &= missed <= ROWS_MISSED * np.abs(shapes).max(axis=0, initial=TINY)
         return shift + 1.0 / inverse[found], shapes[:, found], exhausted or not found.all()
 
     def _missed(self, shapes: Array) -> Array:
@@ -331,11 +331,11 @@ class SmallMotion:
         where, k, m, c = self._entries
         solver, diagonal = where
         entries = k + mass * m + damping * c
-        entries[diagonal[: self.unknowns]] += HELD_BY_NOTHING * self.equations.noise[: self.unknowns]
+        entries[diagonal[: self.unknowns]] += UNRESISTED * self.equations.noise[: self.unknowns]
         # Beside rows of the size of one: loads may make the stiffness as large as any number.
         self._size = float(np.abs(entries[self._inside]).max(initial=TINY))
         entries[self._inside] /= self._size
-        entries[diagonal[self.unknowns :]] -= SOFT_ROWS
+        entries[diagonal[self.unknowns :]] -= DUAL_REGULARISATION
         solver.factor(entries)
 
     def _solved(self, block: Array) -> Array:
@@ -366,7 +366,7 @@ class SmallMotion:
             found.append(entries)
         self._inside = np.flatnonzero((row < self.unknowns) & (column < self.unknowns))
         solver = SparseSolver(
-            total, row, column, equations.rows, symmetric=self.symmetric and self.model.spinning is None
+            total, row, column, equations.rows, symmetric=self.symmetric and self.model.rotating_frame is None
         )
         return (solver, np.flatnonzero(row == column)), found[0], found[1], found[2] + found[3]
 

@@ -26,7 +26,7 @@ from ..mathematics.linear import pattern, places_of
 from ..mechanics.expressions import Given, moved_by
 from ..mechanics.stationarity import Forces, Stationarity, summed
 from ..mechanics.tables import Pattern
-from ..mechanics.terms import by_turning
+from ..mechanics.terms import rotation_gradient
 from .system import System
 
 __all__ = ["StageEquations"]
@@ -38,22 +38,22 @@ class StageEquations(System):
     def iteration(self, stages: int) -> ca.Function:
         """One Newton iteration of all stages of a step.
 
-        ``(q, y, lam, x0, v, a, C, B, factors, near) -> (q, y, lam, size)``: q (components, rotations * stages), y, lam,
-        v, a and factors with a column for each stage, C and B (stages, stages); ``size`` is the largest rotation or
-        displacement by which anything changed.
+        ``(q, y, lam, x0, v, a, C, B, factors, unwrapped) -> (q, y, lam, size)``: q (components, rotations * stages), y,
+        lam, v, a and factors with a column for each stage, C and B (stages, stages); ``size`` is the largest rotation
+        or displacement by which anything changed.
         """
         n = self.layout
         q = ca.MX.sym("q", n.components, n.rotations * stages)
         y, lam = ca.MX.sym("y", n.y, stages), ca.MX.sym("lam", n.lam, stages)
         x0, v, a = ca.MX.sym("x0", n.x), ca.MX.sym("v", n.x, stages), ca.MX.sym("a", n.x, stages)
         c, b = ca.MX.sym("C", stages, stages), ca.MX.sym("B", stages, stages)
-        factors, near = ca.MX.sym("factors", n.factors, stages), ca.MX.sym("near", n.near)
+        factors, unwrapped = ca.MX.sym("factors", n.factors, stages), ca.MX.sym("unwrapped", n.unwrapped)
         parts = ca.horzsplit(q, n.rotations)
         given = [self.given(factors[:, i]) for i in range(stages)]
-        x = ca.horzcat(*[self.moving(parts[i], y[:, i], given[i], near) - x0 for i in range(stages)])
+        x = ca.horzcat(*[self.moving(parts[i], y[:, i], given[i], unwrapped) - x0 for i in range(stages)])
         rates, accelerations = ca.mtimes(x, c.T) + v, ca.mtimes(x, b.T) + a
         forces = self.forces(rates, accelerations)
-        found = [_Stage(self, parts[i], y[:, i], lam[:, i], forces[:, i], given[i], near) for i in range(stages)]
+        found = [_Stage(self, parts[i], y[:, i], lam[:, i], forces[:, i], given[i], unwrapped) for i in range(stages)]
         entries = [stage.entries for stage in found]
         for i, one in enumerate(found):
             entries += [one.coupled(other, c[i, j], b[i, j]) for j, other in enumerate(found)]
@@ -62,8 +62,8 @@ class StageEquations(System):
         step = self.solved(entries, inertia, ca.horzcat(*[stage.residual for stage in found]))
         turned, shift, more, size = self.moved(parts, step)
         results = [ca.horzcat(*turned), y + shift, lam + more, size]
-        names = ["q", "y", "lam", "x0", "v", "a", "C", "B", "factors", "near"]
-        arguments = [q, y, lam, x0, v, a, c, b, factors, near]
+        names = ["q", "y", "lam", "x0", "v", "a", "C", "B", "factors", "unwrapped"]
+        arguments = [q, y, lam, x0, v, a, c, b, factors, unwrapped]
         return ca.Function(f"iteration_{stages}", arguments, results, names, ["q_next", "y_next", "lam_next", "size"])
 
     def solved(self, entries: list[ca.MX], inertia: list[ca.MX], residual: ca.MX) -> ca.MX:
@@ -75,8 +75,8 @@ class StageEquations(System):
         """
         stages = residual.shape[1]
         system = self._system(stages)
-        soft = [-SOFT_CLOSINGS / part for part in inertia]
-        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *soft)))
+        dual = [-DUAL_REGULARISATION / part for part in inertia]
+        matrix = ca.MX(system.pattern, ca.mtimes(system.sums, ca.vertcat(*entries, *dual)))
         left = ca.vec(residual.T)
         # Entries differ by the square of the step: none is too small to divide by.
         found = ca.solve(matrix, left[system.order], "qr", {"eps": 1e-300})
@@ -84,17 +84,17 @@ class StageEquations(System):
 
     def moved(self, q: list[ca.MX], step: ca.MX) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX]:
         """Rotations of all stages after a step, changes of displacements and multipliers, and the largest movement."""
-        turning, unknowns = self.equations.turning_unknowns, self.equations.unknowns
+        rotation_unknowns, unknowns = self.equations.rotation_unknowns, self.equations.unknowns
         there, size = [], ca.MX(0)
         for i, part in enumerate(q):
             spin = self.spins(step[:, i])
             there.append(moved_by(self, part, spin))
-            size = ca.fmax(size, ca.norm_inf(ca.vertcat(0.0, ca.vec(spin), step[turning:unknowns, i])))
-        return there, step[turning:unknowns, :], step[unknowns:, :], size
+            size = ca.fmax(size, ca.norm_inf(ca.vertcat(0.0, ca.vec(spin), step[rotation_unknowns:unknowns, i])))
+        return there, step[rotation_unknowns:unknowns, :], step[unknowns:, :], size
 
-    def stage(self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, factors: ca.MX, near: ca.MX) -> _Stage:
+    def stage(self, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, factors: ca.MX, unwrapped: ca.MX) -> _Stage:
         """Residual and matrix entries of a stage for given inertia and damping forces."""
-        return _Stage(self, q, y, lam, forces, self.given(factors), near)
+        return _Stage(self, q, y, lam, forces, self.given(factors), unwrapped)
 
     def static_matrix(self, stage: _Stage) -> ca.MX:
         """Derivative (total, total) of a stage's residual by its unknowns for given inertia and damping forces."""
@@ -135,8 +135,8 @@ class StageEquations(System):
         return Pattern(found, sums, np.argsort(back).tolist(), back.tolist())
 
 
-SOFT_CLOSINGS = 1e-10
-"""Softness of closings in the matrix over the inverse of what resists them, the whole mass being one."""
+DUAL_REGULARISATION = 1e-10
+"""Dual regularisation of closings in the matrix over the inverse of what resists them, the whole mass being one."""
 
 
 class StagePlaces:
@@ -173,38 +173,40 @@ class _Stage:
     """Residual and entries of one stage at given inertia and damping forces."""
 
     def __init__(
-        self, system: StageEquations, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, given: Given, near: ca.MX
+        self, system: StageEquations, q: ca.MX, y: ca.MX, lam: ca.MX, forces: ca.MX, given: Given, unwrapped: ca.MX
     ) -> None:
         self._system = system
         # What acts along the elements: loads, internal forces, inertia.
         linear = forces[: system.linear]
         further = Forces(times(system.by_place.T, linear), times(system.by_tangent.T, linear))
         places = system.displacements(q, y, given)
-        static = Stationarity(system, q, y, lam, given, near, further)
+        static = Stationarity(system, q, y, lam, given, unwrapped, further)
         entries, shares = static.entries, []
-        self._spin = static.spin[:, system.massive_columns]
-        self._spins = []
+        self._rotation_jacobian = static.rotation_jacobian[:, system.massive_columns]
+        self._rotation_jacobians = []
         observables = zip(system.masses.observables, system.observed, system.ranges, strict=True)
         for observed, sides, (begin, end) in observables:
             n, count = len(observed.data), observed.kind.sizes[2]
             own = ca.reshape(forces[begin:end], count, n)
-            data = *system.sides(observed, q, places), system.seen_data(observed, near)
-            found = system.many(by_turning(observed.kind), n)(*data, ca.MX(0, n), own)
+            data = *system.sides(observed, q, places), system.seen_data(observed, unwrapped)
+            found = system.many(rotation_gradient(observed.kind), n)(*data, ca.MX(0, n), own)
             shares.append((sides, found[3]))
             entries.append(ca.vec(found[4]))
-            self._spins.append(found[5])
+            self._rotation_jacobians.append(found[5])
         self.residual = static.gathered(shares)
         self.entries = ca.vertcat(*entries, ca.MX(1))
 
     def coupled(self, other: _Stage, c: ca.MX, b: ca.MX) -> ca.MX:
         """Entries of this stage's residual by the quantities of another one."""
         system, entries = self._system, []
-        for group, mine, its in zip(system.masses.observables, self._spins, other._spins, strict=True):
+        for group, mine, its in zip(
+            system.masses.observables, self._rotation_jacobians, other._rotation_jacobians, strict=True
+        ):
             n = len(group.data)
             weight = b * ca.DM(group.mass.T) + c * ca.DM(group.damping.T)
             entries.append(ca.vec(system.paired(group.kind.sizes[2], mine.shape[1] // n, n)(mine, its, weight)))
         if len(system.massive):
-            entries += system.hung(self._spin, other._spin, c, b)
+            entries += system.hung(self._rotation_jacobian, other._rotation_jacobian, c, b)
         entries += [b * system.place_mass.nz[:], c * system.place_drag.nz[:]]
         if system.crossing is not None:
             entries += self._turning(other, c)
@@ -215,13 +217,15 @@ class _Stage:
         system, entries = self._system, []
         assert system.crossing is not None
         cross = ca.DM(system.crossing)
-        for group, mine, its in zip(system.masses.observables, self._spins, other._spins, strict=True):
+        for group, mine, its in zip(
+            system.masses.observables, self._rotation_jacobians, other._rotation_jacobians, strict=True
+        ):
             n = len(group.data)
             turned_its = ca.mtimes(ca.DM(system.turned_rows(group)), its)
             function = system.paired(group.kind.sizes[2], mine.shape[1] // n, n)
             entries.append(ca.vec(function(mine, turned_its, c * ca.DM(group.mass.T))))
         if len(system.massive):
-            of_mass = system.hung(self._spin, ca.mtimes(cross, other._spin), ca.MX(0), c)
-            across = system.hung(ca.mtimes(cross.T, self._spin), other._spin, ca.MX(0), c)
+            of_mass = system.hung(self._rotation_jacobian, ca.mtimes(cross, other._rotation_jacobian), ca.MX(0), c)
+            across = system.hung(ca.mtimes(cross.T, self._rotation_jacobian), other._rotation_jacobian, ca.MX(0), c)
             entries += [of_mass[0], across[1], of_mass[2]]
         return [*entries, c * ca.DM(np.outer(system.place_weights[2], cross.full()).ravel())]

@@ -26,7 +26,7 @@ LAST_CHANGE = 1e-8
 def step_function(system: StageEquations, method: Method) -> ca.Function:
     """A step of a method.
 
-    ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, near) -> (q, y, lam, turns, shifts, x, rates, size,
+    ``(q, y, lam, turns, shifts, x, rates, ratio, h, factors, unwrapped) -> (q, y, lam, turns, shifts, x, rates, size,
     iterations, gap)``: before and after the step rotations q (components, rotations), displacements y, multipliers lam,
     quantities x and their rates (quantities, kept); of its stages rotation vectors turns (turns, rotations * stages)
     since its begin and shifts (displacements, stages); ``ratio`` is its length h over that of the step before, 0 for a
@@ -38,20 +38,20 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
     turns, shifts = ca.MX.sym("turns", system.turns, n.rotations * s), ca.MX.sym("shifts", n.y, s)
     x, rates = ca.MX.sym("x", n.x), ca.MX.sym("rates", n.x, method.kept)
     ratio, h = ca.MX.sym("ratio"), ca.MX.sym("h")
-    loads, near = ca.MX.sym("factors", n.factors, len(method.loaded)), ca.MX.sym("near", n.near)
+    loads, unwrapped = ca.MX.sym("factors", n.factors, len(method.loaded)), ca.MX.sym("unwrapped", n.unwrapped)
     factors = loads[:, len(method.loaded) - s :]
     onward = _onward(tuple(method.places))(ratio)
     # Turns and shifts so far go on along the polynomials of the last step.
     spins = ca.horzsplit(turns, n.rotations)
     first = [sum((onward[i, j] * spins[j] for j in range(1, s)), onward[i, 0] * spins[0]) for i in range(s)]
     given = [system.given(factors[:, i]) for i in range(s)]
-    begin = [system.held(moved_by(system, q, first[i]), given[i]) for i in range(s)]
+    begin = [system.with_prescribed_rotations(moved_by(system, q, first[i]), given[i]) for i in range(s)]
     guess = [ca.horzcat(*begin), ca.repmat(y, 1, s) + ca.mtimes(shifts, onward.T), ca.repmat(lam, 1, s)]
-    constants = method.constants(Begin(q, y, x, rates, near), h, loads)
+    constants = method.constants(Begin(q, y, x, rates, unwrapped), h, loads)
     newton = _newton(method.iteration(system), polished=method.polished)
     stages, moved, multipliers, size, count = newton(*guess, *constants)
     parts = ca.horzsplit(stages, n.rotations)
-    there = ca.horzcat(*[system.moving(parts[i], moved[:, i], given[i], near) for i in range(s)])
+    there = ca.horzcat(*[system.moving(parts[i], moved[:, i], given[i], unwrapped) for i in range(s)])
     results = [
         parts[-1],
         moved[:, -1],
@@ -62,10 +62,10 @@ def step_function(system: StageEquations, method: Method) -> ca.Function:
         method.after(h, rates, there - ca.repmat(x, 1, s)),
         size,
         count,
-        ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], given[-1], near))),
+        ca.norm_inf(ca.vertcat(0.0, system.gaps(parts[-1], moved[:, -1], given[-1], unwrapped))),
     ]
-    names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "near"]
-    arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, loads, near]
+    names = ["q", "y", "lam", "turns", "shifts", "x", "rates", "ratio", "h", "factors", "unwrapped"]
+    arguments = [q, y, lam, turns, shifts, x, rates, ratio, h, loads, unwrapped]
     out = [
         "q_next",
         "y_next",

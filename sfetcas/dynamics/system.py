@@ -125,21 +125,25 @@ class System(Expressions):
 
     @functools.cached_property
     def _rates(self) -> ca.Function:
-        """(q, y, factors, near, step) -> quantities, and their derivative along a step of the unknowns."""
+        """(q, y, factors, unwrapped, step) -> quantities, and their derivative along a step of the unknowns."""
         n = self.layout
         q, y = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y)
-        factors, near, step = ca.MX.sym("factors", n.factors), ca.MX.sym("near", n.near), ca.MX.sym("step", self.total)
+        factors, unwrapped, step = (
+            ca.MX.sym("factors", n.factors),
+            ca.MX.sym("unwrapped", n.unwrapped),
+            ca.MX.sym("step", self.total),
+        )
         along = ca.MX.sym("along")
         spin = self.spins(along * step)
-        shift = along * step[self.equations.turning_unknowns : self.equations.unknowns]
-        x = self.moving(moved_by(self, q, spin), y + shift, self.given(factors), near)
+        shift = along * step[self.equations.rotation_unknowns : self.equations.unknowns]
+        x = self.moving(moved_by(self, q, spin), y + shift, self.given(factors), unwrapped)
         rate = ca.substitute([x, ca.jtimes(x, along, ca.MX(1))], [along], [ca.MX(0)])
-        return ca.Function("rates", [q, y, factors, near, step], rate)
+        return ca.Function("rates", [q, y, factors, unwrapped, step], rate)
 
     def rates(self, state: State, factors: Array, step: Array) -> tuple[Array, Array]:
         """Quantities (quantities,) at a state, and their rates for the rates ``step`` (unknowns,) of the unknowns."""
         full = np.concatenate([step, np.zeros(self.equations.rows)])
-        x, v = self.interpreted._rates(state.q.T, state.y, factors, state.wound, full)
+        x, v = self.interpreted._rates(state.q.T, state.y, factors, state.unwrapped, full)
         return np.array(x).ravel(), np.array(v).ravel()
 
     @functools.cached_property
@@ -149,14 +153,16 @@ class System(Expressions):
         None where the ground restrains anything, or where the position matters, as in rotating axes.
         """
         positions, axes = self.model.positions, self.axes
-        grounded = any((group.places < 0).any() for group in self.model.connections) or self.model.spinning is not None
+        grounded = (
+            any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
+        )
         if grounded or positions.Y.shape[0] != len(positions.Y.value):
             return None
         y = np.zeros((self.layout.y, axes))
         y[positions.Y.column, positions.Y.row % axes] = positions.Y.value
         if any(np.abs(positions.W @ column).max(initial=0.0) > 0.0 for column in y.T):
             return None
-        q, flat = ca.DM.ones(self.layout.components, self.layout.rotations), np.zeros(self.layout.near)
+        q, flat = ca.DM.ones(self.layout.components, self.layout.rotations), np.zeros(self.layout.unwrapped)
         if self.model.space:
             q[1:, :] = 0
         arguments = [ca.MX.sym("y", self.layout.y)]
@@ -201,30 +207,30 @@ class System(Expressions):
         blocks = self.many(arms_product(self.axes, self.turns, self.points), len(self.massive))
         return [ca.vec(blocks(mine, its, shares)), ca.vec(mine) * first, ca.vec(its) * first]
 
-    def quantities(self, q: ca.MX, places: ca.MX, given: Given, near: ca.MX) -> ca.MX:
+    def quantities(self, q: ca.MX, places: ca.MX, given: Given, unwrapped: ca.MX) -> ca.MX:
         """All quantities X (quantities,) from rotations and displacements of the places."""
         parts = [times(self.by_place, places)]
         if self.elements:
             parts[0] += times(self.by_tangent, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
         for group in self.masses.observables:
             n = len(group.data)
-            sides = *self.sides(group, q, places), self.seen_data(group, near)
+            sides = *self.sides(group, q, places), self.seen_data(group, unwrapped)
             parts.append(ca.vec(self.many(rows_of(group.kind), n)(*sides, ca.MX(0, n))))
         return ca.vertcat(*parts)
 
-    def moving(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> ca.MX:
+    def moving(self, q: ca.MX, y: ca.MX, given: Given, unwrapped: ca.MX) -> ca.MX:
         """All quantities X (quantities,) from rotations and displacement unknowns."""
-        return self.quantities(q, self.displacements(q, y, given), given, near)
+        return self.quantities(q, self.displacements(q, y, given), given, unwrapped)
 
     def angles_of(self, group: Observables) -> Index | None:
         """Numbers of the turn-counting angles that belong to a group of observables; None where it has none."""
-        part = None if group.spring is None else self.model.winding.parts[group.spring]
+        part = None if group.spring is None else self.model.unwrapping.parts[group.spring]
         return None if part is None or group.numbers is None else part.start + group.numbers
 
-    def seen_data(self, group: Observables, near: ca.MX) -> ca.MX:
+    def seen_data(self, group: Observables, unwrapped: ca.MX) -> ca.MX:
         """Data of a group of observables; of those that count turns the last row is the value near which they do."""
         data, counted = ca.MX(ca.DM(group.data.T)), self.angles_of(group)
-        return data if counted is None else ca.vertcat(data[:-1, :], near[counted.tolist()].T)
+        return data if counted is None else ca.vertcat(data[:-1, :], unwrapped[counted.tolist()].T)
 
     # -- one Newton iteration ---------------------------------------------------------------------------
 
@@ -243,9 +249,9 @@ class System(Expressions):
     @functools.cached_property
     def crossing(self) -> Array | None:
         """Matrix (axes, axes) of ``2 Omega x``, dimensionless, in rotating axes; None in fixed ones."""
-        if self.model.spinning is None:
+        if self.model.rotating_frame is None:
             return None
-        return cross_matrix(2.0 * self.model.spinning.omega)[: self.axes, : self.axes]
+        return cross_matrix(2.0 * self.model.rotating_frame.omega)[: self.axes, : self.axes]
 
     @functools.cached_property
     def coriolis(self) -> ca.DM | None:

@@ -19,7 +19,7 @@ from .quantities import WHERE, Quantity
 from .settings import Settings
 from .solution import Equilibrium
 
-__all__ = ["PILOT_ELEMENTS", "WHERE", "Found", "Meshing"]
+__all__ = ["PILOT_ELEMENTS", "WHERE", "EquilibriumResult", "Meshing"]
 
 FINE = 1e-8
 """Below this accuracy elements of order 6 need fewer unknowns than those of order 4 (measured)."""
@@ -32,7 +32,7 @@ PILOT_ORDER = 4
 
 
 @dataclass
-class Found:
+class EquilibriumResult:
     """An equilibrium in the course of an analysis, with the model that it belongs to.
 
     Attributes
@@ -78,7 +78,7 @@ class Meshing:
         The mesh wanted, and the one on which the first equilibrium is found.
     fixed : set of str
         Members whose number of elements is prescribed.
-    leave, small : bool
+    switch_branch, has_superelements : bool
         Whether unstable equilibria are left for stable ones; whether there are small members.
     """
 
@@ -91,8 +91,8 @@ class Meshing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
-        self.leave = scene.analysis.unstable == "leave"
-        self.small = any(member.type == "small" for member in scene.members.values())
+        self.switch_branch = scene.analysis.unstable == "leave"
+        self.has_superelements = any(member.type == "small" for member in scene.members.values())
         self._choose_meshes()
         # Where the mesh is the library's own, its default accuracy is a promise as well.
         self.asked = self.asked or not self.fixed

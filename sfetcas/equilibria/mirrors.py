@@ -18,7 +18,7 @@ from ..mechanics.equations import State
 from ..mechanics.fields import rotations_along
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 
@@ -106,13 +106,13 @@ def mirrored(model: Model, state: State, mirror: Mirror) -> State:
         q[model.chain(name)] = values
     if model.space:
         _onto_axes(model, q)
-    nothing = {name: np.zeros_like(getattr(state, name)) for name in ("y", "lam", "wound")}
+    nothing = {name: np.zeros_like(getattr(state, name)) for name in ("y", "lam", "unwrapped")}
     return replace(state, q=q, **nothing)
 
 
 def _onto_axes(model: Model, q: Array) -> None:
     """Leave of rotations about held axes what is about these, in place: nothing else would bring them back."""
-    about = np.flatnonzero(model.rotations.kind == Turn.AXIS)
+    about = np.flatnonzero(model.rotations.kind == RotationFreedom.AXIS)
     axis = model.rotations.axis[about]
     q[about, 1:] = (q[about, 1:] * axis).sum(axis=1, keepdims=True) * axis
     size = np.linalg.norm(q[about], axis=1, keepdims=True)

@@ -25,7 +25,7 @@ from ..solvers.redundancy import loose_rows, named_in, stretched
 from ..solvers.residuals import LEAST_SCALE, relative_residual
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
 from ..solvers.stability import LIGHT, Stability
-from .meshing import Found, Meshing
+from .meshing import EquilibriumResult, Meshing
 from .mirrors import has_twin
 from .single import finished, unjudged
 from .solution import Equilibrium, refuse_large
@@ -71,7 +71,7 @@ TURN_LOST = 1.5
 COARSE = 0.1
 """Share of the largest section moment by which moments of two meshes may differ without a note."""
 
-HELD = 2e-9
+RESISTED = 2e-9
 """Eigenvalues above this, in those of the softest member, and above rounding hold a mechanism, if barely."""
 
 CARRIED = 1e-6
@@ -80,11 +80,11 @@ CARRIED = 1e-6
 LARGE = 1e3
 """Multipliers over the loads above which that is looked at."""
 
-ESCAPED = "along its escape shape"
+ALONG_MODE = "along its unstable mode"
 """What notes say of unstable states that were left."""
 
 TWIN = (
-    "its mirror image is an equilibrium as well; which of the two is a rule: the escape shape turns the first ends of "
+    "its mirror image is an equilibrium as well; which of the two is a rule: the unstable mode turns the first ends of "
     "members towards +z, in space +b3, the first names in the alphabet most"
 )
 """What is said where the energy does not tell one side from the other."""
@@ -102,7 +102,7 @@ class Refinement:
     def __init__(self, meshes: Meshing) -> None:
         self.meshes = meshes
 
-    def onto(self, mesh: Mesh, source: Found, factor: float) -> Found:
+    def onto(self, mesh: Mesh, source: EquilibriumResult, factor: float) -> EquilibriumResult:
         """The equilibrium carried over to another mesh and corrected there by Newton's method.
 
         Raises
@@ -147,7 +147,7 @@ class Refinement:
         held = prepared.correct(state, loading, iterations=25, most=1.5, flat=still)
         return held if held.converged else near
 
-    def refined(self, pilot: Found, factor: float) -> Equilibrium:
+    def refined(self, pilot: EquilibriumResult, factor: float) -> Equilibrium:
         """The answer that is found on a pilot mesh, on one that is fine enough.
 
         Raises
@@ -161,7 +161,7 @@ class Refinement:
                 _with_unique_reactions(pilot, pilot.prepared.model.loading(factor))
             # What nothing holds on a coarse mesh no finer one holds.
             _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
-        if self.meshes.small:
+        if self.meshes.has_superelements:
             refuse_large(Fields(pilot.prepared.equations, pilot.corrected.state, pilot.prepared.model.loading(factor)))
         if self.meshes.prescribed:
             return self._on_target(pilot, factor)
@@ -194,19 +194,19 @@ class Refinement:
         difference, error = self._difference(now, finer, factor)
         return self._answer(finer, factor, max(error, self._of_fixed(finer, factor)), difference)
 
-    def _of_fixed(self, now: Found, factor: float) -> float:
+    def _of_fixed(self, now: EquilibriumResult, factor: float) -> float:
         """What members contribute whose number of elements is asked for, and which the halving left as they were."""
         if not self.meshes.fixed:
             return 0.0
         return sum(self._difference(now, self.onto(now.prepared.model.mesh.refined(), now, factor), factor))
 
-    def halved(self, now: Found) -> Mesh:
+    def halved(self, now: EquilibriumResult) -> Mesh:
         """The mesh with all elements halved, but those of members whose number of elements is prescribed."""
         cuts = now.prepared.model.mesh.cuts
         marks = {n: np.full(len(c) - 1, n not in self.meshes.fixed) for n, c in cuts.items()}
         return now.prepared.model.mesh.refined(marks)
 
-    def _on_target(self, pilot: Found, factor: float) -> Equilibrium:
+    def _on_target(self, pilot: EquilibriumResult, factor: float) -> Equilibrium:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.meshes.target
         if mesh.elements > HUGE:
@@ -222,7 +222,7 @@ class Refinement:
         error = sum(self._difference(now, finer, factor))
         return self._answer(_with_coarse_moments(now, finer, factor), factor, error)
 
-    def _onto_target(self, pilot: Found, factor: float) -> Found:
+    def _onto_target(self, pilot: EquilibriumResult, factor: float) -> EquilibriumResult:
         """The same on the mesh that is asked for.
 
         Raises
@@ -246,30 +246,32 @@ class Refinement:
             raise SolveError(Status.FAILED, detail, now.corrected.state)
         return now
 
-    def _answer(self, found: Found, factor: float, error: float, halved: float | None = None) -> Equilibrium:
+    def _answer(
+        self, found: EquilibriumResult, factor: float, error: float, halved: float | None = None
+    ) -> Equilibrium:
         """The answer with its estimated error, and how far it is from that on half the elements."""
         prepared = found.prepared
         found = _with_unique_reactions(found, prepared.model.loading(factor))
         stability = prepared.stability(found.corrected)
         loading = prepared.model.loading(factor)
-        _refuse_wound(prepared, found.corrected)
+        _refuse_many_turns(prepared, found.corrected)
         self._refuse_torn(found, loading)
         if not found.kept:
             _refuse_free(prepared, found.corrected, stability)
         if (
             stability.negative > 0
-            and self.meshes.leave
-            and prepared.leaves
+            and self.meshes.switch_branch
+            and prepared.switches_branch
             and not found.kept
             and KEPT not in found.notes
         ):
-            corrected, stability = prepared.leave(found.corrected.state, stability, loading)
+            corrected, stability = prepared.switch_branch(found.corrected.state, stability, loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             notes, way = (*found.notes, note), (*found.way, "left")
             found = replace(found, corrected=corrected, stability=stability, notes=notes, way=way)
             # The error was that of the state that was left.
             error = sum(self._difference(found, self.onto(prepared.model.mesh.refined(), found, factor), factor))
-        if any(ESCAPED in note for note in found.notes) and has_twin(prepared, found.corrected, loading):
+        if any(ALONG_MODE in note for note in found.notes) and has_twin(prepared, found.corrected, loading):
             found = replace(found, notes=(*found.notes, TWIN))
         return finished(
             prepared,
@@ -285,7 +287,7 @@ class Refinement:
             way=found.way,
         )
 
-    def _refuse_torn(self, found: Found, loading: Loading) -> None:
+    def _refuse_torn(self, found: EquilibriumResult, loading: Loading) -> None:
         """Refuse rotations that jump within an element, however short: a full turn there bends no beam.
 
         Between q and -q elements pass by without a place moved or, at their nodes, a moment: no estimate sees it.
@@ -303,7 +305,7 @@ class Refinement:
                 detail = f"an equilibrium of the mesh only: member {name!r} turns by a jump within an element"
                 raise SolveError(Status.FAILED, detail, found.corrected.state)
 
-    def _difference(self, coarse: Found, fine: Found, factor: float) -> tuple[float, float]:
+    def _difference(self, coarse: EquilibriumResult, fine: EquilibriumResult, factor: float) -> tuple[float, float]:
         """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
         one, other = (
             unjudged(found.prepared, found.corrected, found.prepared.model.loading(factor), factor)
@@ -311,19 +313,19 @@ class Refinement:
         )
         return self.meshes.judged(one, other)
 
-    def _marked(self, found: Found, loading: Loading, smooth: float) -> dict[str, Array]:
+    def _marked(self, found: EquilibriumResult, loading: Loading, smooth: float) -> dict[str, Array]:
         """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""
         rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
         model = found.prepared.model
         return {n: rough[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members}
 
 
-def more_than(mesh: Mesh, source: Found) -> str:
+def more_than(mesh: Mesh, source: EquilibriumResult) -> str:
     """The advice to take more elements, where fewer were asked for than an equilibrium was found on."""
     return ": take more" if mesh.elements < source.prepared.model.mesh.elements else ""
 
 
-def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:
+def _with_coarse_moments(now: EquilibriumResult, finer: EquilibriumResult, factor: float) -> EquilibriumResult:
     """The same, with a note where section moments are far from those on half the elements, wherever positions are."""
     sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (now, finer)]
     most = apart = 0.0
@@ -338,7 +340,7 @@ def _with_coarse_moments(now: Found, finer: Found, factor: float) -> Found:
     return replace(now, notes=(*now.notes, f"section moments differ {share} from those on half the elements asked for"))
 
 
-def _refuse_wound(prepared: Prepared, found: Corrected) -> None:
+def _refuse_many_turns(prepared: Prepared, found: Corrected) -> None:
     """Refuse angles that count so many turns that rounding leaves little of where they point.
 
     Raises
@@ -347,7 +349,7 @@ def _refuse_wound(prepared: Prepared, found: Corrected) -> None:
         Says how far.
     """
     state, model = found.state, prepared.model
-    turned = np.abs(np.append(state.wound, 0.0) if model.space else state.q).max(initial=0.0)
+    turned = np.abs(np.append(state.unwrapped, 0.0) if model.space else state.q).max(initial=0.0)
     if turned > MOST_TURNED:
         detail = f"something turns by {turned:.1e} rad, of which rounding leaves no angle: next to nothing resists it"
         raise SolveError(Status.FAILED, detail, state)
@@ -368,13 +370,16 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
     inside = (equations.row < equations.unknowns) & (equations.column < equations.unknowns)
     row, column, entries = equations.row[inside], equations.column[inside], found.point.entries[inside]
     size = float(np.append(equations.mass, np.full(len(stability.travel), LIGHT)) @ shape**2)
-    if stability.smallest > HELD * prepared.softest + float(blurred(row, column, entries, shape[:, None])[0]) / size:
+    if (
+        stability.smallest
+        > RESISTED * prepared.softest + float(blurred(row, column, entries, shape[:, None])[0]) / size
+    ):
         return
     if moves_nodes(equations, shape, found.state):
         raise SceneError(free_to_move(in_words(equations, shape)))
 
 
-def _with_unique_reactions(found: Found, loading: Loading) -> Found:
+def _with_unique_reactions(found: EquilibriumResult, loading: Loading) -> EquilibriumResult:
     """The same, with the smallest reactions and a note where closings are redundant.
 
     Raises

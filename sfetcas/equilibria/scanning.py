@@ -160,7 +160,7 @@ class _Shooting:
         self.backwards = supports[1] == "free"
         self.clamped = "clamped" in supports
         self.places = model.along(name)
-        self.held = float(first.state.q[model.chain(name)[0 if self.backwards else -1], 0])
+        self.fixed_angle = float(first.state.q[model.chain(name)[0 if self.backwards else -1], 0])
         self.grazing = 0
         section = scene.sections[str(member.section)]
         axis = 1 if line.bending_axis == 2 else 2
@@ -229,7 +229,7 @@ class _Shooting:
             if course:
                 shapes.append(q)
         if self.clamped:
-            value, slope = (q + self.along - self.held) / (2.0 * np.pi), dq / (2.0 * np.pi)
+            value, slope = (q + self.along - self.fixed_angle) / (2.0 * np.pi), dq / (2.0 * np.pi)
         else:
             value, slope = m / self.unit, dm / self.unit
         return value, slope, np.array(shapes).T + self.along

@@ -2,7 +2,7 @@
 
 Newton runs, with and without deflation (see :mod:`~sfetcas.solvers.deflation`), begin at the undeformed scene, at its
 lowest shapes, at known equilibria nudged along their lowest shapes, mirrored, or half-way to each other.  From each
-unstable equilibrium the energy falls to both sides of its escape shape: what lies down there is found as well, as
+unstable equilibrium the energy falls to both sides of its unstable mode: what lies down there is found as well, as
 is what larger and reversed loads lead to when they come back.  What the search does not find may still exist: it
 counts what it did, and says so.
 """
@@ -23,7 +23,7 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.accuracy import largest_difference
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
-from ..solvers.between_states import turned_between, unheld
+from ..solvers.between_states import free_parts, turned_between
 from ..solvers.continuation import follow
 from ..solvers.deflation import deflated
 from ..solvers.guess import restore
@@ -53,7 +53,7 @@ KINK = 1.3
 """A larger rotation from node to node within an element, rad, is an artefact of the mesh."""
 
 LARGE = 700
-"""From this many unknowns on all eigenvalues cost more than they bring: nudges along the escape shape alone."""
+"""From this many unknowns on all eigenvalues cost more than they bring: nudges along the unstable mode alone."""
 
 FAMILY = "one of a continuous family of neutral equilibria with the same energy, of which no other is listed"
 
@@ -138,7 +138,7 @@ class Search:
         self.counts[kind] = self.counts.get(kind, 0) + 1
         self.deflated += deflate
         there = deflated(self.prepared, start, self.loading, [f.state for f in self.found] if deflate else ())
-        there = there and self._wound_back(there)
+        there = there and self._unwrapped_back(there)
         if there is None:
             return False
         self.arrived += 1
@@ -147,10 +147,10 @@ class Search:
         self.found.append(there)
         return True
 
-    def _wound_back(self, there: Corrected) -> Corrected:
+    def _unwrapped_back(self, there: Corrected) -> Corrected:
         """The same without whole turns of parts that nothing holds."""
         turns = there.state.q.copy()
-        parts = () if self.prepared.model.space else unheld(self.prepared.model)
+        parts = () if self.prepared.model.space else free_parts(self.prepared.model)
         for part in parts:
             turns[part] -= 2.0 * np.pi * np.round(turns[part].mean() / (2.0 * np.pi))
         if np.array_equal(turns, there.state.q):
@@ -188,7 +188,7 @@ class Search:
         return False
 
     def _neutral(self, there: Corrected) -> bool:
-        if self.prepared.equations.turning_unknowns > LARGE:
+        if self.prepared.equations.rotation_unknowns > LARGE:
             return self.prepared.stability(there).stable == "neutral"
         return bool((self.prepared.spectrum(there, 0)[0] == 0.0).any())
 
@@ -223,7 +223,7 @@ class Search:
         return descend(prepared.equations, self.moved(state, shape), self.loading, prepared.weight, iterations=DESCENT)
 
     def _shapes(self, found: Corrected, count: int) -> Array:
-        if self.prepared.equations.turning_unknowns > LARGE:
+        if self.prepared.equations.rotation_unknowns > LARGE:
             return self.prepared.stability(found).shape[None, :]
         return self.prepared.spectrum(found, count)[1]
 
@@ -304,7 +304,7 @@ def search(
         effort = max(1, prepared.equations.unknowns * (2 if prepared.model.space else 1))
         runs = max(FEWEST_RUNS, min(RUNS, EFFORT // effort))
     images = mirrors(prepared.model)
-    if not prepared.equations.turning_unknowns:
+    if not prepared.equations.rotation_unknowns:
         return Search(prepared, loading, runs, images, [first])
     carried: list[State] = []
     left = runs
@@ -329,7 +329,9 @@ def _carried(smaller: Search, loading: Loading) -> list[State]:
     change = loading.plus(smaller.loading.scaled(-1.0))
     states = []
     for found in smaller.found:
-        followed = follow(smaller.prepared, lambda t: smaller.loading.plus(change.scaled(t)), found.state, leave=False)
+        followed = follow(
+            smaller.prepared, lambda t: smaller.loading.plus(change.scaled(t)), found.state, switch_branch=False
+        )
         if followed.reached:
             states.append(followed.state)
     return states
@@ -346,7 +348,7 @@ def _there_and_back(prepared: Prepared, loading: Loading, more: Loading, state: 
     out = follow(prepared, lambda t: loading.plus(more.scaled(t)), state)
     if not (out.reached and out.left):
         return None
-    back = follow(prepared, lambda t: loading.plus(more.scaled(1.0 - t)), out.state, leave=False)
+    back = follow(prepared, lambda t: loading.plus(more.scaled(1.0 - t)), out.state, switch_branch=False)
     return back.state if back.reached else None
 
 
@@ -387,7 +389,7 @@ def missing(answers: Sequence[Equilibrium]) -> str:
     """
     model = answers[0].model
     neutral = any(answer.certificate.stable == "neutral" for answer in answers)
-    if model.space or neutral or len(model.positions.rows) or unheld(model):
+    if model.space or neutral or len(model.positions.rows) or free_parts(model):
         return ""
     balance = sum((-1) ** answer.certificate.negative for answer in answers)
     return "" if balance == 1 else "; their numbers of ways out do not balance, so at least one more exists"

@@ -76,7 +76,7 @@ def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> 
             return found, iterations, "afar"
     if not prepared.model.minimisable:
         start = prepared.equations.start(prepared.model.loading(0.0, 0.0))
-        followed = follow(prepared, loading.scaled, start, leave=False)
+        followed = follow(prepared, loading.scaled, start, switch_branch=False)
         if not followed.reached:
             raise SolveError(Status.FAILED, "the loads could not be followed from zero", followed.state)
         return prepared.correct(followed.state, loading), 0, "growing"

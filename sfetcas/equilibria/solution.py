@@ -30,8 +30,8 @@ __all__ = [
     "at_factor",
     "equilibrium",
     "heading",
-    "not_small",
     "refuse_large",
+    "superelement_notes",
 ]
 
 MOST_PLACES = 400
@@ -417,7 +417,7 @@ def equilibrium(
         The number of turns in the angle of a spring or a driven joint is not determined by the state.
     """
     model, notes = equations.model, tuple(dict.fromkeys(notes))
-    doubt = model.winding.doubt(state.q, state.wound, loading)
+    doubt = model.unwrapping.doubt(state.q, state.unwrapped, loading)
     if doubt is not None:
         raise SolveError(Status.FAILED, doubt, state)
     turn = np.where(equations.number >= 0, stability.shape[equations.number], 0.0) if len(stability.shape) else None
@@ -439,7 +439,7 @@ def equilibrium(
         state=state,
         loading=loading,
         certificate=certificate,
-        notes=(*notes, *not_small(fields)),
+        notes=(*notes, *superelement_notes(fields)),
         iterations=iterations,
         strain=point.strain,
         potential=point.potential,
@@ -448,10 +448,10 @@ def equilibrium(
     )
 
 
-SMALL = 0.1
+LARGEST_DEFORMATION = 0.1
 """Displacement over length, or rotation in rad, of a small member beyond which a note is given: errors of some 1 %."""
 
-SMALL_PULL = 0.1
+LARGEST_AXIAL_FORCE = 0.1
 """Axial force of a small member over ``12 EI / L^2`` beyond which a note is given: geometric stiffness left out."""
 
 
@@ -468,28 +468,28 @@ def refuse_large(fields: Fields) -> None:
         raise SolveError(Status.BENT, told)
 
 
-def not_small(fields: Fields) -> tuple[str, ...]:
+def superelement_notes(fields: Fields) -> tuple[str, ...]:
     """Notes on small members beyond linear elasticity by deformation or axial force; error estimates do not see it."""
-    small = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
+    superelements = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
     told = "the error estimate does not tell"
     notes = []
     for measure, limit, words in (
         (
             fields.bent,
-            SMALL,
+            LARGEST_DEFORMATION,
             f"bends by {{:.2g}} of its length or rad{{}}: its linear elasticity is for a few percent, and {told}",
         ),
         (
             fields.pulled,
-            SMALL_PULL,
+            LARGEST_AXIAL_FORCE,
             f"carries {{:.2g}} of 12 EI / L^2 along it{{}}: what that does across it is left out, and {told}",
         ),
     ):
-        found = {name: measure(name) for name in small}
-        far = sorted((name for name in small if found[name] > limit), key=lambda name: -found[name])
+        found = {name: measure(name) for name in superelements}
+        far = sorted((name for name in superelements if found[name] > limit), key=lambda name: -found[name])
         if far:
             others = f", as {counted(len(far) - 1, 'other', 'others')} do" if far[1:] else ""
             notes.append(f"the small member {far[0]!r} {words.format(found[far[0]], others)}")
             # Each is told once.
-            small = [name for name in small if name not in far]
+            superelements = [name for name in superelements if name not in far]
     return tuple(notes)

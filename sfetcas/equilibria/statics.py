@@ -2,7 +2,7 @@
 
 1. A coarse *pilot* mesh: IPOPT from a start guess at the full load, then Newton's method to rounding.
 2. The branch is checked by following the loads from zero on the pilot (see :mod:`~sfetcas.solvers.continuation`), and
-   an unstable equilibrium is left along its escape shape.
+   an unstable equilibrium is left along its unstable mode.
 3. The mesh is refined where the solution is not smooth enough; Newton's method goes on from the coarser state.
 4. All elements are halved once more: the difference is the estimate of the error, the halved mesh the answer.
 """
@@ -27,8 +27,8 @@ from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
-from ..solvers.unheld import refuse_unheld
-from .meshing import Found, Meshing
+from ..solvers.unsupported import refuse_unsupported
+from .meshing import EquilibriumResult, Meshing
 from .quantities import WHERE
 from .refinement import LEVELS, Refinement
 from .scanning import Scan, scan
@@ -110,7 +110,7 @@ class LoadSteps:
         if self.scene.analysis.equilibria == "all":
             self._refuse_all(pilot.model)
         steps: list[Equilibrium] = []
-        last: tuple[float, Found] | None = None
+        last: tuple[float, EquilibriumResult] | None = None
         contact = None
         if self.scene.contacts:
             contact = ContactRun(
@@ -121,13 +121,13 @@ class LoadSteps:
                 self._judged_in_contact,
             )
         for factor in self.scene.analysis.steps:
-            refuse_unheld(pilot, factor)
+            refuse_unsupported(pilot, factor)
             try:
                 if contact is not None:
                     contact.refuse_held_inside(pilot, factor)
                     steps.append(self._in_contact(contact, pilot, factor))
                     continue
-                found = self.ways.found(pilot, factor, last)
+                found = self.ways.result(pilot, factor, last)
                 last = (factor, found) if found.prepared is pilot else None
                 steps.append(self.refinement.refined(found, factor))
                 if self.scene.analysis.equilibria == "all":
@@ -142,14 +142,14 @@ class LoadSteps:
 
     # -- several equilibria ---------------------------------------------------------------------
 
-    def _several(self, found: Found, answer: Equilibrium, factor: float) -> list[Equilibrium]:
+    def _several(self, found: EquilibriumResult, answer: Equilibrium, factor: float) -> list[Equilibrium]:
         """The answer, which tells of the search, then further equilibria of the same factor with rising energy."""
         result = self._searched(found, factor)
         answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
         for number, corrected in enumerate(result.found[1:], start=1):
             stability = result.prepared.stability(corrected)
             notes = result.family_note(number)
-            candidate = Found(result.prepared, corrected, stability, notes, kept=True, way=("search",))
+            candidate = EquilibriumResult(result.prepared, corrected, stability, notes, kept=True, way=("search",))
             further = self._further(candidate, factor)
             if further is None:
                 dropped += 1
@@ -182,7 +182,7 @@ class LoadSteps:
             why = "the energy of pressure, by which equilibria are sorted and told apart, is not evaluated"
         raise SceneError(f"found 'all', accepted: 'one', as {why}", ("analysis", "equilibria"))
 
-    def _further(self, candidate: Found, factor: float) -> Equilibrium | None:
+    def _further(self, candidate: EquilibriumResult, factor: float) -> Equilibrium | None:
         """The answer to what a search found; None where finer meshes do not have it."""
         try:
             answer = self.refinement.refined(candidate, factor)
@@ -191,7 +191,7 @@ class LoadSteps:
         short = (answer.certificate.error_estimate or 0.0) > self.meshes.accuracy
         return None if short and not self.meshes.prescribed else answer
 
-    def _searched(self, found: Found, factor: float) -> Search | Scan:
+    def _searched(self, found: EquilibriumResult, factor: float) -> Search | Scan:
         """The scan or, where one number does not give all equilibria, the search.
 
         On a mesh fine enough for what is strongly curled, but for elements that are prescribed.
@@ -257,7 +257,7 @@ class LoadSteps:
             if error.status is Status.BENT:
                 raise
             found = None
-        if found is None or (self.meshes.leave and found.stability.negative > 0):
+        if found is None or (self.meshes.switch_branch and found.stability.negative > 0):
             return None
         answer = self.refinement.refined(replace(found, way=("no contact",)), factor)
         return answer if contact.clear(answer.fields) else None
@@ -282,14 +282,14 @@ class LoadSteps:
             except SolveError as error:
                 refused = refused or error
                 continue
-            if not self.meshes.leave or answer.certificate.negative == 0:
+            if not self.meshes.switch_branch or answer.certificate.negative == 0:
                 return answer
             unstable = unstable or answer
         if unstable is not None:
             return unstable
         if refused is not None:
             raise refused
-        contact.refuse_unheld(self.meshes.prepared(self.meshes.pilot_mesh))
+        contact.refuse_unsupported(self.meshes.prepared(self.meshes.pilot_mesh))
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
         raise SolveError(Status.FAILED, f"{detail} back: {', '.join(contact.named(failure))}")
 
@@ -298,7 +298,7 @@ class LoadSteps:
         one, other = (unjudged(held.prepared, held.corrected, held.loading, factor) for held in (coarse, fine))
         return self.meshes.judged(one, other)
 
-    def _unstopped(self, pilot: Prepared, factor: float) -> tuple[Found | None, SolveError | None]:
+    def _unstopped(self, pilot: Prepared, factor: float) -> tuple[EquilibriumResult | None, SolveError | None]:
         """The answer as if there were no obstacles; None where nothing else holds the structure."""
         try:
             return self.ways.on_pilot(pilot, factor, None), None
@@ -324,7 +324,7 @@ class LoadSteps:
         return answer
 
 
-def _as_held(found: Found, factor: float) -> Held:
+def _as_held(found: EquilibriumResult, factor: float) -> Held:
     """An equilibrium without contact as one that may begin it."""
     loading = found.prepared.model.loading(factor)
     touched = Touched(found.prepared.equations, found.corrected.state, loading)

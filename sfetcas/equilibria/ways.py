@@ -18,7 +18,7 @@ from ..solvers.deflation import nearest
 from ..solvers.prepared import BEYOND, Prepared
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import SHARED
-from .meshing import PILOT_ELEMENTS, Found, Meshing
+from .meshing import PILOT_ELEMENTS, EquilibriumResult, Meshing
 from .single import cold
 from .solution import refuse_large
 
@@ -118,14 +118,14 @@ class Ways:
 
     # -- the order ------------------------------------------------------------------------------------
 
-    def found(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+    def result(self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None) -> EquilibriumResult:
         """The equilibrium on the pilot mesh, or on one with elements a quarter as long where the pilot mesh has none.
 
         Parameters
         ----------
         factor : float
             Factor of the loads.
-        last : (factor, Found) or None
+        last : (factor, EquilibriumResult) or None
             The load step before.
 
         Raises
@@ -144,7 +144,9 @@ class Ways:
             except SolveError:
                 raise error from None
 
-    def on_pilot(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+    def on_pilot(
+        self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
+    ) -> EquilibriumResult:
         """The equilibrium on the pilot mesh; parameters and errors as of :meth:`found`.
 
         It is the one that the loads lead to as they grow from zero.  It is a minimum of the energy under the full loads
@@ -155,7 +157,7 @@ class Ways:
             return self._without_minimum(pilot, factor, last)
         grows = self.meshes.settings.branch and not self.started
         # Where small members bend beyond sense on the way of the loads, nothing else is tried.
-        grown = self._grown(pilot, factor, last) if grows and self.meshes.small else None
+        grown = self._grown(pilot, factor, last) if grows and self.meshes.has_superelements else None
         alone, failure = self._direct(pilot, loading)
         if not grows:
             return self._accepted(pilot, alone, failure, loading)
@@ -169,7 +171,9 @@ class Ways:
         found = self._accepted(pilot, alone, failure, loading)
         return replace(found, notes=(NEAREST, *found.notes))
 
-    def _without_minimum(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found:
+    def _without_minimum(
+        self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
+    ) -> EquilibriumResult:
         """Loads that cannot be minimised: the state that they lead to from zero, stable or not."""
         found = self._onward(pilot, factor, last)
         ways = [self._carried, self.grown_from_zero]
@@ -196,7 +200,7 @@ class Ways:
         return None if mesh.elements == pilot.model.mesh.elements else self.meshes.prepared(mesh)
 
     @staticmethod
-    def _beside(grown: Found, alone: Found | None) -> Found:
+    def _beside(grown: EquilibriumResult, alone: EquilibriumResult | None) -> EquilibriumResult:
         """What the loads lead to, with a note where another minimum is nearer to the start guess."""
         if alone is None:
             return grown
@@ -225,18 +229,18 @@ class Ways:
 
     # -- single ways ----------------------------------------------------------------------------------
 
-    def _direct(self, pilot: Prepared, loading: Loading) -> tuple[Found | None, SolveError | None]:
+    def _direct(self, pilot: Prepared, loading: Loading) -> tuple[EquilibriumResult | None, SolveError | None]:
         """From the start guess at the full load."""
-        near = nearest(pilot, loading) if self.started and not self.meshes.leave else None
+        near = nearest(pilot, loading) if self.started and not self.meshes.switch_branch else None
         if near is not None:
-            return Found(pilot, near, pilot.stability(near), way=("beside",)), None
+            return EquilibriumResult(pilot, near, pilot.stability(near), way=("beside",)), None
         try:
             corrected, iterations, way = cold(pilot, loading, self.meshes.settings.solver)
         except SolveError as error:
             return None, error
-        return Found(pilot, corrected, pilot.stability(corrected), iterations=iterations, way=(way,)), None
+        return EquilibriumResult(pilot, corrected, pilot.stability(corrected), iterations=iterations, way=(way,)), None
 
-    def _carried(self, pilot: Prepared, factor: float) -> Found | None:
+    def _carried(self, pilot: Prepared, factor: float) -> EquilibriumResult | None:
         """Where the loads carry the undeformed state: slack has no place of its own from which to follow them.
 
         A small share of them first, as they grow; then all of them, which is one of the equilibria.
@@ -256,29 +260,37 @@ class Ways:
                 return replace(found, notes=(*notes, *found.notes), way=(way, *found.way[1:]))
         return None
 
-    def _accepted(self, pilot: Prepared, alone: Found | None, failure: SolveError | None, loading: Loading) -> Found:
+    def _accepted(
+        self, pilot: Prepared, alone: EquilibriumResult | None, failure: SolveError | None, loading: Loading
+    ) -> EquilibriumResult:
         """What IPOPT found, an unstable state left if that is wanted."""
         if alone is None:
             assert failure is not None
             raise failure
-        if alone.stability.negative == 0 or not self.meshes.leave:
+        if alone.stability.negative == 0 or not self.meshes.switch_branch:
             return alone
-        corrected, stability = pilot.leave(alone.corrected.state, alone.stability, loading)
+        corrected, stability = pilot.switch_branch(alone.corrected.state, alone.stability, loading)
         ways = counted(alone.stability.negative, "way out", "ways out")
-        note = f"left an unstable equilibrium with {ways} along its escape shape"
-        return _by("left", Found(pilot, corrected, stability, (note,), alone.iterations, way=alone.way))
+        note = f"left an unstable equilibrium with {ways} along its unstable mode"
+        return _by("left", EquilibriumResult(pilot, corrected, stability, (note,), alone.iterations, way=alone.way))
 
-    def _grown(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
+    def _grown(
+        self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
+    ) -> EquilibriumResult | None:
         """The state that the loads lead to from zero, or from the last factor where that lies on the way."""
         return self._onward(pilot, factor, last) or self.grown_from_zero(pilot, factor)
 
-    def _onward(self, pilot: Prepared, factor: float, last: tuple[float, Found] | None) -> Found | None:
+    def _onward(
+        self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
+    ) -> EquilibriumResult | None:
         """The state that the loads lead to from the last factor, where that lies on the way from zero."""
         if last is None or last[0] * (factor - last[0]) < 0.0:
             return None
         return self._through(pilot, last[0], factor, last[1].corrected.state)
 
-    def grown_from_zero(self, pilot: Prepared, factor: float, allowed: Allowed | None = None) -> Found | None:
+    def grown_from_zero(
+        self, pilot: Prepared, factor: float, allowed: Allowed | None = None
+    ) -> EquilibriumResult | None:
         """The state that the loads lead to from zero, by steps that ``allowed`` accepts; None where that fails."""
         model = pilot.model
         zero = self._unloaded(pilot)
@@ -313,13 +325,13 @@ class Ways:
 
     def _through(
         self, pilot: Prepared, begin: float, end: float, state: State, allowed: Allowed | None = None
-    ) -> Found | None:
+    ) -> EquilibriumResult | None:
         """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
         knots = {
             t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)
         }
         stops = [begin, *sorted(knots, reverse=end < begin), end]
-        found: Found | None = None
+        found: EquilibriumResult | None = None
         for a, b in zip(stops, stops[1:], strict=False):
             part = self._followed(pilot, between(pilot.model, a, b), state, (a, b), allowed)
             if part is None:
@@ -327,7 +339,7 @@ class Ways:
             found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
         return found
 
-    def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> Found | None:
+    def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> EquilibriumResult | None:
         """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
         # What cannot be minimised is followed to each, in thousands of steps where it falls.
         for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
@@ -338,9 +350,9 @@ class Ways:
         if bent is None:
             return None
         state = bent.corrected.state
-        if bent.stability.negative and self.meshes.leave:
+        if bent.stability.negative and self.meshes.switch_branch:
             try:
-                state = pilot.leave(state, bent.stability, pilot.model.loading(begin))[0].state
+                state = pilot.switch_branch(state, bent.stability, pilot.model.loading(begin))[0].state
             except SolveError:
                 return None
         found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
@@ -353,38 +365,45 @@ class Ways:
         state: State,
         factors: tuple[float, float] | None,
         allowed: Allowed | None = None,
-    ) -> Found | None:
+    ) -> EquilibriumResult | None:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
-        leave, energy_known = self.meshes.leave and pilot.leaves, pilot.model.minimisable
+        switch_branch, energy_known = self.meshes.switch_branch and pilot.switches_branch, pilot.model.minimisable
 
         def refuse(there: State, loading: Loading) -> None:
             refuse_large(Fields(pilot.equations, there, loading))
 
-        result = follow(pilot, way, state, leave=leave, allowed=allowed, refuse=refuse if self.meshes.small else None)
-        passed = not result.reached and leave and not energy_known
+        result = follow(
+            pilot,
+            way,
+            state,
+            switch_branch=switch_branch,
+            allowed=allowed,
+            refuse=refuse if self.meshes.has_superelements else None,
+        )
+        passed = not result.reached and switch_branch and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
-            result = follow(pilot, way, state, leave=False, allowed=allowed)
+            result = follow(pilot, way, state, switch_branch=False, allowed=allowed)
         if not result.reached:
             return None
         corrected = pilot.correct(result.state, way(1.0))
         stability = pilot.stability(corrected)
         notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
-        if stability.negative and self.meshes.leave and not energy_known:
+        if stability.negative and self.meshes.switch_branch and not energy_known:
             notes += (KEPT,)
         elif passed:
             notes += (PASSED,)
-        return Found(
+        return EquilibriumResult(
             pilot, corrected, stability, notes, left=result.left, way=("growing", *("left",) * bool(result.left))
         )
 
 
-def _by(way: str, found: Found) -> Found:
+def _by(way: str, found: EquilibriumResult) -> EquilibriumResult:
     """The same, with a further way that it took."""
     return replace(found, way=(*found.way, way))
 
 
-def _with_change_point(found: Found) -> Found:
+def _with_change_point(found: EquilibriumResult) -> EquilibriumResult:
     """The same, with a note where driven links begin in one line, or as good as that."""
     if not any(motion.rotation is not None for motion in found.prepared.model.scene.motions.values()):
         return found

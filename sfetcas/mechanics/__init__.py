@@ -7,8 +7,8 @@ Words that the modules share:
 - *segment*: a run of elements of a member between two places; its *reach* is the vector between their positions;
 - *closing*: a loop closure: the segments of a loop, or a member between places with known displacements, must meet;
 - *row*: a scalar constraint, of a closing or a joint, with its multiplier;
-- *kept*: a place whose displacement is an unknown, or prescribed; displacements of others follow from the segments;
-- *held*: restrained by a support or prescribed by a motion;
+- *retained*: a place whose displacement is an unknown, or prescribed; displacements of others follow from the segments;
+- *fixed*, *held*: restrained by a support or prescribed by a motion;
 - *pull*: minus the internal force at an integration point;
 - *turn*: a rotation, or its number in the model; *turned*: rotated by it;
 - *side*: a rotation or place that a term connects.

@@ -87,8 +87,8 @@ def roughness(fields: Fields) -> Array:
     angles = np.linalg.norm(np.einsum("j,ejc->ec", interpolation.legendre_tail(element.nodes), nodal), axis=1)
     tangents = fields.turned / element.weights[:, None]
     tails = np.einsum("k,eka->ea", interpolation.legendre_tail(element.points), tangents)
-    reach = np.linalg.norm(tails, axis=1) * model.scales.length / model.scene.size
-    return np.asarray((2.0 if model.space else 1.0) * angles + reach)
+    chord = np.linalg.norm(tails, axis=1) * model.scales.length / model.scene.size
+    return np.asarray((2.0 if model.space else 1.0) * angles + chord)
 
 
 def every_other(cuts: Array) -> Array:

@@ -104,9 +104,9 @@ class Balance:
             return force, self._rigid.get(("node", node), np.zeros(3))
         return force, sum((held @ moments[turn] for turn, held in self._reactions.turned(node)), np.zeros(3))
 
-    def held(self, number: int, moment: Array) -> Array:
+    def fixed_share(self, number: int, moment: Array) -> Array:
         """The part of a moment (3,) on a rotation that the ground takes: none about axes that are free."""
-        return self._reactions.held(number) @ moment
+        return self._reactions.fixed_directions(number) @ moment
 
     def starting_moments(self, elements: slice) -> Array:
         """Moments (n, 3) that the surroundings exert on the first nodes of elements."""
@@ -156,9 +156,9 @@ class Balance:
         """What all connections of a group tell, (n, answers), dimensionless."""
         model, state, group = self.model, self._state, self.model.connections[number]
         first = len(model.positions.rows) + sum(len(other.rows) for other in model.connections[:number])
-        batch = GroupBatch(model, group, answers_of(group.kind), model.winding.parts[number + 1])
+        batch = GroupBatch(model, group, answers_of(group.kind), model.unwrapping.parts[number + 1])
         lam = state.lam[first : first + len(group.rows)]
-        return batch(state.q, self._places, state.wound, self._loading.loads[number], lam)[0]
+        return batch(state.q, self._places, state.unwrapped, self._loading.loads[number], lam)[0]
 
     def body_ends(self, member: str) -> list[tuple[Array, Array]]:
         """Force (3,) and moment (3,) that the surroundings exert on each end of a small member."""

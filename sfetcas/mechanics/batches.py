@@ -32,7 +32,7 @@ class GroupBatch:
     function : Function
     angles : slice or ndarray, optional
         Numbers of the turn-counting angles that stand last in the data, see
-        :class:`~sfetcas.mechanics.winding.Winding`.
+        :class:`~sfetcas.mechanics.unwrapping.Unwrapping`.
     """
 
     def __init__(self, model: Model, group: Acting, function: ca.Function, angles: slice | Index | None = None) -> None:
@@ -44,7 +44,7 @@ class GroupBatch:
         self._still = np.zeros((1, model.element.axes)) if (group.places < 0).any() else None
 
     def __call__(
-        self, q: Array, places: Array, near: Array, load: Array | None = None, lam: Array | None = None
+        self, q: Array, places: Array, unwrapped: Array, load: Array | None = None, lam: Array | None = None
     ) -> list[Array]:
         """Results at rotations, displacements (places, axes) and values near which angles are counted.
 
@@ -56,7 +56,7 @@ class GroupBatch:
         if group.places.size:
             self._batch.set(1, (places if self._still is None else np.vstack([places, self._still]))[group.places])
         if self._angles is not None:
-            self._data[:, -1] = near[self._angles]
+            self._data[:, -1] = unwrapped[self._angles]
             self._batch.set(2, self._data)
         for number, values in ((3, load), (4, lam)):
             if values is not None and values.size:

@@ -41,7 +41,7 @@ from .joints import (
 )
 from .mesh import Cushion, Mesh, Touch
 from .parts import Parts
-from .rotations import Pin, Rotations, Turn, end_joints
+from .rotations import Pin, RotationFreedom, Rotations, end_joints
 from .segments import Segments, cushioned
 from .terms import GROUND, Group, One
 
@@ -142,7 +142,7 @@ class _Maker:
         spring, scales = self.scene.springs[name], self.scales
         if spring.type == "rotational":
             crossed, sides, head = self._measured(name)
-            data = numbers([*head, spring.stiffness / scales.moment, spring.rest, *self._near])
+            data = numbers([*head, spring.stiffness / scales.moment, spring.rest, *self._unwrapped])
             return One(TurnSpring(self.space, crossed), name, spring.node, data, sides)
         other, places = spring.to, self._ends_of(name)
         stiffness = spring.stiffness * scales.length**2 / scales.moment
@@ -170,7 +170,7 @@ class _Maker:
             at = spring.stop[0 if side == "low" else 1]
             if spring.type == "rotational":
                 crossed, sides, head = self._measured(name)
-                data = numbers([*head, at, *self._near])
+                data = numbers([*head, at, *self._unwrapped])
                 stop = TurnStop(self.space, crossed)
                 yield One(stop, f"{side} stop of {name}", spring.node, data, sides, row=row)
                 continue
@@ -178,7 +178,7 @@ class _Maker:
             yield One(LineStop(self.space), f"{side} stop of {name}", spring.node, data, (), self._ends_of(name), row)
 
     @property
-    def _near(self) -> tuple[float, ...]:
+    def _unwrapped(self) -> tuple[float, ...]:
         """Value near which an angle in space is counted, in the undeformed scene."""
         return (0.0,) if self.space else ()
 
@@ -314,13 +314,13 @@ class _Toucher:
         if stop.kind == "flat":
             for turn, tangent in zip(turns.tolist(), tangents, strict=True):
                 key = (touch.contact, -2 - turn)
-                if self.rotations.kind[turn] != Turn.HELD and key not in covered:
+                if self.rotations.kind[turn] != RotationFreedom.FIXED and key not in covered:
                     covered.add(key)
                     data = np.concatenate([stop.normal[:axes], tangent])
                     yield One(Along(axes == 3), name, "", data, (turn,), row=name)
             return
         start = (line.positions(x[:1])[0] - stop.place)[:axes] / self.scales.length
-        if self.rotations.kind[turns[0]] != Turn.HELD:
+        if self.rotations.kind[turns[0]] != RotationFreedom.FIXED:
             data = np.concatenate([start, tangents[0]])
             yield One(AlongRound(False), name, "", data, (int(turns[0]),), (self.place(touch, touch.at),), name)
         rest = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0]))

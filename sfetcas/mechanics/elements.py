@@ -168,35 +168,35 @@ class Element(Term):
     # In space derivatives of the whole element are long: those of one point, mapped over the points and put together
     # by constant matrices, are a tenth of the code, and as fast.
 
-    def turning(self) -> ca.Function:
-        """As :meth:`Term.turning`; in space assembled from the derivatives of single points."""
+    def rotation_gradient(self) -> ca.Function:
+        """As :meth:`Term.rotation_gradient`; in space assembled from the derivatives of single points."""
         if not self.space:
-            return super().turning()
+            return super().rotation_gradient()
         symbols, q, stiffness, tangent, load, pull = self._large_symbols()
         strain, tangents, gradient, hessian, change = self._point.map(self.order + 1)(
             *self._at(q), stiffness, tangent, pull
         )
-        by_q, spin, gained = self._on_nodes(gradient), self._spins(q), tangents - tangent
-        matrix = ca.mtimes(spin.T, ca.mtimes(self._between_nodes(hessian), spin))
+        by_q, basis, gained = self._on_nodes(gradient), self._basis(q), tangents - tangent
+        matrix = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
         # What keeps quaternions on the unit sphere.
         matrix -= 0.25 * ca.diag(ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1)))
         results = {
             "energy": ca.sum2(strain) + ca.dot(load, gained),
             "stored": ca.sum2(strain),
             "rows": ca.sum2(gained),
-            "gradient": ca.densify(ca.mtimes(spin.T, ca.vec(by_q))),
+            "gradient": ca.densify(ca.mtimes(basis.T, ca.vec(by_q))),
             "stiffness": ca.densify(matrix),
-            "spin": ca.densify(ca.mtimes(self._by_nodes(change), spin)),
+            "rotation_jacobian": ca.densify(ca.mtimes(self._by_nodes(change), basis)),
         }
-        return self._function("turning", symbols, results)
+        return self._function("rotation_gradient", symbols, results)
 
-    def turning_forces(self) -> ca.Function:
-        """As :meth:`Term.turning_forces`; in space assembled from the derivatives of single points."""
+    def rotation_forces(self) -> ca.Function:
+        """As :meth:`Term.rotation_forces`; in space assembled from the derivatives of single points."""
         if not self.space:
-            return super().turning_forces()
+            return super().rotation_forces()
         symbols, q, stiffness, tangent, _, pull = self._large_symbols()
         tangents, gradient, _ = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, pull)
-        moments = ca.mtimes(self._spins(q).T, ca.vec(self._on_nodes(gradient)))
+        moments = ca.mtimes(self._basis(q).T, ca.vec(self._on_nodes(gradient)))
         return self._function("forces", symbols, {"rows": ca.sum2(tangents - tangent), "gradient": ca.densify(moments)})
 
     def slopes(self) -> ca.Function:
@@ -220,7 +220,8 @@ class Element(Term):
 
     @functools.cached_property
     def convex(self) -> ca.Function:
-        """``(q, u, data, load, lam) ->`` a positive semidefinite substitute for the stiffness of :meth:`turning`.
+        """``(q, u, data, load, lam) ->`` a positive semidefinite substitute for the stiffness of
+        :meth:`rotation_gradient`.
 
         Of the strain energy it has the Gauss-Newton part, which in the plane is exact.  Of the internal force it has
         the geometric stiffness of its axial part about both normals, with the sign of tension also in compression.
@@ -242,11 +243,11 @@ class Element(Term):
     def _convex_in_space(self, q: ca.MX, stiffness: ca.MX, tangent: ca.MX, pull: ca.MX) -> ca.MX:
         n = self.order + 1
         hessian, across = self._convex_point.map(n)(*self._at(q), stiffness, tangent, pull)
-        spin = self._spins(q)
+        basis = self._basis(q)
         pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
         summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
         order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
-        total = ca.mtimes(spin.T, ca.mtimes(self._between_nodes(hessian), spin))
+        total = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
         return ca.densify(total + ca.reshape(summed.nz[order.tolist()], 3 * n, 3 * n))
 
     def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX, ca.MX, ca.MX]:
@@ -303,11 +304,13 @@ class Element(Term):
         order = entry.transpose(0, 2, 1, 3).ravel()
         return ca.reshape(ca.densify(summed).nz[order.tolist()], 4 * n, 4 * n)
 
-    def _spins(self, q: ca.MX) -> ca.MX:
-        """As :meth:`_spin`, (4 nodes, 3 nodes)."""
+    def _basis(self, q: ca.MX) -> ca.MX:
+        """Derivatives of the quaternions of all nodes by their rotation vectors, (4 nodes, 3 nodes)."""
         one = ca.SX.sym("one", 4)
         columns = [product([0.0, *axis], ca.vertsplit(one)) for axis in np.eye(3).tolist()]
-        block = ca.Function("spin", [one], [ca.densify(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))])
+        block = ca.Function(
+            "basis", [one], [ca.densify(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))]
+        )
         blocks = block.map(self.order + 1)(q)
         return ca.diagcat(*ca.horzsplit(blocks, 3))
 
@@ -326,7 +329,7 @@ class Element(Term):
 
     @functools.cached_property
     def _point(self) -> ca.Function:
-        """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :meth:`turning`.
+        """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :meth:`rotation_gradient`.
 
         Strain energy, turned tangent, gradient (8,) and Hessian (8, 8) by rotation and slope, and the derivative
         of the turned tangent by the rotation (3, 4).

@@ -25,9 +25,9 @@ from .load_terms import present
 from .loading import Loading
 from .model import Model
 from .reactions import Reactions
-from .rotations import Turn
+from .rotations import RotationFreedom
 from .tables import Tables
-from .terms import Group, by_turning
+from .terms import Group, rotation_gradient
 
 __all__ = ["UNLOADED", "Equations", "Point", "State", "turned_tangents"]
 
@@ -46,15 +46,15 @@ class State:
     y : ndarray (displacement unknowns,)
     lam : ndarray (rows,)
         Multipliers of the loop closures, then of the rows of joints.
-    wound : ndarray (angles,)
+    unwrapped : ndarray (angles,)
         Reference values, rad, by which the turns of angles are counted, see
-        :class:`~sfetcas.mechanics.winding.Winding`.
+        :class:`~sfetcas.mechanics.unwrapping.Unwrapping`.
     """
 
     q: Array
     y: Array
     lam: Array
-    wound: Array
+    unwrapped: Array
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Point:
         plus a hundredth of its stiffness; 1 for gaps.
     entries : ndarray
         Entries of the Newton matrix, in the order of :attr:`Equations.row` and :attr:`Equations.column`.
-    spin : ndarray (elements, moments of the nodes, axes)
+    rotation_jacobian : ndarray (elements, moments of the nodes, axes)
         Derivatives of the chords of elements by rotations of their nodes.
     """
 
@@ -81,7 +81,7 @@ class Point:
     residual: Array
     scale: Array
     entries: Array
-    spin: Array
+    rotation_jacobian: Array
 
 
 class Equations:
@@ -91,7 +91,7 @@ class Equations:
     ----------
     unknowns, rows, total : int
         Number of rotation and displacement unknowns, of constraint rows, and their sum.
-    turning_unknowns, displacement_unknowns : int
+    rotation_unknowns, displacement_unknowns : int
     number : ndarray (rotations, width)
         Unknown of each component of a rotation, see :class:`~sfetcas.mechanics.tables.Tables`.
     row, column, diagonal : ndarray
@@ -106,7 +106,7 @@ class Equations:
         self.redundant: bool | None = None
         self.tables = tables = Tables(model)
         self.number, self.place_number = tables.number, tables.place_number
-        self.turning_unknowns, self.displacement_unknowns = tables.turning_unknowns, tables.displacement_unknowns
+        self.rotation_unknowns, self.displacement_unknowns = tables.rotation_unknowns, tables.displacement_unknowns
         self.unknowns, self.rows, self.total = tables.unknowns, tables.rows, tables.total
         self._owner, self._first = model.segments.owner, model.segments.first
         # Elements are what there may be thousands of: their functions alone are worth compiling.
@@ -114,7 +114,7 @@ class Equations:
             _Terms(tables, number, kernels if number == 0 else "interpreted", evaluations)
             for number in range(len(model.terms))
         ]
-        self._kept = self.place_number[(model.positions.kept >= 0).all(axis=1)]
+        self._retained = self.place_number[(model.positions.retained >= 0).all(axis=1)]
         self._pattern()
         self._judge()
 
@@ -127,7 +127,7 @@ class Equations:
         # Sections turn: about any fixed axis rounding is that of the stiffest one, also where nothing resists a turn.
         free = self.number[(self.number >= 0).all(axis=1)]
         self.noise[free] = self.noise[free].max(axis=1, keepdims=True)
-        self.noise[self._kept] = self.noise[self._kept].max(axis=1, keepdims=True)
+        self.noise[self._retained] = self.noise[self._retained].max(axis=1, keepdims=True)
         self.noise[self.unknowns :] = 1.0
 
     @functools.cached_property
@@ -148,7 +148,7 @@ class Equations:
         tables = self.tables
         sides = [part for group, part in zip(self.model.terms, tables.sides, strict=True) if chosen(group)]
         unknown = tables.unknown[np.concatenate([part[part >= 0] for part in sides])]
-        return np.unique(unknown[unknown >= self.turning_unknowns])
+        return np.unique(unknown[unknown >= self.rotation_unknowns])
 
     @functools.cached_property
     def _transposed(self) -> Index:
@@ -175,7 +175,7 @@ class Equations:
                 np.add.at(lump, list(model.rotations.ends[name]), share)
         # What turns with nothing that has a length.
         lump = np.maximum(lump, 1e-6)
-        mass = np.zeros(self.turning_unknowns)
+        mass = np.zeros(self.rotation_unknowns)
         used = self.number >= 0
         mass[self.number[used]] = np.broadcast_to(lump[:, None], self.number.shape)[used]
         return mass
@@ -223,18 +223,27 @@ class Equations:
 
     def start(self, loading: Loading) -> State:
         """The undeformed state, with prescribed rotations at their values."""
-        winding = self.model.winding
-        wound = winding.prescribed(self.model.rotations.kind, loading)
-        wound = np.where(np.isnan(wound), winding.of_vectors(loading.turn), wound)
-        return State(self.model.held(loading), np.zeros(self.displacement_unknowns), np.zeros(self.rows), wound)
+        unwrapping = self.model.unwrapping
+        unwrapped = unwrapping.prescribed(self.model.rotations.kind, loading)
+        unwrapped = np.where(np.isnan(unwrapped), unwrapping.of_vectors(loading.turn), unwrapped)
+        return State(
+            self.model.prescribed_rotations(loading),
+            np.zeros(self.displacement_unknowns),
+            np.zeros(self.rows),
+            unwrapped,
+        )
 
     def holding(self, state: State, loading: Loading) -> State:
         """The state with prescribed rotations set to their values."""
-        q = np.where((self.model.rotations.kind == Turn.HELD)[:, None], self.model.held(loading), state.q)
-        if not self.model.winding.count:
+        q = np.where(
+            (self.model.rotations.kind == RotationFreedom.FIXED)[:, None],
+            self.model.prescribed_rotations(loading),
+            state.q,
+        )
+        if not self.model.unwrapping.count:
             return replace(state, q=q)
-        wound = self.model.winding.prescribed(self.model.rotations.kind, loading)
-        return replace(state, q=q, wound=np.where(np.isnan(wound), state.wound, wound))
+        unwrapped = self.model.unwrapping.prescribed(self.model.rotations.kind, loading)
+        return replace(state, q=q, unwrapped=np.where(np.isnan(unwrapped), state.unwrapped, unwrapped))
 
     def segment_pulls(self, lam: Array, loading: Loading) -> Array:
         """Minus the constant part of the internal force of each segment, (segments, axes), dimensionless."""
@@ -263,7 +272,7 @@ class Equations:
         gap = positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift
         return nodal, gap
 
-    def kept_places(self, state: State, loading: Loading) -> Array:
+    def retained_places(self, state: State, loading: Loading) -> Array:
         """Displacements (places, axes), dimensionless, of kept places (unknown or prescribed); undefined for others."""
         positions = self.model.positions
         moved = positions.Y @ state.y + positions.B @ loading.shift
@@ -271,7 +280,7 @@ class Equations:
 
     def _evaluated(self, state: State, loading: Loading) -> _Results:
         """Results of the terms of all groups at a state; to be read before they are evaluated again."""
-        places = self.kept_places(state, loading)
+        places = self.retained_places(state, loading)
         pull = loading.pull - self._hanging_pulls(loading)[self._owner][:, None, :]
         constant = self._closing_pulls(state.lam)[self._owner]
         found = [
@@ -286,7 +295,7 @@ class Equations:
         With ``convex`` the stiffness matrices of terms without constraint rows are replaced by positive semidefinite
         ones.
         """
-        positions, turning = self.model.positions, self.turning_unknowns
+        positions, rotation_unknowns = self.model.positions, self.rotation_unknowns
         results = self._evaluated(state, loading)
         found, force, nodal = results.groups, loading.force.ravel(), results.places.ravel()
         potential = sum(float(part[0].sum()) for part in found) - float(force @ nodal)
@@ -297,7 +306,7 @@ class Equations:
             residual -= self._of_moments(loading.further)
         lam = state.lam[: len(positions.rows)]
         if self.displacement_unknowns:
-            displacement = slice(turning, self.unknowns)
+            displacement = slice(rotation_unknowns, self.unknowns)
             residual[displacement] += positions.W.T @ lam - positions.Y.T @ force
             sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
             # A node at which next to nothing acts is judged by a millionth of what acts elsewhere.
@@ -305,10 +314,10 @@ class Equations:
         gap = self.displacements(state, loading, found[0][2])[1]
         residual[self.unknowns :] = np.concatenate([gap, *(part[2].ravel() for part in found[1:])])
         # A component along which nothing acts is judged by what acts across it.
-        scale[self._kept] = scale[self._kept].max(axis=1, keepdims=True)
+        scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
         values = [group.entries(part, convex=convex) for group, part in zip(self._terms, found, strict=True)]
-        spin = found[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
-        return Point(potential, stored, residual, scale, self._matrix(values), spin)
+        rotation_jacobian = found[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
+        return Point(potential, stored, residual, scale, self._matrix(values), rotation_jacobian)
 
     def _of_moments(self, moments: Array) -> Array:
         """Moments about the fixed axes (rotations, 3) on the unknowns."""
@@ -331,14 +340,14 @@ class Equations:
         """Derivative of the residual, (unknowns + rows,), along a rate of nodal loads and prescribed displacements."""
         positions = self.model.positions
         hanging = -self._hanging_pulls(rate)[self._owner]
-        parts = [np.einsum("eca,ea->ec", point.spin, hanging)]
-        places = self.kept_places(state, rate)
+        parts = [np.einsum("eca,ea->ec", point.rotation_jacobian, hanging)]
+        places = self.retained_places(state, rate)
         for group, load in zip(self._terms[1:], rate.loads, strict=True):
             # What loads do is linear in them.
             found = group(state, places, load, np.zeros(0))[3] if group.kind.is_load else np.zeros(group.sides.shape)
             parts.append(found.copy())
         slope = self._gathered(parts)
-        slope[self.turning_unknowns : self.unknowns] -= positions.Y.T @ rate.force.ravel()
+        slope[self.rotation_unknowns : self.unknowns] -= positions.Y.T @ rate.force.ravel()
         slope[self.unknowns : self.unknowns + len(positions.rows)] += positions.BZ @ rate.shift
         return slope
 
@@ -366,17 +375,20 @@ class Equations:
         positions, tables = self.model.positions, self.tables
         found = self._evaluated(state, loading).groups[0]
         sides = tables.sides[0]
-        spin = found[5].reshape(*sides.shape, self.model.element.axes)
+        rotation_jacobian = found[5].reshape(*sides.shape, self.model.element.axes)
         maps = (
             positions.E.rows(chosen)
             .full()
             .reshape(len(chosen), len(self._first), self.model.element.axes)[:, self._owner]
         )
-        values = np.einsum("rea,eca->rec", maps, spin).reshape(len(chosen), sides.size) * tables.weight[sides.ravel()]
+        values = (
+            np.einsum("rea,eca->rec", maps, rotation_jacobian).reshape(len(chosen), sides.size)
+            * tables.weight[sides.ravel()]
+        )
         jacobian = np.zeros((len(chosen), self.unknowns))
         unknown = tables.unknown[sides.ravel()]
         np.add.at(jacobian.T, unknown[unknown >= 0], values.T[unknown >= 0])
-        jacobian[:, self.turning_unknowns :] = positions.Y.rows(chosen).full()
+        jacobian[:, self.rotation_unknowns :] = positions.Y.rows(chosen).full()
         return self.displacements(state, loading, found[2])[0][chosen], jacobian
 
     def elastic_entries(self) -> Array:
@@ -392,18 +404,18 @@ class Equations:
 
     def acting(self, state: State, loading: Loading) -> Loading:
         """The effective loading, in rotating axes with the centrifugal forces."""
-        loading, spinning = self.effective(state, loading), self.model.spinning
-        if spinning is None:
+        loading, rotating_frame = self.effective(state, loading), self.model.rotating_frame
+        if rotating_frame is None:
             return loading
         q, places = state.q, self.places(state, loading)
         u = places.reshape(len(self.model.segments.places), -1)
-        matrix = loading.loads[spinning.pairs][0].reshape(u.shape[1], -1)
-        found = loading.plus(spinning.positional(self.model, u, turned_tangents(self.model, q), matrix))
+        matrix = loading.loads[rotating_frame.pairs][0].reshape(u.shape[1], -1)
+        found = loading.plus(rotating_frame.positional(self.model, u, turned_tangents(self.model, q), matrix))
         moment, couple, jump, force = (
             np.zeros_like(part) for part in (found.moment, found.couple, found.jump, found.force)
         )
-        massive = [group for group in spinning.masses.observables if group.kind.vectors]
-        for number, observed in zip(spinning.bodies, massive, strict=True):
+        massive = [group for group in rotating_frame.masses.observables if group.kind.vectors]
+        for number, observed in zip(rotating_frame.bodies, massive, strict=True):
             group = self._terms[1 + number]
             forces = -group(state, u, loading.loads[number], np.zeros(0))[3]
             group.add_forces(forces, moment, force)
@@ -453,7 +465,7 @@ class Equations:
             part[: tables.of_places].reshape(self.number.shape) for part in (tables.unknown, tables.weight)
         )
         # What is held, number -1, turns by the zero at the end.
-        return np.asarray((np.append(step[: self.turning_unknowns], 0.0)[unknown] * weight).reshape(self.number.shape))
+        return np.asarray((np.append(step[: self.rotation_unknowns], 0.0)[unknown] * weight).reshape(self.number.shape))
 
     def moved(self, state: State, step: Array) -> State:
         """The state after an increment (unknowns + rows,) of all unknowns and multipliers."""
@@ -463,9 +475,9 @@ class Equations:
             q /= np.linalg.norm(q, axis=-1, keepdims=True)
         else:
             q = state.q + turn
-        y = state.y + step[self.turning_unknowns : self.unknowns]
-        wound = self.model.winding.moved(state.q, state.wound, turn, q)
-        return State(q, y, state.lam + step[self.unknowns :], wound)
+        y = state.y + step[self.rotation_unknowns : self.unknowns]
+        unwrapped = self.model.unwrapping.moved(state.q, state.unwrapped, turn, q)
+        return State(q, y, state.lam + step[self.unknowns :], unwrapped)
 
 
 def turned_tangents(model: Model, q: Array) -> Array:
@@ -499,8 +511,8 @@ class _Terms:
         labels, n = tables.labels[number] - tables.of_rows, len(group.data)
         # Elements have their multipliers from those of the loop closures.
         self._rows = slice(int(labels[0, 0]), int(labels[-1, -1]) + 1) if labels.size else slice(0, 0)
-        function = chosen(by_turning(group.kind), evaluations * n, kernels)
-        self._batch = GroupBatch(model, group, function, model.winding.parts[number])
+        function = chosen(rotation_gradient(group.kind), evaluations * n, kernels)
+        self._batch = GroupBatch(model, group, function, model.unwrapping.parts[number])
 
     def add_noise(self, noise: Array) -> None:
         """Judge the sides of what is stiff in some directions by the stiffest one."""
@@ -509,24 +521,26 @@ class _Terms:
             np.maximum.at(noise, self._unknown[used], (0.01 * largest[:, None] * used)[used])
 
     def __call__(self, state: State, places: Array, load: Array, constant: Array) -> list[Array]:
-        """Results of :func:`~sfetcas.mechanics.terms.by_turning` at a state.
+        """Results of :func:`~sfetcas.mechanics.terms.rotation_gradient` at a state.
 
         ``places`` are the displacements (places, axes), ``constant`` the multipliers of elements.
         """
         lam = constant if self._closed is not None else state.lam[self._rows]
-        return self._batch(state.q, places, state.wound, load, lam)
+        return self._batch(state.q, places, state.unwrapped, load, lam)
 
     def entries(self, found: list[Array], *, convex: bool = False) -> Array:
         """What it adds to Newton's matrix, in the order of its tables."""
-        stiffness, spin = found[4], found[5]
+        stiffness, rotation_jacobian = found[4], found[5]
         if convex and not self.kind.has_potential:
             stiffness = np.zeros_like(stiffness)
         elif convex and not self.group.rows:
             width = self.sides.shape[1]
             stiffness = _positive_part(stiffness.reshape(-1, width, width))
         closed = self._closed
-        spin = spin.ravel() if closed is None else spin.ravel()[closed.entry] * closed.value
-        return np.concatenate([stiffness.ravel(), spin, spin])
+        rotation_jacobian = (
+            rotation_jacobian.ravel() if closed is None else rotation_jacobian.ravel()[closed.entry] * closed.value
+        )
+        return np.concatenate([stiffness.ravel(), rotation_jacobian, rotation_jacobian])
 
     def add_forces(self, forces: Array, moments: Array, on_places: Array) -> None:
         """Add moments and forces (n, width) on the sides to those of rotations (rotations, 3) and places, in place."""

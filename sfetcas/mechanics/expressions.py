@@ -20,7 +20,7 @@ from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseMap
 from .equations import Equations
 from .model import Model
-from .rotations import Turn
+from .rotations import RotationFreedom
 from .singles import exponential, moved_rotation, rotation_between, turned_vector
 from .tables import Acting, Tables
 from .terms import energies_of, rows_of
@@ -38,7 +38,7 @@ class Layout:
         Rotations are an array (components, rotations).
     y, lam, factors : int
         Number of displacement unknowns, of multipliers, and of factors of the groups of loads.
-    near : int
+    unwrapped : int
         Number of angles that count turns.
     """
 
@@ -47,7 +47,7 @@ class Layout:
     y: int
     lam: int
     factors: int
-    near: int
+    unwrapped: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +146,12 @@ class SymbolicTerms:
 
     def displacements(self, q: ca.MX, y: ca.MX, given: Given) -> ca.MX:
         """Displacements of all places, (places * axes,)."""
-        moved = self.kept_places(y, given)
+        moved = self.retained_places(y, given)
         if not self.reaching.nnz():
             return moved
         return moved + times(self.reaching, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
 
-    def kept_places(self, y: ca.MX, given: Given) -> ca.MX:
+    def retained_places(self, y: ca.MX, given: Given) -> ca.MX:
         """Displacements of kept places (unknown or prescribed), (places * axes,); undefined for others."""
         positions = self.model.positions
         return times(constant(positions.Y), y) + times(constant(positions.B), given.shift)
@@ -161,9 +161,9 @@ class SymbolicTerms:
         positions = self.model.positions
         return times(constant(positions.W), y) + times(constant(positions.BZ), given.shift)
 
-    def gaps(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> ca.MX:
+    def gaps(self, q: ca.MX, y: ca.MX, given: Given, unwrapped: ca.MX) -> ca.MX:
         """Gaps of the loop closures, then of the rows of joints, (rows,)."""
-        return self.gaps_of(self.every(q, y, given, near), y, given)
+        return self.gaps_of(self.every(q, y, given, unwrapped), y, given)
 
     def gaps_of(self, arguments: list[list[ca.MX]], y: ca.MX, given: Given) -> ca.MX:
         """As :meth:`gaps`, from the arguments that :meth:`every` gives."""
@@ -178,11 +178,11 @@ class SymbolicTerms:
                 rows.append(found)
         return ca.vertcat(closed, *rows)
 
-    def held(self, q: ca.MX, given: Given) -> ca.MX:
+    def with_prescribed_rotations(self, q: ca.MX, given: Given) -> ca.MX:
         """The rotations with prescribed ones set to their values."""
         turn = ca.reshape(given.turn, 3, self.rotations)
         driven = np.any([group.turn.any(axis=1) for group in self.model.groups.values()], axis=0)
-        for i in np.flatnonzero(driven & (self.model.rotations.kind == Turn.HELD)).tolist():
+        for i in np.flatnonzero(driven & (self.model.rotations.kind == RotationFreedom.FIXED)).tolist():
             q[:, i] = exponential(turn[:, i]) if self.model.space else turn[2, i]
         return q
 
@@ -206,14 +206,14 @@ class SymbolicTerms:
         u = ca.horzcat(u, ca.DM.zeros(self.axes, 1)) if (at < 0).any() else u
         return turned, u[:, np.where(at < 0, self.places, at).ravel().tolist()]
 
-    def data(self, number: int, given: Given, near: ca.MX) -> ca.MX:
+    def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
         """Data of a group of terms; the last row of those that count turns is the value near which they do."""
         if number == 0:
             parts = (given.stiffness, given.tangent)
             return ca.vertcat(*(ca.reshape(part, part.shape[0] * self.points, self.elements) for part in parts))
-        part = self.model.winding.parts[number]
+        part = self.model.unwrapping.parts[number]
         data = ca.MX(given.data[number - 1])
-        return data if part is None else ca.vertcat(data[:-1, :], near[part.start : part.stop].T)
+        return data if part is None else ca.vertcat(data[:-1, :], unwrapped[part.start : part.stop].T)
 
     def load(self, number: int, given: Given) -> ca.MX:
         """Loads of a group of terms, (loads, n); for elements their pulls."""
@@ -230,16 +230,16 @@ class SymbolicTerms:
         first = int(labels[0, 0]) if labels.size else 0
         return ca.reshape(lam[first : first + labels.size, :], group.kind.sizes[2], len(group.data))
 
-    def arguments(self, number: int, q: ca.MX, places: ca.MX, given: Given, near: ca.MX) -> list[ca.MX]:
+    def arguments(self, number: int, q: ca.MX, places: ca.MX, given: Given, unwrapped: ca.MX) -> list[ca.MX]:
         """Rotations, displacements, data and loads of the terms of a group, as their functions take them."""
         sides = self.sides(self.model.terms[number], q, places)
-        return [*sides, self.data(number, given, near), self.load(number, given)]
+        return [*sides, self.data(number, given, unwrapped), self.load(number, given)]
 
-    def every(self, q: ca.MX, y: ca.MX, given: Given, near: ca.MX) -> list[list[ca.MX]]:
+    def every(self, q: ca.MX, y: ca.MX, given: Given, unwrapped: ca.MX) -> list[list[ca.MX]]:
         """Arguments of all groups of terms; an empty list for a group without terms."""
-        places = self.kept_places(y, given)
+        places = self.retained_places(y, given)
         groups = enumerate(self.model.terms)
-        return [self.arguments(i, q, places, given, near) if len(group.data) else [] for i, group in groups]
+        return [self.arguments(i, q, places, given, unwrapped) if len(group.data) else [] for i, group in groups]
 
     def energies(self, arguments: list[list[ca.MX]]) -> tuple[ca.MX, ca.MX]:
         """Energy of all terms, and its elastic part, from the arguments that :meth:`every` gives."""
@@ -266,14 +266,14 @@ class Expressions(SymbolicTerms):
         super().__init__(equations.tables, kernels, calls)
         self.equations, model = equations, self.model
         # Centrifugal forces are a load that no factor multiplies.
-        self.loadings = [*model.groups.values(), *([model.spinning.loading] if model.spinning else [])]
+        self.loadings = [*model.groups.values(), *([model.rotating_frame.loading] if model.rotating_frame else [])]
         self.layout = Layout(
             components=model.element.components,
             rotations=self.rotations,
             y=equations.displacement_unknowns,
             lam=equations.rows,
             factors=len(self.loadings),
-            near=model.winding.count,
+            unwrapped=model.unwrapping.count,
         )
         self._number()
         starts = [model.segments.place(part.start) for part in model.segments.parts]
@@ -290,7 +290,7 @@ class Expressions(SymbolicTerms):
         y = self.model.positions.Y
         # Residuals in full coordinates to those of the unknowns; changes of the unknowns to full ones.
         self.gather = sparse(
-            np.concatenate([self.unknown[turning], equations.turning_unknowns + y.column, self.unknown[rows]]),
+            np.concatenate([self.unknown[turning], equations.rotation_unknowns + y.column, self.unknown[rows]]),
             np.concatenate([turning, self.of_places + y.row, rows]),
             np.concatenate([self.weight[turning], y.value, self.weight[rows]]),
             (self.total, self.full),
@@ -349,7 +349,7 @@ class Expressions(SymbolicTerms):
         for sides, values in shares:
             residual += times(self.onto_unknowns(sides), ca.vec(values))
         below = ca.vertcat(times(constant(self.model.positions.W).T, lam), *rows)
-        return residual + ca.vertcat(ca.MX.zeros(self.equations.turning_unknowns), below)
+        return residual + ca.vertcat(ca.MX.zeros(self.equations.rotation_unknowns), below)
 
 
 def data_of(model: Model) -> dict[str, Any]:

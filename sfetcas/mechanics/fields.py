@@ -102,7 +102,7 @@ class Fields:
                 force = force + sign * (laid["force"][0] - raw["force"][0])
                 # What the support does not hold the rows of the obstacle take already.
                 turn = self.model.rotations.ends[touch.member][i]
-                moment = moment + self.balance.held(turn, sign * (laid["moment"][0] - raw["moment"][0]))
+                moment = moment + self.balance.fixed_share(turn, sign * (laid["moment"][0] - raw["moment"][0]))
         return force, moment
 
     def spring(self, name: str) -> SpringState:
@@ -192,7 +192,7 @@ class Fields:
     def _strain_energies(self) -> Array:
         """Of all elements."""
         elements = self.model.terms[0]
-        return GroupBatch(self.model, elements, energies_of(elements.kind))(self.q, self._nodal, self.state.wound)[
+        return GroupBatch(self.model, elements, energies_of(elements.kind))(self.q, self._nodal, self.state.unwrapped)[
             1
         ].ravel()
 
@@ -483,11 +483,11 @@ class Fields:
 
     def too_large(self) -> str:
         """A sentence on the small member deformed most, where its linear elasticity is meaningless; else empty."""
-        small = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
-        worst = [*small, ""][first_of_largest(np.array([*small.values(), 0.0]))]
-        if not small.get(worst, 0.0) > LARGE:
+        superelements = {name: self.bent(name) for name, m in self.model.scene.members.items() if m.type == "small"}
+        worst = [*superelements, ""][first_of_largest(np.array([*superelements.values(), 0.0]))]
+        if not superelements.get(worst, 0.0) > LARGE:
             return ""
-        found = f"{worst!r} by {small[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}"
+        found = f"{worst!r} by {superelements[worst]:.2g} of its length or rad, accepted: up to {LARGE:g}"
         return f"{found}, and to be accurate a few percent; make it flexible"
 
     def pulled(self, member: str) -> float:
@@ -594,7 +594,7 @@ def transferred(source: Any, state: State, target: Any) -> State:
             q[number] = state.q[source.rotations.node_turn[name]]
     y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
     lam = _by_name(source.row_names, state.lam, target.row_names)
-    return State(q, y, lam, state.wound)
+    return State(q, y, lam, state.unwrapped)
 
 
 def _by_name(names: tuple[str, ...], values: Array, wanted: tuple[str, ...]) -> Array:

@@ -209,9 +209,9 @@ class Turning(Term):
             other = data[3:6]
             seen = ca.vertcat(*self.forth(r, ca.vertsplit(other)))
             sine, cosine, share = ca.dot(ca.cross(axis, other), seen), ca.dot(other, seen), 1.0
-        near = data[self.first + self.own]
-        c, s = ca.cos(near / share), ca.sin(near / share)
-        return near + share * ca.atan2(sine * c - cosine * s, cosine * c + sine * s)
+        unwrapped = data[self.first + self.own]
+        c, s = ca.cos(unwrapped / share), ca.sin(unwrapped / share)
+        return unwrapped + share * ca.atan2(sine * c - cosine * s, cosine * c + sine * s)
 
 
 @final

@@ -26,7 +26,7 @@ from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
 from .parts import Parts
-from .rotations import STIFF, Rotations, Turn, end_joints
+from .rotations import STIFF, RotationFreedom, Rotations, end_joints
 from .segments import Segments
 from .singles import turned_vector
 from .terms import GROUND, Discrete, Group, One, Side, Term
@@ -263,7 +263,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
             yield One(Follower(space), *where, nothing, (number,), (place,))
         elif follows:
             yield One(FollowingMoment(space), *where, nothing, (number,))
-        elif space and rotations.kind[number] == Turn.AXIS:
+        elif space and rotations.kind[number] == RotationFreedom.AXIS:
             axis = numbers([*rotations.axis[number], 0.0])
             yield One(AxisMoment(space), *where, axis, (GROUND, number))
         else:

@@ -28,11 +28,11 @@ from .mesh import Mesh
 from .parts import Parts
 from .positions import Positions, entries, place_nodes
 from .pressure import is_pressure
-from .rotations import Rotations, Turn, number_rotations
+from .rotating_frame import RotatingFrame, with_rotating_frame
+from .rotations import RotationFreedom, Rotations, number_rotations
 from .segments import Segments, cut_members
-from .spinning import Spinning, with_spinning
 from .terms import Group, One, grouped
-from .winding import Winding, winding_of
+from .unwrapping import Unwrapping, unwrapping_of
 
 __all__ = ["SOURCES", "Block", "Model", "assemble"]
 
@@ -70,7 +70,7 @@ class Model:
         Terms of joints, springs, small members and loads.
     groups : mapping
         Loadings at factor 1, by the name of their history; None: multiplied by the load factor.
-    spinning : Spinning or None
+    rotating_frame : RotatingFrame or None
         Centrifugal terms in rotating axes.
     """
 
@@ -85,7 +85,7 @@ class Model:
     positions: Positions
     connections: tuple[Group, ...]
     groups: Mapping[str | None, Loading]
-    spinning: Spinning | None = None
+    rotating_frame: RotatingFrame | None = None
 
     @property
     def space(self) -> bool:
@@ -118,9 +118,9 @@ class Model:
         return (elements, *self.connections)
 
     @functools.cached_property
-    def winding(self) -> Winding:
+    def unwrapping(self) -> Unwrapping:
         """The angles that count turns in space."""
-        return winding_of(self.terms, self.space)
+        return unwrapping_of(self.terms, self.space)
 
     @functools.cached_property
     def row_names(self) -> tuple[str, ...]:
@@ -147,8 +147,8 @@ class Model:
         """Whether a group of connections has loads without potential; a moment on what is held does no work."""
         if group.kind.has_potential:
             return False
-        held = (self.rotations.kind[group.turns] == Turn.HELD).all(axis=1) & (group.places.shape[1] == 0)
-        return any(loading.loads[number][~held].any() for loading in self.groups.values())
+        fixed = (self.rotations.kind[group.turns] == RotationFreedom.FIXED).all(axis=1) & (group.places.shape[1] == 0)
+        return any(loading.loads[number][~fixed].any() for loading in self.groups.values())
 
     @functools.cached_property
     def conservative(self) -> bool:
@@ -158,7 +158,7 @@ class Model:
     @property
     def loaded_at_zero(self) -> bool:
         """Whether there may be loads at factor 0: from histories, or in rotating axes."""
-        return bool(self.scene.histories) or self.spinning is not None
+        return bool(self.scene.histories) or self.rotating_frame is not None
 
     @functools.cached_property
     def minimisable(self) -> bool:
@@ -219,8 +219,8 @@ class Model:
         """Loads and prescribed motions at a load factor, multiplied by ``share``; dimensionless."""
         parts = [self.groups[name].scaled(share * value) for name, value in self.factors(factor).items()]
         total = parts[0]
-        if self.spinning is not None:
-            parts.append(self.spinning.loading.scaled(share))
+        if self.rotating_frame is not None:
+            parts.append(self.rotating_frame.loading.scaled(share))
         for part in parts[1:]:
             total = total.plus(part)
         return total
@@ -232,7 +232,7 @@ class Model:
         parts = Parts(scene, self.mesh, self.element, self.scales, self.beams, self.segments, self.rotations)
         return unit_loadings(parts, self.connections)[motions[name].history].unloaded()
 
-    def held(self, loading: Loading) -> Array:
+    def prescribed_rotations(self, loading: Loading) -> Array:
         """Rotations (rotations, components): prescribed ones at their values, all others undeformed."""
         if not self.space:
             return loading.turn[:, 2:3].copy()
@@ -300,13 +300,13 @@ def assemble(
         connections=connections,
         groups=unit_loadings(parts, connections),
     )
-    return model if scene.rotating is None else with_spinning(model)
+    return model if scene.rotating is None else with_rotating_frame(model)
 
 
 def _blocks(model: Model) -> tuple[Block, ...]:
     """What the model consists of, and why."""
     kind = model.rotations.kind
-    free, about = int((kind == Turn.FREE).sum()), int((kind == Turn.AXIS).sum())
+    free, about = int((kind == RotationFreedom.FREE).sum()), int((kind == RotationFreedom.AXIS).sum())
     blocks = []
     if model.space:
         blocks.append(Block("quaternions", 4 * free, f"4 for each of {counted(free, 'free rotation')}: {model.reason}"))
@@ -317,7 +317,7 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
     if model.positions.unknowns:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
-        if model.assembly != "nodal" and model.segments.kept:
+        if model.assembly != "nodal" and model.segments.retained:
             why = "springs, small members, slides or followers act upon places"
         blocks.append(Block("displacements", len(model.positions.unknowns), f"{why}: positions are unknowns"))
     if model.positions.rows:

@@ -8,7 +8,7 @@ since the undeformed scene, ``y`` the displacement unknowns and ``b`` the prescr
 
     u = E Delta + Y y + B b,      0 = Z Delta + W y + B_Z b.
 
-A place that is *kept* has its displacement among ``y`` (or prescribed), component by component, in either assembly.
+A place that is *retained* has its displacement among ``y`` (or prescribed), component by component, in either assembly.
 
 Source: Barraco and Munteanu, Part 1, section 1 (the two ways of assembling).
 """
@@ -43,7 +43,7 @@ class Positions:
         Gaps of the closing equations.
     rows, unknowns : tuple of str
         Names of the closing equations and of the displacement unknowns.
-    kept : ndarray (places, axes)
+    retained : ndarray (places, axes)
         For each component of a kept place its index in ``y``; -1 where it is prescribed or the place is not kept.
     """
 
@@ -55,7 +55,7 @@ class Positions:
     BZ: SparseMap
     rows: tuple[str, ...]
     unknowns: tuple[str, ...]
-    kept: Index
+    retained: Index
 
 
 def _slides(scene: Scene, name: str) -> bool:
@@ -66,7 +66,7 @@ def _slides(scene: Scene, name: str) -> bool:
 
 
 Source = tuple[str, int]
-"""What a displacement depends on: the reach (E), unknowns (Y) or prescribed displacement (B) of a number."""
+"""What a displacement depends on: the chord (E), unknowns (Y) or prescribed displacement (B) of a number."""
 
 
 @dataclass
@@ -99,7 +99,7 @@ class _Placing:
         self.labels: list[str] = []
         self.rows: list[tuple[str, _Place]] = []
         self.places: dict[str, _Place] = {}
-        self.kept = np.full((len(segments.places), axes), -1, dtype=np.intp)
+        self.retained = np.full((len(segments.places), axes), -1, dtype=np.intp)
         self.number = {name: i for i, name in enumerate(segments.places)}
         self.free = {n for n in segments.places if n not in scene.nodes or scene.nodes[n].support == "free"}
         self.sliding = {n for n in scene.nodes if _slides(scene, n)}
@@ -116,7 +116,7 @@ class _Placing:
             if name not in self.free and name not in self.sliding:
                 self.places[name] = self._prescribed(name)
         for name in loose:
-            if name in self.segments.kept:
+            if name in self.segments.retained:
                 self._keep(name)
             elif not closing:
                 self.places[name] = self._unknown(name)
@@ -128,7 +128,7 @@ class _Placing:
         within = self._loops_within_bodies()
         for i, part in enumerate(self.segments.parts):
             if i not in self._used | within:
-                gap = self.places[part.start].plus(self._reach(i)).plus(self.places[part.end], -1.0)
+                gap = self.places[part.start].plus(self._chord(i)).plus(self.places[part.end], -1.0)
                 self._close(gap, [f"closing of {part.member}, {c}" for c in "xyz"[: self.axes]], self.eye)
 
     def _loops_within_bodies(self) -> set[int]:
@@ -162,7 +162,7 @@ class _Placing:
     def _prescribed(self, name: str) -> _Place:
         return _Place({("B", self.number[name]): self.eye})
 
-    def _reach(self, number: int) -> _Place:
+    def _chord(self, number: int) -> _Place:
         return _Place({("E", number): self.eye})
 
     def _unknown(self, name: str) -> _Place:
@@ -177,7 +177,7 @@ class _Placing:
     def _keep(self, name: str) -> None:
         """A place by its components; on a guide with the equations that keep it there."""
         first = len(self.labels)
-        self.kept[self.number[name]] = first + np.arange(self.axes)
+        self.retained[self.number[name]] = first + np.arange(self.axes)
         self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
         self.places[name] = _Place({("Y", first): self.eye})
         if name in self.sliding:
@@ -204,7 +204,7 @@ class _Placing:
                 if i in self._used or there in self.places:
                     continue
                 self._used.add(i)
-                found = self.places[here].plus(self._reach(i), 1.0 if here == part.start else -1.0)
+                found = self.places[here].plus(self._chord(i), 1.0 if here == part.start else -1.0)
                 self.places[there] = self._across(there, found) if there in self.sliding else found
                 front.append(there)
 
@@ -248,7 +248,7 @@ def place_nodes(scene: Scene, segments: Segments, axes: int, closing: bool, bodi
         BZ=low["B"],
         rows=tuple(label for label, _ in placing.rows),
         unknowns=tuple(placing.labels),
-        kept=placing.kept,
+        retained=placing.retained,
     )
 
 

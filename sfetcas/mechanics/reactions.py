@@ -23,7 +23,7 @@ from ..mathematics.arrays import Array, Index, unit
 from ..mathematics.linear import SparseMap, smallest
 from .connections import connections_of
 from .load_terms import elements_of, inner_cut
-from .rotations import STIFF, Turn, end_joints
+from .rotations import STIFF, RotationFreedom, end_joints
 from .tables import Tables
 from .terms import GROUND
 
@@ -147,21 +147,21 @@ class Reactions:
             found -= np.outer(along, along)
         return found
 
-    def held(self, number: int) -> Array:
+    def fixed_directions(self, number: int) -> Array:
         """Projection (3, 3) of moments onto those that the ground can exert on a rotation: none about free axes."""
         kind = self.model.rotations.kind[number]
-        if kind == Turn.AXIS:
+        if kind == RotationFreedom.AXIS:
             axis = self.model.rotations.axis[number]
             return np.asarray(np.eye(3) - np.outer(axis, axis))
-        return np.zeros((3, 3)) if kind == Turn.FREE else np.eye(3)
+        return np.zeros((3, 3)) if kind == RotationFreedom.FREE else np.eye(3)
 
     def turned(self, node: str) -> list[tuple[int, Array]]:
         """Numbers of the rotations on which a support exerts moments, with the projection (3, 3) onto these moments."""
         number, record = self.model.rotations.node_turn[node], self.model.scene.nodes[node]
         if number is None:
             return [(turn, np.eye(3)) for turn in self._pinned(node)]
-        free = self.model.rotations.kind[number] == Turn.FREE
-        return [(number, np.eye(3) if free and record.support == "universal" else self.held(number))]
+        free = self.model.rotations.kind[number] == RotationFreedom.FREE
+        return [(number, np.eye(3) if free and record.support == "universal" else self.fixed_directions(number))]
 
     def _pinned(self, node: str) -> list[int]:
         """Rotations of member ends that a support itself pins, its node having none."""

@@ -14,13 +14,13 @@ from ..mathematics.arrays import Array, Index, numbers, unit
 from .elements import Element
 from .mesh import Mesh
 
-__all__ = ["STIFF", "Pin", "Rotations", "Turn", "end_joints", "number_rotations"]
+__all__ = ["STIFF", "Pin", "RotationFreedom", "Rotations", "end_joints", "number_rotations"]
 
 
-class Turn(enum.IntEnum):
+class RotationFreedom(enum.IntEnum):
     """Restraint of a rotation by the ground: HELD is prescribed, AXIS turns about a fixed axis, FREE is free."""
 
-    HELD = 0
+    FIXED = 0
     AXIS = 1
     FREE = 2
 
@@ -57,7 +57,7 @@ class Rotations:
     turns : ndarray (elements, p + 1)
         Numbers of the rotations at the nodes of each element.
     kind : ndarray (rotations,)
-        Restraint of each rotation, see :class:`Turn`.
+        Restraint of each rotation, see :class:`RotationFreedom`.
     axis : ndarray (rotations, 3)
         Unit axis of rotations of kind AXIS, fixed axes; without meaning for others.
     pins : tuple of Pin
@@ -97,7 +97,7 @@ def number_rotations(scene: Scene, mesh: Mesh, element: Element) -> Rotations:
             chain = [first, *inner, ends[name][-1]]
             turns += [chain[e : e + element.order + 1] for e in range(0, len(chain) - 1, element.order)]
     for name, node in scene.nodes.items():
-        if node.joint == "rigid" and numbering.held[name] != Turn.FREE:
+        if node.joint == "rigid" and numbering.freedom[name] != RotationFreedom.FREE:
             numbering.of(("node", name))
     return Rotations(
         turns=np.array(turns, dtype=np.intp).reshape(-1, element.order + 1),
@@ -118,19 +118,19 @@ class _Numbers:
 
     def __init__(self, scene: Scene, space: bool) -> None:
         self.scene = scene
-        self.kind: list[Turn] = []
+        self.kind: list[RotationFreedom] = []
         self.axis: list[tuple[float, float, float]] = []
         self.given: dict[Key, int] = {}
-        self.held = {name: _node_turn(node, scene, name, space) for name, node in scene.nodes.items()}
+        self.freedom = {name: _node_freedom(node, scene, name, space) for name, node in scene.nodes.items()}
         self._parent: dict[Key, Key] = {}
-        self._limits: dict[Key, list[tuple[Turn, tuple[float, float, float]]]] = {}
+        self._limits: dict[Key, list[tuple[RotationFreedom, tuple[float, float, float]]]] = {}
         for name, node in scene.nodes.items():
-            if node.joint == "rigid" and self.held[name] != Turn.FREE:
-                self._limits.setdefault(("node", name), []).append((self.held[name], node.turn_axis))
+            if node.joint == "rigid" and self.freedom[name] != RotationFreedom.FREE:
+                self._limits.setdefault(("node", name), []).append((self.freedom[name], node.turn_axis))
         for name, member in scene.members.items():
             for i, n in enumerate(member.nodes):
-                if space and self.held[n] != Turn.FREE and scene.nodes[n].joint == "hinge":
-                    self._limits.setdefault(("end", name, i), []).append((Turn.AXIS, scene.nodes[n].axis))
+                if space and self.freedom[n] != RotationFreedom.FREE and scene.nodes[n].joint == "hinge":
+                    self._limits.setdefault(("end", name, i), []).append((RotationFreedom.AXIS, scene.nodes[n].axis))
             if member.type == "rigid":
                 self._join(*(self.key(name, i) for i in range(2)))
 
@@ -151,8 +151,10 @@ class _Numbers:
             self._parent[b] = a
             self._limits[a] = self._limits.get(a, []) + self._limits.pop(b, [])
 
-    def new(self, turn: Turn = Turn.FREE, about: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> int:
-        self.kind.append(turn)
+    def new(
+        self, freedom: RotationFreedom = RotationFreedom.FREE, about: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    ) -> int:
+        self.kind.append(freedom)
         self.axis.append(about)
         return len(self.kind) - 1
 
@@ -168,16 +170,22 @@ class _Numbers:
         return self.of(self.key(member, i))
 
 
-def _together(limits: list[tuple[Turn, tuple[float, float, float]]]) -> tuple[Turn, tuple[float, float, float]]:
+def _together(
+    limits: list[tuple[RotationFreedom, tuple[float, float, float]]],
+) -> tuple[RotationFreedom, tuple[float, float, float]]:
     """How a rotation may change under all of these: two hinges that are not parallel hold it."""
     about = (0.0, 0.0, 1.0)
-    if any(turn == Turn.HELD for turn, _ in limits):
-        return Turn.HELD, about
-    axes = [unit(axis) for turn, axis in limits if turn == Turn.AXIS]
+    if any(freedom == RotationFreedom.FIXED for freedom, _ in limits):
+        return RotationFreedom.FIXED, about
+    axes = [unit(axis) for freedom, axis in limits if freedom == RotationFreedom.AXIS]
     if not axes:
-        return Turn.FREE, about
+        return RotationFreedom.FREE, about
     same = all(np.linalg.norm(np.cross(axes[0], axis)) < tolerances.PARALLEL for axis in axes)
-    return (Turn.AXIS, next(axis for turn, axis in limits if turn == Turn.AXIS)) if same else (Turn.HELD, about)
+    return (
+        (RotationFreedom.AXIS, next(axis for freedom, axis in limits if freedom == RotationFreedom.AXIS))
+        if same
+        else (RotationFreedom.FIXED, about)
+    )
 
 
 STIFF = ("rigid", "slider")
@@ -190,11 +198,11 @@ def end_joints(scene: Scene, member: Member) -> list[tuple[str, str]]:
     return [(n, scene.nodes[n].joint if scene.nodes[n].joint != "rigid" else release) for n, release in pairs]
 
 
-def _node_turn(node: Node, scene: Scene, name: str, space: bool) -> Turn:
+def _node_freedom(node: Node, scene: Scene, name: str, space: bool) -> RotationFreedom:
     driven = any(m.node == name and m.rotation is not None and m.between is None for m in scene.motions.values())
     if node.turn == "fixed" or (node.turn == "hinge" and driven):
-        return Turn.HELD
-    return Turn.AXIS if node.turn == "hinge" and space else Turn.FREE
+        return RotationFreedom.FIXED
+    return RotationFreedom.AXIS if node.turn == "hinge" and space else RotationFreedom.FREE
 
 
 def _pins(scene: Scene, numbers: _Numbers) -> Iterator[Pin]:
@@ -211,7 +219,7 @@ def _pins(scene: Scene, numbers: _Numbers) -> Iterator[Pin]:
         for member, i in ends_at[name]:
             joint = end_joints(scene, scene.members[member])[i][1]
             turn = numbers.of_end(member, i)
-            if joint in STIFF or (node.joint == "hinge" and numbers.held[name] != Turn.FREE):
+            if joint in STIFF or (node.joint == "hinge" and numbers.freedom[name] != RotationFreedom.FREE):
                 continue
             if base is None:
                 base = turn

@@ -40,7 +40,7 @@ class Segments:
     ----------
     places : tuple of str
         Names: the nodes of the scene, then places within members and sliding ends.
-    kept : frozenset of str
+    retained : frozenset of str
         Places whose displacement is prescribed or an unknown in either assembly.
     parts : tuple of Segment
         In the order of their elements.
@@ -51,14 +51,14 @@ class Segments:
     """
 
     places: tuple[str, ...]
-    kept: frozenset[str]
+    retained: frozenset[str]
     parts: tuple[Segment, ...]
     owner: Index
     ends: Mapping[tuple[str, int], str]
 
     def alike(self, other: Segments) -> bool:
         """Whether other segments of the same scene join the same places by as many elements."""
-        return (self.places, self.kept, self.parts) == (other.places, other.kept, other.parts)
+        return (self.places, self.retained, self.parts) == (other.places, other.retained, other.parts)
 
     @property
     def first(self) -> Index:
@@ -98,7 +98,7 @@ def cushioned(member: str, at: float) -> str:
     return f"{member} cushioned at {at:.17g}"
 
 
-def _kept_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
+def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
     inner = range(1, len(cuts) - 1)
     following = [load for load in scene.loads.values() if load.member == member and load.follows]
@@ -124,7 +124,7 @@ def _sprung(scene: Scene) -> Iterator[str]:
 def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     """The segments of a scene on a mesh."""
     places, ends = list(scene.nodes), {}
-    kept: set[str] = set()
+    retained: set[str] = set()
     parts: list[Segment] = []
     begin = 0
     for name, member in scene.members.items():
@@ -133,26 +133,26 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
             if joint in SLIDING:
                 ends[name, i] = f"{node} at {name}"
                 places.append(ends[name, i])
-                kept |= {node, ends[name, i]}
+                retained |= {node, ends[name, i]}
         if name not in mesh.cuts:
             continue
         cuts = mesh.cuts[name]
         touched, last = _touched(mesh, name), len(cuts) - 1
-        kept |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
-        inner = range(1, last) if mesh.places and member.type == "flexible" else _kept_cuts(scene, name, cuts)
+        retained |= {ends[name, i] for i, cut in enumerate((0, last)) if cut in touched}
+        inner = range(1, last) if mesh.places and member.type == "flexible" else _retained_cuts(scene, name, cuts)
         stops = [0, *sorted({*inner, *touched} - {0, last}), last]
         here = ends[name, 0]
         for a, b in zip(stops, stops[1:], strict=False):
             there = ends[name, 1] if b == len(cuts) - 1 else touched.get(b, f"{name} at {cuts[b]:.12g}")
             if b < len(cuts) - 1:
                 places.append(there)
-                kept.add(there)
+                retained.add(there)
             parts.append(Segment(name, slice(begin + a, begin + b), here, there))
             here = there
         begin += len(cuts) - 1
     # Turning axes act upon all that has mass.
-    kept |= set(scene.nodes) if scene.rotating is not None else set()
-    kept |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
+    retained |= set(scene.nodes) if scene.rotating is not None else set()
+    retained |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
-    return Segments(tuple(places), frozenset(kept), tuple(parts), owner, ends)
+    return Segments(tuple(places), frozenset(retained), tuple(parts), owner, ends)

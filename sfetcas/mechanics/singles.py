@@ -83,12 +83,18 @@ def rotation_between(space: bool) -> ca.Function:
 
 @functools.cache
 def counted_angle() -> ca.Function:
-    """``(a, b, axis, across, crossed, near) ->`` angle of side b relative to side a in space, nearest to ``near``.
+    """``(a, b, axis, across, crossed, unwrapped) ->`` angle of side b relative to side a in space, nearest to
+    ``unwrapped``.
 
-    See :class:`~sfetcas.mechanics.winding.Winding`.
+    See :class:`~sfetcas.mechanics.unwrapping.Unwrapping`.
     """
     a, b = ca.SX.sym("a", 4), ca.SX.sym("b", 4)
-    axis, across, crossed, near = ca.SX.sym("axis", 3), ca.SX.sym("across", 3), ca.SX.sym("crossed"), ca.SX.sym("near")
+    axis, across, crossed, unwrapped = (
+        ca.SX.sym("axis", 3),
+        ca.SX.sym("across", 3),
+        ca.SX.sym("crossed"),
+        ca.SX.sym("unwrapped"),
+    )
     q = ca.vertsplit(a)
     r = product([q[0], -q[1], -q[2], -q[3]], ca.vertsplit(b))
     seen = ca.vertcat(*turned(r, ca.vertsplit(across)))
@@ -96,8 +102,8 @@ def counted_angle() -> ca.Function:
     cosine = ca.if_else(crossed, ca.dot(across, seen), r[0])
     share = ca.if_else(crossed, 1.0, 2.0)
     raw, period = share * ca.atan2(sine, cosine), 2.0 * ca.pi * share
-    angle = raw + period * ca.floor((near - raw) / period + 0.5)
-    return ca.Function("counted_angle", [a, b, axis, across, crossed, near], [angle])
+    angle = raw + period * ca.floor((unwrapped - raw) / period + 0.5)
+    return ca.Function("counted_angle", [a, b, axis, across, crossed, unwrapped], [angle])
 
 
 @functools.cache

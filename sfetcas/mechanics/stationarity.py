@@ -15,7 +15,7 @@ from ..mathematics.constants import picked, sparse, times
 from .expressions import Expressions, Given
 from .load_terms import elements_of
 from .tables import Places
-from .terms import by_turning, forces_by_turning
+from .terms import rotation_forces, rotation_gradient
 
 __all__ = ["Forces", "Stationarity", "summed"]
 
@@ -44,7 +44,7 @@ class Stationarity:
         For each group of terms the full coordinates of its sides, and the forces and moments that it takes from them.
     on_places : MX
         Dead forces on places, as a residual.
-    spin : MX (axes, turns * nodes of elements)
+    rotation_jacobian : MX (axes, turns * nodes of elements)
         Derivatives of the chords of elements by rotations of their nodes.
     """
 
@@ -55,7 +55,7 @@ class Stationarity:
         y: ca.MX,
         lam: ca.MX,
         given: Given,
-        near: ca.MX,
+        unwrapped: ca.MX,
         forces: Forces | None = None,
         *,
         entries: bool = True,
@@ -63,17 +63,20 @@ class Stationarity:
         forces, self._expressions = forces or Forces(), expressions
         model, tables = expressions.model, expressions.tables
         self._lam, self._given, self._further = lam[: len(model.positions.rows), :], given, forces
-        places, self._closed = expressions.kept_places(y, given), expressions.open_gaps(y, given)
+        places, self._closed = expressions.retained_places(y, given), expressions.open_gaps(y, given)
         self.shares: list[tuple[Index, ca.MX]] = []
         self.entries: list[ca.MX] = []
         self.on_places, self._rows = forces.on_places - given.force, []
-        self.spin = ca.MX(expressions.axes, 0)
+        self.rotation_jacobian = ca.MX(expressions.axes, 0)
         for number, group in enumerate(model.terms):
-            n, function = len(group.data), by_turning(group.kind) if entries else forces_by_turning(group.kind)
+            n, function = len(group.data), rotation_gradient(group.kind) if entries else rotation_forces(group.kind)
             if not n:
                 self.shares.append((tables.sides[number], ca.MX(tables.sides[number].shape[1], 0)))
                 continue
-            arguments = [*expressions.arguments(number, q, places, given, near), expressions.multipliers(number, lam)]
+            arguments = [
+                *expressions.arguments(number, q, places, given, unwrapped),
+                expressions.multipliers(number, lam),
+            ]
             if number == 0:
                 arguments[3] += ca.reshape(ca.MX(forces.pull) + ca.MX.zeros(given.pull.shape), *arguments[3].shape)
             found = expressions.many(function, n)(*arguments)
@@ -87,9 +90,9 @@ class Stationarity:
                 continue
             self.entries.append(ca.vec(stiff[0]))
             if number == 0:
-                self.spin, closed = stiff[1], tables.closed
-                spins = picked(ca.vec(self.spin), closed.entry) * ca.DM(closed.value)
-                self.entries += [spins, spins]
+                self.rotation_jacobian, closed = stiff[1], tables.closed
+                rotation_jacobians = picked(ca.vec(self.rotation_jacobian), closed.entry) * ca.DM(closed.value)
+                self.entries += [rotation_jacobians, rotation_jacobians]
             elif group.rows:
                 self.entries += [ca.vec(stiff[1])] * 2
 

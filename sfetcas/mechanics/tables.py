@@ -19,7 +19,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array, Index
 from .model import Model
-from .rotations import Turn
+from .rotations import RotationFreedom
 
 __all__ = ["Acting", "Closed", "Entries", "Pattern", "Places", "Tables"]
 
@@ -117,7 +117,7 @@ class Tables:
         first is the angle, or the first two are the scalar and the vector's component along the axis.
     place_number : ndarray (places, axes)
         Unknown of each component of a displacement that is an unknown by itself, else -1.
-    turning_unknowns, displacement_unknowns, unknowns, rows, total : int
+    rotation_unknowns, displacement_unknowns, unknowns, rows, total : int
         Number of rotation and displacement unknowns, their sum, number of constraint rows, and the sum of all.
     of_places, of_rows, full : int
         Where displacements and multipliers begin among the full coordinates, and their number.
@@ -147,19 +147,21 @@ class Tables:
         model, turns = self.model, self.width
         about = 2 if self._components and model.space else 1
         count = np.where(
-            model.rotations.kind == Turn.FREE, turns, np.where(model.rotations.kind == Turn.AXIS, about, 0)
+            model.rotations.kind == RotationFreedom.FREE,
+            turns,
+            np.where(model.rotations.kind == RotationFreedom.AXIS, about, 0),
         )
         ends = np.cumsum(count)
         self.number = np.full((len(count), turns), -1, dtype=np.intp)
         for i in range(turns):
             here = count > i
             self.number[here, i] = (ends - count)[here] + i
-        self.turning_unknowns = int(ends[-1]) if len(ends) else 0
+        self.rotation_unknowns = int(ends[-1]) if len(ends) else 0
         self.displacement_unknowns = len(model.positions.unknowns)
-        kept = model.positions.kept
-        self.place_number = np.where(kept < 0, -1, self.turning_unknowns + kept)
+        retained = model.positions.retained
+        self.place_number = np.where(retained < 0, -1, self.rotation_unknowns + retained)
         self.rows = len(model.row_names)
-        self.unknowns = self.turning_unknowns + self.displacement_unknowns
+        self.unknowns = self.rotation_unknowns + self.displacement_unknowns
         self.total = self.unknowns + self.rows
 
     def _full(self) -> None:
@@ -170,12 +172,12 @@ class Tables:
         self.full = self.of_rows + self.rows
         unknown, weight = np.full(self.full, -1, np.intp), np.ones(self.full)
         unknown[: self.of_places] = self.number.ravel()
-        for i in np.flatnonzero(model.rotations.kind == Turn.AXIS) if model.space else ():
+        for i in np.flatnonzero(model.rotations.kind == RotationFreedom.AXIS) if model.space else ():
             vector = slice(width * (i + 1) - 3, width * (i + 1))
             unknown[vector], weight[vector] = self.number[i, width - 3], model.rotations.axis[i]
-        # What acts between places acts upon kept ones, and of these each component is one unknown.
+        # What acts between places acts upon retained ones, and of these each component is one unknown.
         y = model.positions.Y
-        unknown[self.of_places + y.row], weight[self.of_places + y.row] = self.turning_unknowns + y.column, y.value
+        unknown[self.of_places + y.row], weight[self.of_places + y.row] = self.rotation_unknowns + y.column, y.value
         unknown[self.of_rows :] = self.unknowns + np.arange(self.rows)
         self.unknown, self.weight = unknown, weight
 
@@ -273,7 +275,7 @@ class Tables:
         """The positions of entries, then those of displacements in loop closures, of one last entry, the number 1."""
         w = self.model.positions.W
         row, column, value, entry = entries.places
-        r, c = self.unknowns + w.row, self.turning_unknowns + w.column
+        r, c = self.unknowns + w.row, self.rotation_unknowns + w.column
         return (
             np.concatenate([row, r, c]),
             np.concatenate([column, c, r]),

@@ -36,12 +36,12 @@ __all__ = [
     "Side",
     "Term",
     "answers_of",
-    "by_turning",
     "curvatures_of",
     "energies_of",
-    "forces_by_turning",
     "grouped",
     "name_of",
+    "rotation_forces",
+    "rotation_gradient",
     "rows_of",
     "slopes_of",
 ]
@@ -129,8 +129,8 @@ class Term(Components, abc.ABC):
         """Axis (n, 3) of the first side and direction (n, 3) of the second whose angle about the axis counts turns.
 
         A zero direction means the angle of the rotation itself.  For such terms the last number of the data is the
-        reference value of the angle, see :class:`~sfetcas.mechanics.winding.Winding`.  None for terms without such an
-        angle.
+        reference value of the angle, see :class:`~sfetcas.mechanics.unwrapping.Unwrapping`.  None for terms without
+        such an angle.
         """
         return None
 
@@ -200,13 +200,13 @@ class Term(Components, abc.ABC):
 
     # -- derivatives, where a kind has a shorter way to them than the whole expression ---------------
 
-    def turning(self) -> ca.Function:
-        """The function :func:`by_turning` of this kind."""
-        return _by_turning(self)
+    def rotation_gradient(self) -> ca.Function:
+        """The function :func:`rotation_gradient` of this kind."""
+        return _rotation_gradient(self)
 
-    def turning_forces(self) -> ca.Function:
-        """The function :func:`forces_by_turning` of this kind."""
-        whole = by_turning(self)
+    def rotation_forces(self) -> ca.Function:
+        """The function :func:`rotation_forces` of this kind."""
+        whole = rotation_gradient(self)
         symbols = whole.sx_in()
         found = whole.call(symbols)
         names = whole.name_in()
@@ -344,7 +344,7 @@ def _work(kind: Term, arguments: list[ca.SX]) -> ca.SX:
 
 
 @functools.cache
-def by_turning(kind: Term) -> ca.Function:
+def rotation_gradient(kind: Term) -> ca.Function:
     """``(q, u, data, load, lam) ->`` energy, its part without loads, rows, gradient, stiffness, Jacobian of the rows.
 
     Derivatives of the Lagrangian ``energy + lam.rows`` by rotations about the fixed axes of all sides, then by all
@@ -358,24 +358,24 @@ def by_turning(kind: Term) -> ca.Function:
 
     Source: Barraco and Munteanu, Part 1, section 4 (virtual work); Argyris 1982 (moments that are not conservative).
     """
-    return kind.turning()
+    return kind.rotation_gradient()
 
 
-def _by_turning(kind: Term) -> ca.Function:
+def _rotation_gradient(kind: Term) -> ca.Function:
     arguments, energy, rows, forces = _said(kind)
     q, u = arguments[0], arguments[1]
     x = ca.vertcat(ca.vec(q), ca.vec(u))
     hessian, gradient = ca.hessian(energy + ca.dot(arguments[4], rows), x)
-    spin, radial = [ca.SX.eye(q.numel())], ca.SX.zeros(u.numel(), 1)
+    blocks, radial = [ca.SX.eye(q.numel())], ca.SX.zeros(u.numel(), 1)
     if kind.space:
         sides = [ca.vertsplit(q[:, i]) for i in range(q.shape[1])]
         columns = [[ca.vertcat(*product([0.0, *a], side)) for a in np.eye(3).tolist()] for side in sides]
-        spin = [0.5 * ca.horzcat(*c) for c in columns]
+        blocks = [0.5 * ca.horzcat(*c) for c in columns]
         parts = [ca.dot(q[:, i], gradient[4 * i : 4 * i + 4]) for i in range(q.shape[1])]
         radial = ca.vertcat(*[part for part in parts for _ in range(3)], radial)
     else:
         radial = ca.SX.zeros(x.numel(), 1)
-    basis = ca.diagcat(*spin, ca.SX.eye(u.numel()))
+    basis = ca.diagcat(*blocks, ca.SX.eye(u.numel()))
     stiffness = ca.mtimes(basis.T, ca.mtimes(hessian, basis)) - 0.25 * ca.diag(radial)
     gradient = ca.mtimes(basis.T, gradient)
     if forces.numel():
@@ -389,8 +389,8 @@ def _by_turning(kind: Term) -> ca.Function:
         ca.densify(stiffness),
         ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
     ]
-    names = ["energy", "stored", "rows", "gradient", "stiffness", "spin"]
-    return ca.Function(f"turning_{name_of(kind)}", arguments, results, [*ARGUMENTS], names)
+    names = ["energy", "stored", "rows", "gradient", "stiffness", "rotation_jacobian"]
+    return ca.Function(f"rotation_gradient_{name_of(kind)}", arguments, results, [*ARGUMENTS], names)
 
 
 def _halves(forces: ca.SX, rotations: int, space: bool) -> ca.SX:
@@ -403,9 +403,10 @@ def _halves(forces: ca.SX, rotations: int, space: bool) -> ca.SX:
 
 
 @functools.cache
-def forces_by_turning(kind: Term) -> ca.Function:
-    """``(q, u, data, load, lam) ->`` rows and gradient of :func:`by_turning` alone, as a short expression graph."""
-    return kind.turning_forces()
+def rotation_forces(kind: Term) -> ca.Function:
+    """``(q, u, data, load, lam) ->`` rows and gradient of :func:`rotation_gradient` alone, as a short expression
+    graph."""
+    return kind.rotation_forces()
 
 
 @functools.cache

@@ -388,7 +388,9 @@ class Arguments:
         everything = Program(self.expressions, self._every())
         self._layout, self._groups = everything.sizes, list(self.model.groups)
         told, data = Active.of(results.rest(symbolic)), self._data(symbolic, everything)
-        self._told, self._given = (_Part(part, self._symbols, name) for part, name in ((told, "rest"), (data, "data")))
+        self._undeformed, self._given = (
+            _Part(part, self._symbols, name) for part, name in ((told, "rest"), (data, "data"))
+        )
         self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
 
@@ -438,13 +440,13 @@ class Arguments:
 
     def _check(self, symbolic: Model) -> None:
         """Refuse numbers that the unknowns themselves depend on, and those on which nothing depends."""
-        parts = [symbolic.rotations.axis, symbolic.winding.axis, symbolic.winding.across]
+        parts = [symbolic.rotations.axis, symbolic.unwrapping.axis, symbolic.unwrapping.across]
         axes = _Part(gathered(parts), self._symbols, "axes")
         for i, turns in zip(self._own, axes.numbers, strict=True):
             if turns:
                 message = "found a number that turns an axis about which angles are unknowns or counted"
                 raise SceneError(f"{message}, accepted: one that leaves it as it is", ("arguments", self._names[i]))
-        for i, used in zip(self._own, self._told.numbers | self._given.numbers, strict=True):
+        for i, used in zip(self._own, self._undeformed.numbers | self._given.numbers, strict=True):
             if not used:
                 message = "found a number on which nothing depends, accepted: one that the equilibrium depends on"
                 raise SceneError(message, ("arguments", self._names[i]))
@@ -500,7 +502,7 @@ class Arguments:
 
     def undeformed(self, p: ca.MX) -> ca.MX:
         """Undeformed positions as :meth:`Results.rest` gives them, for numbers (numbers,)."""
-        return self._told.at(picked(p, np.array(self._own, dtype=np.intp)))
+        return self._undeformed.at(picked(p, np.array(self._own, dtype=np.intp)))
 
     def given(self, p: ca.MX) -> ca.MX:
         """Data and loads as :class:`~sfetcas.solvers.program.Program` takes them, for numbers (numbers,)."""

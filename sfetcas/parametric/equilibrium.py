@@ -102,7 +102,7 @@ class EquilibriumSolver:
         given_by_p = ca.densify(ca.jacobian(self.arguments.given(p), p))
         residual = program.stationarity.residual
         # What motions prescribe turns held nodes, too.
-        held_by_p = ca.densify(ca.jtimes(program.held_expression, given, given_by_p))
+        held_by_p = ca.densify(ca.jtimes(program.prescribed_expression, given, given_by_p))
         out = ca.jtimes(residual, given, given_by_p) + ca.jtimes(residual, state, held_by_p)
         step = -ca.solve(program.matrix, ca.densify(out), "qr", {"eps": 1e-300})
         changed = ca.densify(held_by_p + ca.mtimes(program.moving, step))

@@ -32,7 +32,7 @@ from .results import Results
 
 __all__ = ["Implicit", "Slopes"]
 
-FIRMER = 1000.0
+LARGE_PRIMAL_FACTOR = 1000.0
 """Times the weight for a second attempt: where numbers act along a neutral direction both differ."""
 
 SINGULAR = 1e-5
@@ -93,7 +93,7 @@ class Implicit:
         self._arguments, self._results, self._program = arguments, results, arguments.program
         self._weight, self._unique = weight, unique
         self.total, self._count = arguments.expressions.total, len(arguments.defaults)
-        self.turning = self._program.equations.turning_unknowns
+        self.rotation_unknowns = self._program.equations.rotation_unknowns
         self._symmetric = self._program.model.has_potential
         self._batches: dict[str, Batch] = {}
         self._data = _Data(arguments)
@@ -110,7 +110,7 @@ class Implicit:
         program, (x, state) = self._program, self._symbols
         step, data = ca.vertsplit(x, [0, self.total, self.total + self._data.size])
         given, rest = self._data.whole(data)
-        hold = ca.Function("hold", [program.state_symbol, program.symbol], [program.held_expression])
+        hold = ca.Function("hold", [program.state_symbol, program.symbol], [program.prescribed_expression])
         there = hold.call([state, given], True)[0]
         if moved:
             by = ca.MX.sym("by", self.total)
@@ -122,10 +122,10 @@ class Implicit:
 
     @functools.cached_property
     def _rest(self) -> ca.MX:
-        return ca.MX.sym("rest", self._data.told)
+        return ca.MX.sym("rest", self._data.undeformed_size)
 
     @functools.cached_property
-    def _told(self) -> ca.MX:
+    def _outputs(self) -> ca.MX:
         """The answers after a step."""
         return self._at(self._results.expression(self._program, self._rest, short=True))
 
@@ -168,7 +168,7 @@ class Implicit:
     def _by_all(self) -> ca.Function | None:
         """(x, state, seeds) -> the answers, their derivatives by the step, sparse, and by the numbers where that stays;
         None where :attr:`_along` is meant for it."""
-        found = self._expanded(self._told)
+        found = self._expanded(self._outputs)
         if found is None:
             return None
         x, state, seeds, (told,) = found
@@ -180,15 +180,15 @@ class Implicit:
         """(x, state, seeds, steps) -> the answers, and their derivatives in directions, one for each number."""
         x, state = self._symbols
         steps = ca.MX.sym("steps", self.total, self._count)
-        found = ca.jtimes(self._told, x, self._directions(steps))
-        return ca.Function("along", [x, state, self._seeds, steps], [self._told, ca.densify(found)])
+        found = ca.jtimes(self._outputs, x, self._directions(steps))
+        return ca.Function("along", [x, state, self._seeds, steps], [self._outputs, ca.densify(found)])
 
     @functools.cached_property
     def _by_step(self) -> ca.Function:
         """(x, state, weights) -> derivative of weighted answers by the step."""
         x, state = self._symbols
         weights = ca.MX.sym("weights", self._results.size)
-        found = ca.jtimes(self._told, x, weights, True)[: self.total]
+        found = ca.jtimes(self._outputs, x, weights, True)[: self.total]
         return ca.Function("by_step", [x, state, weights], [ca.densify(found)])
 
     @functools.cached_property
@@ -200,7 +200,7 @@ class Implicit:
         x, state = self._symbols
         weights, m = ca.MX.sym("weights", self._results.size), ca.MX.sym("multipliers", self.total)
         steps = ca.MX.sym("steps", self.total, self._count)
-        lagrangian = ca.dot(weights, self._told) + ca.dot(m, self._at(self._program.forces.residual))
+        lagrangian = ca.dot(weights, self._outputs) + ca.dot(m, self._at(self._program.forces.residual))
         along, gradient = self._directions(steps), ca.gradient(lagrangian, x)
         found = ca.mtimes(along.T, ca.jtimes(gradient, x, along))
         results = [ca.densify(found), ca.densify(gradient[self.total :])]
@@ -227,7 +227,7 @@ class Implicit:
         right = -by_p.reshape(self._count, self.total).T
         steps = self._solved(entries, right)
         if steps is None:
-            return self._softened((x, seeds), state, entries, right)
+            return self._regularised_slopes((x, seeds), state, entries, right)
         return self._slopes((x, seeds), state, entries, steps)
 
     def _slopes(self, at: tuple[Array, Array], state: Array, entries: Array, steps: Array) -> Slopes:
@@ -307,7 +307,7 @@ class Implicit:
         size, grown = (float(np.sqrt(weight @ shape**2)) for shape in (generic, found[:, -1]))
         return found[:, :-1] if np.isfinite(found).all() and grown * SINGULAR <= size else None
 
-    def _soft(self, entries: Array, proximal: float) -> Array:
+    def _regularised(self, entries: Array, proximal: float) -> Array:
         entries = entries.copy()
         row, column = self._places
         diagonal = np.flatnonzero(row == column)
@@ -315,13 +315,13 @@ class Implicit:
         entries[diagonal[self.total - self._rows :]] -= tolerances.DUAL
         return entries
 
-    def _softened(self, at: tuple[Array, Array], state: Array, entries: Array, right: Array) -> Slopes:
+    def _regularised_slopes(self, at: tuple[Array, Array], state: Array, entries: Array, right: Array) -> Slopes:
         """Derivatives with a little softness in all neutral directions, if none of the numbers acts along these."""
         found = []
-        for proximal in (tolerances.PROXIMAL, FIRMER * tolerances.PROXIMAL):
-            soft = self._soft(entries, proximal)
-            self._straight.factor(soft)
-            found.append(self._slopes(at, state, soft, self._straight.solve(right)))
+        for proximal in (tolerances.PROXIMAL, LARGE_PRIMAL_FACTOR * tolerances.PROXIMAL):
+            regularised = self._regularised(entries, proximal)
+            self._straight.factor(regularised)
+            found.append(self._slopes(at, state, regularised, self._straight.solve(right)))
         one, other = (slopes.jacobian for slopes in found)
         if not np.abs(one - other).max(initial=0.0) <= DISAGREE * np.abs(one).max(initial=0.0):
             raise SolveError(Status.SINGULAR, "a limit point, a bifurcation, or what nothing resists")
@@ -341,7 +341,7 @@ class _Data:
 
     Attributes
     ----------
-    size, told : int
+    size, undeformed_size : int
         Of the data; of what is told of the undeformed scene.
     pattern : Sparsity (size, numbers)
         Of their derivatives.
@@ -350,7 +350,7 @@ class _Data:
     def __init__(self, arguments: Arguments) -> None:
         p = ca.MX.sym("p", len(arguments.defaults))
         given, rest = ca.densify(arguments.given(p)), ca.densify(arguments.undeformed(p))
-        flat, self.told = ca.vertcat(given, rest), rest.numel()
+        flat, self.undeformed_size = ca.vertcat(given, rest), rest.numel()
         rows = sorted(set(ca.jacobian_sparsity(flat, p).row()))
         data = flat[rows]
         self._rows, self.size, self._given = rows, len(rows), given.numel()
@@ -366,7 +366,7 @@ class _Data:
         flat = ca.MX(self._constant)
         if self.size:
             flat[self._rows] = data
-        given, rest = ca.vertsplit(flat, [0, self._given, self._given + self.told])
+        given, rest = ca.vertsplit(flat, [0, self._given, self._given + self.undeformed_size])
         return given, rest
 
     def at(self, p: Array) -> tuple[Array, Array]:

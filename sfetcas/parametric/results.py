@@ -275,11 +275,11 @@ class Results:
 
         ``speeds`` (axes, places) are velocities of a motion; ``short`` gives expressions with short derivatives.
         """
-        told = _Told(self, program, rest, speeds, program.forces if short else program.stationarity)
-        return ca.vertcat(*(ca.densify(ca.vec(told.value(result.asked).T)) for result in self.results))
+        outputs = _Outputs(self, program, rest, speeds, program.forces if short else program.stationarity)
+        return ca.vertcat(*(ca.densify(ca.vec(outputs.value(result.asked).T)) for result in self.results))
 
 
-class _Told:
+class _Outputs:
     """The values of results."""
 
     def __init__(
@@ -289,7 +289,7 @@ class _Told:
         self._results, self._program = results, program
         self._model, self._expressions = program.model, program.expressions
         model, expressions = self._model, self._expressions
-        self._q, self._y, self._lam, self._near = program.parts
+        self._q, self._y, self._lam, self._unwrapped = program.parts
         places = expressions.displacements(self._q, self._y, program.given)
         self._places = ca.reshape(places, expressions.axes, expressions.places)
         self._found = found
@@ -506,7 +506,7 @@ class _Told:
         found = answers_of(group.kind)(
             turned[:, turns * i : turns * (i + 1)],
             moved[:, places * i : places * (i + 1)],
-            expressions.data(number, given, self._near)[:, i],
+            expressions.data(number, given, self._unwrapped)[:, i],
             expressions.load(number, given)[:, i],
             expressions.multipliers(number, self._lam)[:, i],
         )

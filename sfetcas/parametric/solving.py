@@ -292,8 +292,8 @@ class ParametricAnswer:
         if slopes is None:
             return self.outcome.state
         step = slopes.steps @ (numbers - self.numbers)
-        turning = self.of.implicit.turning
-        if not np.abs(step[:turning]).max(initial=0.0) <= FAR:
+        rotation_unknowns = self.of.implicit.rotation_unknowns
+        if not np.abs(step[:rotation_unknowns]).max(initial=0.0) <= FAR:
             return self.outcome.state
         return np.array(self.of.solver.arguments.program.move(self.outcome.state, step, 1.0)).ravel()
 

@@ -189,7 +189,7 @@ class ContactCurve:
         if bend is not None:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
         state = curve.equations.moved(start.standing.state, z)
-        return curve.held(state, curve.loading(factor)), factor, rates
+        return curve.with_prescribed(state, curve.loading(factor)), factor, rates
 
     def along(self, start: Stood, length: float, before: Stood | None = None) -> Stood | None:
         """The point of the curve in the plane normal to the tangent at a length; None where none is found."""

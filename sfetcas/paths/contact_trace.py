@@ -190,7 +190,7 @@ class Tracer:
 
     def _longest(self, now: Stood) -> float:
         curve = self.curve.plain(now.held.prepared)
-        turning = float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
+        turning = float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
         stride = (self.span[1] - self.span[0]) / SHARE
         return min(LONGEST / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
@@ -235,7 +235,7 @@ class Tracer:
         if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST):
             return False
         expected = self.curve.expected(now, length, before)[0]
-        turned = length * float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
+        turned = length * float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
         return curve.prepared.distance(expected, there.standing.state) <= FAR * turned + EVENT * FAR
 
     def wrong(self, now: Stood, there: Stood) -> tuple[Touch, ...] | None:

@@ -177,7 +177,7 @@ class _Level:
         along = Tangent(np.zeros(curve.equations.total), 1.0 if points[-1].factor >= points[0].factor else -1.0)
         before = self._places.get((branch, number - 1))
         if before is not None:
-            along.z[: curve.equations.turning_unknowns] = turned_between(curve.equations, state, before.standing.state)
+            along.z[: curve.equations.rotation_unknowns] = turned_between(curve.equations, state, before.standing.state)
             along = replace(along, factor=point.factor - before.standing.factor)
         rough = curve.standing(state, point.factor, along, arc=point.arc)
         # Across the path, as at a limit point there may be nothing at the factor itself.

@@ -38,7 +38,7 @@ PASSING = 1e-10
 TURN = 0.6
 """No node turns by more than this, rad, in the corrections of a step."""
 
-FIRMER = 1e3
+LARGE_PRIMAL_FACTOR = 1e3
 """Times the weight of the proximal term for a second attempt between two points of the curve."""
 
 DOUBT = 30.0
@@ -47,7 +47,7 @@ DOUBT = 30.0
 LIMITS = Limits(iterations=10, short=0.01, turned=TURN, near=tolerances.BALANCED, returns=False)
 """Of corrections: beside a bifurcation the first ones wander along its shape, and short ones need not shrink."""
 
-HELD = 1e-3
+FIXED_STEP = 1e-3
 """Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
 
 HISTORY = 1e-5
@@ -122,19 +122,19 @@ class Curve:
         self.searched = 0
         equations = prepared.equations
         self.equations, self.model = equations, prepared.model
-        turning = equations.turning_unknowns
+        rotation_unknowns = equations.rotation_unknowns
         self.weight = np.zeros(equations.total)
         lengths = sum(line.length for line in prepared.model.scene.center_lines.values())
-        self.weight[:turning] = equations.mass * prepared.model.scales.length / lengths
+        self.weight[:rotation_unknowns] = equations.mass * prepared.model.scales.length / lengths
         self.weight[equations.elastic_displacements] = LIGHT
-        self._turning, self._proximal = turning, tolerances.PROXIMAL * prepared.weight
+        self._rotation_unknowns, self._proximal = rotation_unknowns, tolerances.PROXIMAL * prepared.weight
         self._driven = any(np.any(group.turn) for group in self.model.groups.values())
         self._linear = set(self.model.groups) == {None}
-        self._small = any(member.type == "small" for member in prepared.model.scene.members.values())
+        self._has_superelements = any(member.type == "small" for member in prepared.model.scene.members.values())
 
     def too_large(self, state: State, loading: Loading) -> str:
         """What is said of a small member that bends beyond what it is for; empty where none does."""
-        return Fields(self.equations, state, loading).too_large() if self._small else ""
+        return Fields(self.equations, state, loading).too_large() if self._has_superelements else ""
 
     def within(self, piece: tuple[float, float]) -> Curve:
         """The same curve between two factors."""
@@ -142,21 +142,21 @@ class Curve:
         there.piece = piece
         return there
 
-    def held_still(self, standing: Standing) -> Standing:
+    def without_neutral(self, standing: Standing) -> Standing:
         """A point where motions are neutral as one of a curve that goes along none of them."""
         values, shapes = self.prepared.around_zero(standing.point)[1:]
         chosen = shapes[:, np.argsort(np.abs(values))[: standing.inertia.zero]]
         along = replace(standing.tangent, neutral=self.neutral(standing.point, chosen))
         return replace(standing, tangent=self.tangent(standing.state, standing.factor, standing.point, along)[0])
 
-    def neutral(self, point: Point, shapes: Array, firm: float = 1.0) -> Neutral:
-        """Motions from their shapes (turning unknowns, n), neutral or held as if they were.
+    def neutral(self, point: Point, shapes: Array, primal_factor: float = 1.0) -> Neutral:
+        """Motions from their shapes (rotation unknowns, n), neutral or held as if they were.
 
-        With a ``firm`` proximal term those are not taken to others that are open as well.
+        With a large ``primal_factor`` of the proximal term those are not taken to others that are open as well.
         """
         weight = self.prepared.weight
         weighted = Neutral.right(shapes, weight, self.equations.total)
-        return Neutral.answered(weighted, self.solved(point, weighted, firm), weight)[0]
+        return Neutral.answered(weighted, self.solved(point, weighted, primal_factor), weight)[0]
 
     # -- lengths --------------------------------------------------------------------------------
 
@@ -172,12 +172,12 @@ class Curve:
     def way(self, a: Standing, b: Standing) -> float:
         """How far the second point lies ahead of the first, along the tangent there."""
         apart = np.zeros(self.equations.total)
-        apart[: self._turning] = turned_between(self.equations, b.state, a.state)
+        apart[: self._rotation_unknowns] = turned_between(self.equations, b.state, a.state)
         return self.inner(Tangent(apart, b.factor - a.factor), a.tangent)
 
     # -- derivative by the factor ---------------------------------------------------------------
 
-    def held(self, state: State, loading: Loading) -> State:
+    def with_prescribed(self, state: State, loading: Loading) -> State:
         """The state with held rotations where the motions want them."""
         return self.equations.holding(state, loading) if self._driven else state
 
@@ -213,7 +213,7 @@ class Curve:
             return self.equations.slope(state, point, rate)
         if turning == 0.0:
             return np.asarray((residual(self.unit) - point.residual) / self.unit)
-        h = min(self.unit, HELD / turning)
+        h = min(self.unit, FIXED_STEP / turning)
         a, b = ((residual(w) - residual(-w)) / (2.0 * w) for w in (h, 2.0 * h))
         return np.asarray((4.0 * a - b) / 3.0)
 
@@ -224,9 +224,9 @@ class Curve:
 
     # -- points ---------------------------------------------------------------------------------
 
-    def solved(self, point: Point, right: Array, firm: float = 1.0) -> Array:
-        """Solutions for the Newton matrix of a point with the proximal term, which may be made firmer."""
-        entries = self.equations.regularised(point.entries, firm * self._proximal, tolerances.DUAL)
+    def solved(self, point: Point, right: Array, primal_factor: float = 1.0) -> Array:
+        """Solutions for the Newton matrix of a point with the proximal term, which may be made larger."""
+        entries = self.equations.regularised(point.entries, primal_factor * self._proximal, tolerances.DUAL)
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
@@ -240,7 +240,7 @@ class Curve:
             return along, True
         if not np.all(np.isfinite(both)):
             return along, True
-        rate, answer, neutral = both[: len(self.weight), 0], both[: self._turning, 1], None
+        rate, answer, neutral = both[: len(self.weight), 0], both[: self._rotation_unknowns, 1], None
         if along.neutral is not None:
             neutral, values = Neutral.answered(along.neutral.weighted, both[:, 2:], self.prepared.weight)
             neutral = neutral if np.abs(values).max() <= tolerances.NEUTRAL else None
@@ -259,8 +259,8 @@ class Curve:
     def _probe(self) -> Array:
         """A load of size one that has a share in every shape: where an eigenvalue vanishes it moves much."""
         weight, probe = self.prepared.weight, np.zeros(self.equations.total)
-        shape = np.random.default_rng(0).standard_normal(self._turning)
-        probe[: self._turning] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), TINY))
+        shape = np.random.default_rng(0).standard_normal(self._rotation_unknowns)
+        probe[: self._rotation_unknowns] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), TINY))
         return probe
 
     def standing(
@@ -277,7 +277,7 @@ class Curve:
         z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
         if bend is not None:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
-        return self.held(self.equations.moved(start.state, z), self.loading(factor)), factor
+        return self.with_prescribed(self.equations.moved(start.state, z), self.loading(factor)), factor
 
     def corrected(
         self,
@@ -286,15 +286,17 @@ class Curve:
         across: Tangent,
         arc: float = 0.0,
         *,
-        firm: float = 1.0,
+        primal_factor: float = 1.0,
         sharp: bool = True,
     ) -> Standing | None:
         """The equilibrium that lies across a direction from a state near the curve; None where none is found.
 
-        With a ``firm`` proximal term directions that the equations leave open stay as they are; a ``sharp`` one is
-        iterated to rounding.
+        With a large ``primal_factor`` of the proximal term directions that the equations leave open stay as they are; a
+        ``sharp`` one is iterated to rounding.
         """
-        system = _Across(self, across, firm if across.neutral is None else max(firm, FIRMER), sharp)
+        system = _Across(
+            self, across, primal_factor if across.neutral is None else max(primal_factor, LARGE_PRIMAL_FACTOR), sharp
+        )
         found = correct(system, state, factor=factor, limits=LIMITS)
         if not found.converged:
             return None
@@ -330,8 +332,8 @@ class Curve:
         def at(length: float) -> Standing | None:
             near = self.predicted(a, length, bend)
             found = self.corrected(*near, a.tangent, a.arc + length)
-            # Where the proximal term happens to make the matrix singular, a firmer one does not.
-            return found or self.corrected(*near, a.tangent, a.arc + length, firm=FIRMER)
+            # Where the proximal term happens to make the matrix singular, a larger one does not.
+            return found or self.corrected(*near, a.tangent, a.arc + length, primal_factor=LARGE_PRIMAL_FACTOR)
 
         return at
 
@@ -352,8 +354,8 @@ class _Across:
 
     complete = True
 
-    def __init__(self, curve: Curve, across: Tangent, firm: float, sharp: bool) -> None:
-        self.curve, self.across, self.firm, self.sharp = curve, across, firm, sharp
+    def __init__(self, curve: Curve, across: Tangent, primal_factor: float, sharp: bool) -> None:
+        self.curve, self.across, self.primal_factor, self.sharp = curve, across, primal_factor, sharp
         self.equations, self.neutral = curve.equations, across.neutral
         self.row = curve.weight * across.z
 
@@ -361,9 +363,9 @@ class _Across:
         """Loads and motions at a factor."""
         return self.curve.loading(factor)
 
-    def held(self, state: State, loading: Loading) -> State:
+    def with_prescribed(self, state: State, loading: Loading) -> State:
         """The state with held rotations where the motions want them."""
-        return self.curve.held(state, loading)
+        return self.curve.with_prescribed(state, loading)
 
     def seen(self, state: State, point: Point) -> Point:
         """Without what is out of balance along neutral motions, and gaps that no unknown closes."""
@@ -376,7 +378,7 @@ class _Across:
         """Newton's step of all unknowns, multipliers and the factor."""
         rights = [-here.point.residual, -self.curve.slope(here.state, here.factor, here.point)]
         rights += [] if self.neutral is None else [*self.neutral.weighted.T]
-        both = self.curve.solved(here.point, np.column_stack(rights), self.firm)
+        both = self.curve.solved(here.point, np.column_stack(rights), self.primal_factor)
         if self.neutral is not None:
             self.neutral = self.neutral.moved(both[:, 2:])
             both = self.neutral.without(both[:, :2])

@@ -16,7 +16,7 @@ from .prepared import Prepared
 from .redundancy import loose_rows, named_in, stretched
 from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
-from .unheld import refuse_unheld
+from .unsupported import refuse_unsupported
 
 __all__ = ["begin_path", "check_slack"]
 
@@ -62,7 +62,7 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
     model, equations = prepared.model, prepared.equations
     unloaded = model.loading(0.0, 0.0)
     state = equations.start(unloaded)
-    refuse_unheld(prepared, beside)
+    refuse_unsupported(prepared, beside)
     moved = np.any(model.loading(beside).shift - model.loading(0.0).shift)
     if moved and prepared.lacks_slack:
         note = f"straight members have no slack: the path starts at factor {beside:g}, where they have bent"
@@ -101,7 +101,7 @@ def _stable(prepared: Prepared, loading: Loading) -> Corrected:
     found, _ = prepared.minimise(loading, state)
     stability = prepared.stability(found)
     if stability.negative:
-        found, _ = prepared.leave(found.state, stability, loading)
+        found, _ = prepared.switch_branch(found.state, stability, loading)
     return found
 
 

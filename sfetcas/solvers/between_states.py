@@ -9,20 +9,20 @@ from ..mathematics.arrays import Array, Index
 from ..mathematics.keeping import kept
 from ..mechanics.equations import Equations, State
 from ..mechanics.model import Model
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 
-__all__ = ["turned_between", "unheld"]
+__all__ = ["free_parts", "turned_between"]
 
 
 def turned_between(equations: Equations, here: State, there: State) -> Array:
-    """Rotations from one state to another, ``there`` to ``here``, in the turning unknowns, rad.
+    """Rotations from one state to another, ``there`` to ``here``, in the rotation unknowns, rad.
 
     Plane angles count turns, but for parts of the structure that nothing holds: a whole turn of such a part is no
     difference.
     """
     model = equations.model
     vectors = _rotation_vectors(model, here, there) if model.space else _angles(model, here, there)
-    between = np.zeros(equations.turning_unknowns)
+    between = np.zeros(equations.rotation_unknowns)
     used = equations.number >= 0
     between[equations.number[used]] = vectors[used]
     return between
@@ -30,7 +30,7 @@ def turned_between(equations: Equations, here: State, there: State) -> Array:
 
 def _angles(model: Model, here: State, there: State) -> Array:
     angles = here.q - there.q
-    for part in unheld(model):
+    for part in free_parts(model):
         angles[part] -= 2.0 * np.pi * np.round(angles[part].mean() / (2.0 * np.pi))
     return np.asarray(angles)
 
@@ -38,18 +38,18 @@ def _angles(model: Model, here: State, there: State) -> Array:
 def _rotation_vectors(model: Model, here: State, there: State) -> Array:
     vectors = quaternion.rotation_vector(quaternion.multiply(here.q, quaternion.conjugate(there.q)))
     # The one unknown of a rotation about a held axis is the angle about it.
-    held = model.rotations.kind == Turn.AXIS
+    held = model.rotations.kind == RotationFreedom.AXIS
     vectors[held, 0] = (vectors * model.rotations.axis).sum(axis=1)[held]
     return vectors
 
 
 @kept(1)
-def unheld(model: Model) -> tuple[Index, ...]:
+def free_parts(model: Model) -> tuple[Index, ...]:
     """Rotations that hang together and of which none is held."""
     turns = model.rotations.turns
     label, before = np.arange(len(model.rotations.kind)), np.zeros(0)
     while not np.array_equal(label, before):
         before = label.copy()
         np.minimum.at(label, turns, np.broadcast_to(label[turns].min(axis=1)[:, None], turns.shape))
-    held = set(label[model.rotations.kind == Turn.HELD].tolist())
-    return tuple(np.flatnonzero(label == part) for part in np.unique(label).tolist() if part not in held)
+    fixed = set(label[model.rotations.kind == RotationFreedom.FIXED].tolist())
+    return tuple(np.flatnonzero(label == part) for part in np.unique(label).tolist() if part not in fixed)

@@ -95,12 +95,14 @@ def _undeformed(equations: Equations) -> State:
 
 def free_motions(equations: Equations, weight: Array, state: State) -> Array:
     """Motions that strain nothing at an unstrained state: columns (unknowns, n), each with one unknown of its own."""
-    n, turning = equations.unknowns, equations.turning_unknowns
+    n, rotation_unknowns = equations.unknowns, equations.rotation_unknowns
     if n == 0:
         return np.zeros((0, 0))
     point = equations.at(state, equations.model.loading(0.0, 0.0))
     stiffness = point.entries
-    metric = np.concatenate([weight, np.full(n - turning, float(weight.mean()) if turning else 1.0)])
+    metric = np.concatenate(
+        [weight, np.full(n - rotation_unknowns, float(weight.mean()) if rotation_unknowns else 1.0)]
+    )
     equations.solver.factor(equations.regularised(stiffness, 0.01 * tolerances.NEUTRAL * metric, tolerances.DUAL))
     chosen = (equations.row < n) & (equations.column < n)
     row, column = equations.row[chosen], equations.column[chosen]
@@ -285,7 +287,7 @@ def _asked(equations: Equations, state: State, loading: Loading, name: str) -> A
 
 def moves_nodes(equations: Equations, motion: Array, state: State) -> bool:
     """Whether a motion moves any node, or in the plane turns any member: a spin about its own axis does not."""
-    if not equations.model.space and np.abs(motion[: equations.turning_unknowns]).max(initial=0.0) > 0.0:
+    if not equations.model.space and np.abs(motion[: equations.rotation_unknowns]).max(initial=0.0) > 0.0:
         return True
     return bool(
         np.abs(_node_travels(equations, motion, state)).max(initial=0.0)

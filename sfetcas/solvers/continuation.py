@@ -3,7 +3,7 @@
 Nobody has to prescribe load steps; this is a check, and it costs a few Newton iterations.  The library asks
 which of several equilibria the growing loads lead to: the state is followed from the undeformed scene in as
 few steps as Newton's method allows, the inertia is counted at each of them, and where the state ceases to be
-stable it is left along its escape shape.
+stable it is left along its unstable mode.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def near_factor(factor: float) -> str:
     return f"near factor {factor:.3g}"
 
 
-JUMPED = "left an unstable equilibrium there along its escape shape"
+JUMPED = "left an unstable equilibrium there along its unstable mode"
 """What became of it."""
 
 
@@ -105,14 +105,14 @@ def follow(
     way: Callable[[float], Loading],
     state: State,
     *,
-    leave: bool = True,
+    switch_branch: bool = True,
     allowed: Callable[[State, Loading, State, Loading], bool] | None = None,
     refuse: Callable[[State, Loading], None] | None = None,
 ) -> Followed:
     """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
-    With ``leave=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A step
-    that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
+    With ``switch_branch=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A
+    step that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
     the way ends.  ``refuse`` is shown each state, and raises where there is no sense in going on.
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
@@ -137,14 +137,14 @@ def follow(
         there = prepared.correct(
             now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
         )
-        far = there.first > HALF_TURN and (prepared.model.winding.count > 0 or there.second > LINEAR)
+        far = there.first > HALF_TURN and (prepared.model.unwrapping.count > 0 or there.second > LINEAR)
         good = there.converged and not far
         if good and not free(there.state, trial):
             if step <= BLOCKED:
                 break
             step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
             continue
-        unstable = _unstable(prepared, there) if good and leave else 0
+        unstable = _unstable(prepared, there) if good and switch_branch else 0
         if not good or unstable is None:
             if done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far:
                 # No step moves the state any more, and something is out of balance, in a short step as in a long one.
@@ -152,11 +152,11 @@ def follow(
             if step > max(SHORTEST * done, LEAST_STEP):
                 step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
                 continue
-            # What is no equilibrium has no escape shape, whatever a first step balances to rounding.
-            if not leave or not now.converged:
+            # What is no equilibrium has no unstable mode, whatever a first step balances to rounding.
+            if not switch_branch or not now.converged:
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
-            snapped = _left(prepared, now, way(trial))
+            snapped = _switched(prepared, now, way(trial))
             if snapped is None or not free(snapped.state, trial):
                 break
             crept += prepared.distance(snapped.state, now.state) < CREPT
@@ -170,10 +170,10 @@ def follow(
             if trial - done > NARROW * done:
                 step = 0.5 * (trial - done)
                 continue
-            escaped = _left(prepared, there, way(trial))
-            if escaped is None or not free(escaped.state, trial):
+            switched = _switched(prepared, there, way(trial))
+            if switched is None or not free(switched.state, trial):
                 break
-            there = escaped
+            there = switched
             left.append(trial)
             step = 0.1
         now, done = there, trial
@@ -191,8 +191,8 @@ def _unstable(prepared: Prepared, found: Corrected) -> int | None:
         return None
 
 
-def _left(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:
+def _switched(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:
     try:
-        return prepared.leave(found.state, prepared.stability(found), loading)[0]
+        return prepared.switch_branch(found.state, prepared.stability(found), loading)[0]
     except SolveError:
         return None

@@ -18,7 +18,7 @@ from ..mathematics.arrays import TINY, Array
 from .arclength import Curve, Standing, Tangent
 from .sides import Sides
 
-__all__ = ["FIRM", "ONE_EVENT", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
+__all__ = ["LARGEST_PRIMAL_FACTOR", "ONE_EVENT", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
 SHARP = 1e-10
 """Roots are sought to this share of the arc between the two points."""
@@ -44,7 +44,7 @@ CLOSE = 0.1
 ASIDE = 0.01
 """Share of the arc at which a bifurcation point is interpolated from both sides."""
 
-FIRM = 1e6
+LARGEST_PRIMAL_FACTOR = 1e6
 """Times the weight of the proximal term that holds the open direction at a bifurcation point."""
 
 TRUSTED = 0.02
@@ -132,7 +132,7 @@ def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standin
     # Between the two points what counts is the way along the tangent of a, as in looking for the point.
     left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
     state, factor = curve.predicted(left, reach, curve.bend(left, right))
-    settled = curve.corrected(state, factor, a.tangent, found.arc, firm=FIRM)
+    settled = curve.corrected(state, factor, a.tangent, found.arc, primal_factor=LARGEST_PRIMAL_FACTOR)
     close = settled is not None and curve.prepared.distance(settled.state, found.state) < 1e-3
     return replace(settled if settled is not None and close else found, tangent=tangent)
 
@@ -255,7 +255,7 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 
 
 def shapes_at(curve: Curve, event: Event) -> Array:
-    """Shapes of the eigenvalues that vanish at a bifurcation, (turning unknowns, multiplicity), largest size 1.
+    """Shapes of the eigenvalues that vanish at a bifurcation, (rotation unknowns, multiplicity), largest size 1.
 
     Of several, the first is what :mod:`~sfetcas.solvers.sides` takes of their space, the next of what that leaves.
     """

@@ -51,7 +51,7 @@ def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence
         if length < UNDEFLATED:
             return replace(here, length=length)
         # The step of the deflated equations points along the plain one, forwards or backwards.
-        turned = step[: equations.turning_unknowns]
+        turned = step[: equations.rotation_unknowns]
         left = 1.0 - sum(_slope(equations, here.state, other, turned) for other in known)
         stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / length)
         state = equations.moved(here.state, (stretch if left > 0.0 else -stretch) * step)

@@ -87,7 +87,7 @@ class TangentTest:
         tangent = self._tangent(point)[0]
         values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
         vectors[:, np.argsort(np.abs(values))] = np.linalg.svd(tangent)[2][::-1].T
-        return 0, values, (vectors / self._root[:, None])[: self._equations.turning_unknowns]
+        return 0, values, (vectors / self._root[:, None])[: self._equations.rotation_unknowns]
 
     def singular(self, point: Point, count: int) -> bool:
         """Whether so many eigenvalues vanish at a point where their real parts do."""
@@ -109,5 +109,5 @@ class TangentTest:
 
     def test(self, point: Point) -> Stability:
         """Without an energy there is nothing to tell."""
-        turning = np.zeros(self._equations.turning_unknowns)
+        turning = np.zeros(self._equations.rotation_unknowns)
         return Stability("not defined", 0, np.nan, turning, np.zeros(self._equations.displacement_unknowns))

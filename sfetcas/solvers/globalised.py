@@ -177,21 +177,29 @@ class Globalised:
     Parameters
     ----------
     program : Program
-    weight : ndarray (turning unknowns,)
+    weight : ndarray (rotation unknowns,)
         See :class:`~sfetcas.solvers.stability.StabilityTest`.
     """
 
     def __init__(self, program: Program, weight: Array, rules: Rules | None = None) -> None:
         self.program, self.rules = program, rules or Rules()
         equations = program.equations
-        self._turning, self._unknowns, self._total = equations.turning_unknowns, equations.unknowns, equations.total
+        self._rotation_unknowns, self._unknowns, self._total = (
+            equations.rotation_unknowns,
+            equations.unknowns,
+            equations.total,
+        )
         # What firmness acts upon: rotations by their weight, displacements; softness, with the signs of the pivots.
-        self.mass = np.concatenate([weight, np.ones(self._unknowns - self._turning), np.zeros(equations.rows)])
-        self.soft = np.repeat([0.0, 1.0, -1.0], [self._turning, self._unknowns - self._turning, equations.rows])
+        self.mass = np.concatenate(
+            [weight, np.ones(self._unknowns - self._rotation_unknowns), np.zeros(equations.rows)]
+        )
+        self.soft = np.repeat(
+            [0.0, 1.0, -1.0], [self._rotation_unknowns, self._unknowns - self._rotation_unknowns, equations.rows]
+        )
         row, column = places_of(program.sparsity)
         self.diagonal = np.flatnonzero(row == column)
         # Where the softest shape is looked for from: a rule of the scene, and next to nothing where nothing turns.
-        beside = LEAST / (1.0 + np.arange(self._unknowns - self._turning))
+        beside = LEAST / (1.0 + np.arange(self._unknowns - self._rotation_unknowns))
         self.seed = np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
         # What is large stays with CasADi from function to function: to change hands costs more than most of these.
         self._made_firm = self._firmness()
@@ -273,10 +281,10 @@ class Globalised:
         return self.program.move(state, step, share)
 
     def _length(self, step: Array) -> float:
-        return float(np.abs(step[: self._turning]).max(initial=0.0))
+        return float(np.abs(step[: self._rotation_unknowns]).max(initial=0.0))
 
     def _multipliers(self, state: ca.DM) -> Array:
-        end = self.program.states - self.program.expressions.layout.near
+        end = self.program.states - self.program.expressions.layout.unwrapped
         return _flat(state[end - (self._total - self._unknowns) : end])
 
     # -- the method -----------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from .newton import TURN, Iterate, descend, moving, newton
 from .redundancy import loose_rows
 
@@ -58,7 +58,7 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     n, rows = equations.unknowns, equations.rows
     if rows == 0:
         return state, 0.0
-    primal = np.concatenate([0.1 * weight, np.full(n - equations.turning_unknowns, 1e-6)])
+    primal = np.concatenate([0.1 * weight, np.full(n - equations.rotation_unknowns, 1e-6)])
     metric = equations.regularised(equations.elastic_entries(), primal, tolerances.DUAL)
 
     def at(state: State) -> Point:
@@ -178,7 +178,7 @@ def _distances(model: Model) -> Array:
 
 def _turned_by(equations: Equations, state: State, vectors: Array) -> Array:
     """Rotations of a state turned further by rotation vectors where they are free."""
-    vectors = np.where((equations.model.rotations.kind == Turn.FREE)[:, None], vectors, 0.0)
+    vectors = np.where((equations.model.rotations.kind == RotationFreedom.FREE)[:, None], vectors, 0.0)
     if equations.model.space:
         return quaternion.multiply(quaternion.from_rotation_vector(vectors), state.q)
     return np.asarray(state.q + vectors[:, 2:3])
@@ -206,12 +206,12 @@ def _carried(equations: Equations, loading: Loading) -> State:
     laplacian = np.zeros((len(used), len(used)))
     for a, b in index:
         laplacian[[a, b, a, b], [a, b, b, a]] += [1.0, 1.0, -1.0, -1.0]
-    held = model.rotations.kind[used] == Turn.HELD
+    fixed = model.rotations.kind[used] == RotationFreedom.FIXED
     vectors = loading.turn[used]
-    free = ~held
+    free = ~fixed
     if free.any():
         matrix = laplacian[np.ix_(free, free)] + 1e-9 * np.eye(int(free.sum()))
-        vectors[free] = np.linalg.solve(matrix, -laplacian[np.ix_(free, held)] @ vectors[held])
+        vectors[free] = np.linalg.solve(matrix, -laplacian[np.ix_(free, fixed)] @ vectors[fixed])
     field = np.zeros((count, 3))
     for (a, b), (i, j), name in zip(ends, index, names, strict=True):
         field[a], field[b] = vectors[i], vectors[j]
@@ -220,11 +220,11 @@ def _carried(equations: Equations, loading: Loading) -> State:
         chain = model.chain(name)
         part = model.along(name)[:, None]
         field[chain] = (1.0 - part) * vectors[i] + part * vectors[j]
-    about = model.rotations.kind == Turn.AXIS
+    about = model.rotations.kind == RotationFreedom.AXIS
     field[about] = (field[about] * model.rotations.axis[about]).sum(axis=1, keepdims=True) * model.rotations.axis[about]
     q = quaternion.from_rotation_vector(field) if model.space else field[:, 2:3]
-    wound = model.winding.of_vectors(field)
-    return equations.holding(replace(equations.start(loading), q=q, wound=wound), loading)
+    unwrapped = model.unwrapping.of_vectors(field)
+    return equations.holding(replace(equations.start(loading), q=q, unwrapped=unwrapped), loading)
 
 
 def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -> State:

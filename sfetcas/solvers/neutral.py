@@ -23,7 +23,7 @@ class Neutral:
     Attributes
     ----------
     weighted : ndarray (total, motions)
-        The turning unknowns of the motions times their weight, zero elsewhere.
+        The rotation unknowns of the motions times their weight, zero elsewhere.
     motions : ndarray (total, motions)
         The same motions with the displacements and multipliers that belong to them; ``weighted.T @ motions`` is the
         unit matrix.

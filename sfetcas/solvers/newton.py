@@ -115,11 +115,11 @@ def moving(
 
 def turned_by(equations: Equations, step: Array) -> float:
     """Largest rotation of a step, rad."""
-    return float(np.abs(step[: equations.turning_unknowns]).max(initial=0.0))
+    return float(np.abs(step[: equations.rotation_unknowns]).max(initial=0.0))
 
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
-    """The step of all unknowns and multipliers, with a proximal term of a ``weight`` (turning unknowns,)."""
+    """The step of all unknowns and multipliers, with a proximal term of a ``weight`` (rotation unknowns,)."""
     equations.solver.factor(equations.regularised(point.entries, tolerances.PROXIMAL * weight, tolerances.DUAL))
     step = equations.solver.solve(-point.residual)
     if redundant(equations, point):
@@ -143,7 +143,7 @@ class System(Protocol):
     def loading(self, factor: float) -> Loading:
         """Loads and motions at a factor."""
 
-    def held(self, state: State, loading: Loading) -> State:
+    def with_prescribed(self, state: State, loading: Loading) -> State:
         """The state with prescribed rotations where the motions want them."""
 
     def seen(self, state: State, point: Point) -> Point:
@@ -168,13 +168,13 @@ class AtLoads:
     ----------
     equations : Equations
     loads : Loading
-    weight : ndarray (turning unknowns,)
+    weight : ndarray (rotation unknowns,)
         Weight of the proximal term, see :class:`~sfetcas.solvers.stability.StabilityTest`.
     tangent : ndarray, optional
         Entries of the Newton matrix of the equilibrium that is left, for the first step: then it goes along the
         path, while the matrix under the new load may already point away from it.
     flat : ndarray, optional
-        Shapes of a flat energy, columns (turning unknowns, shapes): no step goes along them.
+        Shapes of a flat energy, columns (rotation unknowns, shapes): no step goes along them.
     drag : callable, optional
         Adds couples that resist to the equations, see :class:`~sfetcas.solvers.pseudo_transient.Drag`; the point that
         is returned has none.
@@ -191,7 +191,7 @@ class AtLoads:
         """The loads that are given."""
         return self.loads
 
-    def held(self, state: State, loading: Loading) -> State:
+    def with_prescribed(self, state: State, loading: Loading) -> State:
         """The state with prescribed rotations where the motions want them."""
         return self.equations.holding(state, loading)
 
@@ -206,14 +206,14 @@ class AtLoads:
         if self.tangent is None or here.count:
             return self._without_flat(newton_step(self.equations, point, self.weight))
         step = newton_step(self.equations, replace(point, entries=self.tangent), self.weight)
-        turned = step[: self.equations.turning_unknowns]
+        turned = step[: self.equations.rotation_unknowns]
         resisted = tolerances.PROXIMAL * float(self.weight @ turned**2) <= 0.1 * abs(float(step @ point.residual))
         # Of an unloaded mechanism of rigid members little but the proximal term resists: it has no stiffness yet.
         return self._without_flat(step if resisted else newton_step(self.equations, point, self.weight))
 
     def _without_flat(self, step: Array) -> Array:
         if self.flat is not None:
-            weighted, turning = self.weight[:, None] * self.flat, step[: self.equations.turning_unknowns]
+            weighted, turning = self.weight[:, None] * self.flat, step[: self.equations.rotation_unknowns]
             turning -= self.flat @ np.linalg.lstsq(self.flat.T @ weighted, weighted.T @ turning, rcond=None)[0]
         return step
 
@@ -330,7 +330,7 @@ class _Correction:
         total = self.equations.total
         moved, factor = self.equations.moved(here.state, step[:total]), here.factor + float(step[total:].sum())
         if factor != here.factor:
-            moved = self.system.held(moved, self.system.loading(factor))
+            moved = self.system.with_prescribed(moved, self.system.loading(factor))
         there = self.at(moved, factor, length, here.count + 1)
         if not np.isfinite(there.residual):
             return None
@@ -345,7 +345,7 @@ class _Correction:
         return here.count > 0 and rounded(self.equations, here.state, here.point)
 
     def __call__(self, state: State, factor: float) -> Corrected:
-        begin = self.at(self.system.held(state, self.system.loading(factor)), factor)
+        begin = self.at(self.system.with_prescribed(state, self.system.loading(factor)), factor)
         here, _ = newton(begin, self.system.step, self.after, self.arrived, self.limits.iterations)
         tolerance, count = tolerances.CONVERGED, here.count
         if self.limits.returns and not here.residual <= tolerance and begin.residual <= tolerance:

@@ -50,7 +50,7 @@ BEYOND = 1e4
 PRESTRESSED = 1e-3
 """Two states nearer than this, rad, are the same but for what a prestress bends."""
 
-ESCAPES, FALLEN = 8, 400
+MOST_SWITCHES, FALLEN = 8, 400
 """Unstable equilibria that are left in a row before giving up, and iterations of falls that end nowhere."""
 
 
@@ -165,8 +165,8 @@ class Prepared:
         return self.model.conservative or self._tangent.singular(point, count)
 
     def negative(self, found: Corrected) -> int:
-        """Number of negative eigenvalues at a state; none is counted where :attr:`leaves` is false."""
-        if not self.leaves:
+        """Number of negative eigenvalues at a state; none is counted where :attr:`switches_branch` is false."""
+        if not self.switches_branch:
             return 0
         if self.model.conservative:
             return self._test.negative(found.point)
@@ -182,7 +182,7 @@ class Prepared:
         return self.equations.unknowns <= MOST_COUNTED
 
     @property
-    def leaves(self) -> bool:
+    def switches_branch(self) -> bool:
         """Whether unstable states can be left: there is an energy and, where its value is not known, not too much."""
         return self.model.minimisable or (self.model.conservative and self.countable)
 
@@ -192,7 +192,7 @@ class Prepared:
 
     @property
     def weight(self) -> Array:
-        """Weight of the turning unknowns, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
+        """Weight of the rotation unknowns, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
         return self._test.weight
 
     @property
@@ -304,8 +304,8 @@ class Prepared:
         found = None if there is None else self.correct(there, loading)
         return found if found is not None and found.converged else None
 
-    def leave(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:
-        """Leave an unstable equilibrium along its escape shape to a stable or neutral one.
+    def switch_branch(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:
+        """Leave an unstable equilibrium along its unstable mode to a stable or neutral one.
 
         Raises
         ------
@@ -313,7 +313,7 @@ class Prepared:
             None was found.
         """
         amplitude, lost = 0.2, 0
-        for _ in range(ESCAPES):
+        for _ in range(MOST_SWITCHES):
             begun = self._spent
             try:
                 found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
@@ -331,7 +331,7 @@ class Prepared:
             same = self.distance(found.state, state) < tolerances.SAME_STATE
             amplitude = 1.7 * amplitude if same else 0.2
             state, stability = found.state, there
-        raise SolveError(Status.FAILED, "no stable equilibrium found along the escape shapes", state)
+        raise SolveError(Status.FAILED, "no stable equilibrium found along the unstable modes", state)
 
     def _fallen(self, state: State, loading: Loading) -> Corrected:
         """The equilibrium below a state."""
@@ -345,13 +345,13 @@ class Prepared:
         raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
 
     def nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
-        """The state moved along the escape shape to the side of lower energy, closings restored."""
+        """The state moved along the unstable mode to the side of lower energy, closings restored."""
         equations = self.equations
         sides = []
         for sign in (1.0, -1.0):
             step = np.zeros(equations.total)
-            step[: equations.turning_unknowns] = sign * amplitude * stability.shape
-            step[equations.turning_unknowns : equations.unknowns] = sign * amplitude * stability.travel
+            step[: equations.rotation_unknowns] = sign * amplitude * stability.shape
+            step[equations.rotation_unknowns : equations.unknowns] = sign * amplitude * stability.travel
             moved = replace(equations.moved(state, step), lam=state.lam)
             if equations.rows:
                 moved = replace(restore(equations, moved, loading, self._test.weight)[0], lam=state.lam)

@@ -1,9 +1,9 @@
 """The equilibrium of a model as a nonlinear program that a user can extend.
 
 Unknowns are the components of the quaternions (angles in the plane) of all rotations that are not held, and the
-displacements kept as unknowns; rows are the norms of the quaternions, the closings and the joints.  The terms are those
-of Newton's method, differentiated by components: each function once for its kind, mapped over all terms of the kind and
-scattered by constant matrices, so the effort of building does not grow with their number.
+displacements retained as unknowns; rows are the norms of the quaternions, the closings and the joints.  The terms are
+those of Newton's method, differentiated by components: each function once for its kind, mapped over all terms of the
+kind and scattered by constant matrices, so the effort of building does not grow with their number.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..mechanics.equations import State
 from ..mechanics.expressions import Given, SymbolicTerms, data_of
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from ..mechanics.stationarity import summed
 from ..mechanics.tables import Tables
 from ..mechanics.terms import curvatures_of, slopes_of
@@ -47,7 +47,7 @@ class EquilibriumProblem:
 
     def __init__(self, model: Model, loading: Loading, guess: State, *, kernels: Kernels = "auto") -> None:
         self.model = model
-        self._wound = guess.wound
+        self._guessed_unwrapped = guess.unwrapped
         self.terms = SymbolicTerms(Tables(model, components=True), kernels, CALLS)
         self._tables = self.terms.tables
         self._symbols()
@@ -74,18 +74,18 @@ class EquilibriumProblem:
     def _symbols(self) -> None:
         model, element, tables = self.model, self.model.element, self._tables
         self.x = ca.MX.sym("x", tables.unknowns)
-        _, self._y = ca.vertsplit(self.x, [0, tables.turning_unknowns, tables.unknowns])
+        _, self._y = ca.vertsplit(self.x, [0, tables.rotation_unknowns, tables.unknowns])
         points = model.beams.weight.size
         sizes = (
             points * element.axes,
             tables.of_places,
             model.positions.B.shape[1],
             model.positions.B.shape[1],
-            model.winding.count,
+            model.unwrapping.count,
             *(len(group.data) * group.kind.sizes[4] for group in model.connections),
         )
         self.p = ca.MX.sym("p", sum(sizes))
-        pull, held, force, shift, self._near, *loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
+        pull, held, force, shift, self._unwrapped, *loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
         self._given = Given(
             **data_of(model),
             pull=pull,
@@ -97,8 +97,8 @@ class EquilibriumProblem:
         )
         turned = held + times(self._spread, self.x) if tables.of_places else held
         self._q = ca.reshape(turned, element.components, len(model.rotations.kind))
-        self._places = self.terms.kept_places(self._y, self._given)
-        self._arguments = self.terms.every(self._q, self._y, self._given, self._near)
+        self._places = self.terms.retained_places(self._y, self._given)
+        self._arguments = self.terms.every(self._q, self._y, self._given, self._unwrapped)
         norms = [f"norm of rotation {i}" for i in self._unit]
         self.row_names = (*norms, *model.row_names)
 
@@ -113,7 +113,7 @@ class EquilibriumProblem:
     @functools.cached_property
     def _unit(self) -> list[int]:
         """Rotations with a norm to hold."""
-        return np.flatnonzero(self.model.rotations.kind != Turn.HELD).tolist() if self.model.space else []
+        return np.flatnonzero(self.model.rotations.kind != RotationFreedom.FIXED).tolist() if self.model.space else []
 
     @functools.cached_property
     def _norm_parts(self) -> tuple[Index, Index]:
@@ -146,7 +146,7 @@ class EquilibriumProblem:
         for sides, (gradient, _) in zip(tables.sides, self._slopes, strict=True):
             total += times(self.terms.onto_unknowns(sides), ca.vec(gradient))
         loads = times(constant(self.model.positions.Y).T, self._given.force)
-        return ca.densify(total[: tables.unknowns] - ca.vertcat(ca.MX.zeros(tables.turning_unknowns), loads))
+        return ca.densify(total[: tables.unknowns] - ca.vertcat(ca.MX.zeros(tables.rotation_unknowns), loads))
 
     def _norms(self) -> ca.MX:
         rows, columns = self._norm_parts
@@ -164,7 +164,7 @@ class EquilibriumProblem:
         norm_rows, norm_columns = self._norm_parts
         places = (
             np.concatenate([norms + row - tables.unknowns, norms + w.row, norm_rows]),
-            np.concatenate([column, tables.turning_unknowns + w.column, norm_columns]),
+            np.concatenate([column, tables.rotation_unknowns + w.column, norm_columns]),
             np.concatenate([weight, w.value, np.full(len(norm_rows), 2.0)]),
             np.concatenate([entry, np.full(len(w.row), count), count + 1 + np.arange(len(norm_rows))]),
         )
@@ -223,23 +223,25 @@ class EquilibriumProblem:
     def parameters(self, loading: Loading, near: State | None = None) -> Array:
         """Values of the parameters for a loading; angles that count turns are counted near those of a state."""
         model, positions = self.model, self.model.positions
-        held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
+        held = np.where(
+            (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
+        )
         hanging = (positions.E.T @ loading.force.ravel()).reshape(-1, model.element.axes)
         pull = loading.pull - hanging[model.segments.owner][:, None, :]
-        wound = self._wound if near is None else near.wound
+        unwrapped = self._guessed_unwrapped if near is None else near.unwrapped
         loads = [load.ravel() for load in loading.loads]
-        parts = [pull.ravel(), held.ravel(), loading.force.ravel(), loading.shift, wound, *loads]
+        parts = [pull.ravel(), held.ravel(), loading.force.ravel(), loading.shift, unwrapped, *loads]
         return np.concatenate(parts)
 
-    def parameters_by(self, given: Given, near: Array) -> ca.MX:
+    def parameters_by(self, given: Given, unwrapped: Array) -> ca.MX:
         """The same as an expression of what is given; data are those of the model."""
         still = np.zeros((self.model.element.components, len(self.model.rotations.kind)))
-        held = (self.model.rotations.kind == Turn.HELD).astype(float)
+        held = (self.model.rotations.kind == RotationFreedom.FIXED).astype(float)
         if self.model.space:
             # What no motion turns stands as it stood.
             still[0] = held
-        turned = self.terms.held(ca.MX(ca.DM(still)), given)
-        return ca.vertcat(given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(near)), *given.loads)
+        turned = self.terms.with_prescribed_rotations(ca.MX(ca.DM(still)), given)
+        return ca.vertcat(given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(unwrapped)), *given.loads)
 
     def unknowns(self, state: State) -> Array:
         """The unknowns of the program at a state."""
@@ -247,21 +249,23 @@ class EquilibriumProblem:
         unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
         used = unknown >= 0
         np.add.at(x, unknown[used], (weight * state.q.ravel())[used])
-        x[tables.turning_unknowns :] = state.y
+        x[tables.rotation_unknowns :] = state.y
         return x
 
     def state(self, x: Array, lam: Array, loading: Loading, near: State | None = None) -> State:
         """The state of a solution; quaternions are made exactly unit, turns counted near those of another state."""
         model, tables = self.model, self._tables
-        held = np.where((model.rotations.kind == Turn.HELD)[:, None], model.held(loading), 0.0)
+        held = np.where(
+            (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
+        )
         unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
         q = held + (weight * np.append(x, 0.0)[unknown]).reshape(held.shape)
         if model.space:
             # A quaternion that is zero has no direction: what is not finite is no solution.
             with np.errstate(divide="ignore", invalid="ignore"):
                 q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-        wound = model.winding.angles(q, self._wound if near is None else near.wound)
-        return State(q, x[tables.turning_unknowns :].copy(), lam[self.rows_of_equations], wound)
+        unwrapped = model.unwrapping.angles(q, self._guessed_unwrapped if near is None else near.unwrapped)
+        return State(q, x[tables.rotation_unknowns :].copy(), lam[self.rows_of_equations], unwrapped)
 
     @property
     def rows_of_equations(self) -> slice:

@@ -1,9 +1,9 @@
 """The equilibrium of a model as functions of flat vectors: what Newton's method from afar and generated C are made of.
 
-A *state* is one vector: rotations (quaternions or angles) of all nodes, displacements kept as unknowns, multipliers,
-and the values near which angles count turns.  What is *given* is another one: the loads, and whatever else of the
-data of the equations shall vary.  Every operation of the solver is a CasADi Function of these two, so that the same
-numbers come out of Python and of C.
+A *state* is one vector: rotations (quaternions or angles) of all nodes, displacements retained as unknowns,
+multipliers, and the values near which angles count turns.  What is *given* is another one: the loads, and whatever else
+of the data of the equations shall vary.  Every operation of the solver is a CasADi Function of these two, so that the
+same numbers come out of Python and of C.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 from ..mechanics.singles import counted_angle, turned_vector
 from ..mechanics.stationarity import Stationarity, summed
 from ..mechanics.terms import GROUND, energies_of
@@ -59,8 +59,8 @@ class Program:
         self.expressions, self.model = expressions, expressions.model
         self.equations = expressions.equations
         n = expressions.layout
-        self.states = n.components * n.rotations + n.y + n.lam + n.near
-        self._bounds = np.cumsum([0, n.components * n.rotations, n.y, n.lam, n.near]).tolist()
+        self.states = n.components * n.rotations + n.y + n.lam + n.unwrapped
+        self._bounds = np.cumsum([0, n.components * n.rotations, n.y, n.lam, n.unwrapped]).tolist()
         still = expressions.given(ca.MX.zeros(n.factors))
         parts = self._parts(still)
         varying = varying if varying is not None else expressions.loaded()
@@ -108,16 +108,16 @@ class Program:
 
     def flat(self, state: State) -> Array:
         """A state as one vector."""
-        return np.concatenate([state.q.ravel(), state.y, state.lam, state.wound])
+        return np.concatenate([state.q.ravel(), state.y, state.lam, state.unwrapped])
 
     def state(self, flat: Array) -> State:
         """The state of a vector."""
-        q, y, lam, near = np.split(flat, self._bounds[1:-1])
-        return State(q.reshape(-1, self.expressions.layout.components), y, lam, near)
+        q, y, lam, unwrapped = np.split(flat, self._bounds[1:-1])
+        return State(q.reshape(-1, self.expressions.layout.components), y, lam, unwrapped)
 
     def _split(self, state: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-        q, y, lam, near = ca.vertsplit(state, self._bounds)
-        return ca.reshape(q, self.expressions.layout.components, self.expressions.layout.rotations), y, lam, near
+        q, y, lam, unwrapped = ca.vertsplit(state, self._bounds)
+        return ca.reshape(q, self.expressions.layout.components, self.expressions.layout.rotations), y, lam, unwrapped
 
     @functools.cached_property
     def _symbols(self) -> tuple[ca.MX, tuple[ca.MX, ca.MX, ca.MX, ca.MX]]:
@@ -137,7 +137,7 @@ class Program:
     def moved_expression(self, step: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Rotations, displacements and multipliers after a step of all unknowns and multipliers."""
         q, y, lam, _ = self.parts
-        bounds = [0, self.equations.turning_unknowns, self.equations.unknowns, self.expressions.total]
+        bounds = [0, self.equations.rotation_unknowns, self.equations.unknowns, self.expressions.total]
         _, shift, more = ca.vertsplit(step, bounds)
         return moved_by(self.expressions, q, self.expressions.spins(step)), y + shift, lam + more
 
@@ -152,8 +152,8 @@ class Program:
 
     @functools.cached_property
     def _arguments(self) -> list[list[ca.MX]]:
-        q, y, _, near = self.parts
-        return self.expressions.every(q, y, self.given, near)
+        q, y, _, unwrapped = self.parts
+        return self.expressions.every(q, y, self.given, unwrapped)
 
     @functools.cached_property
     def strains(self) -> ca.MX:
@@ -175,49 +175,51 @@ class Program:
 
     # -- counted turns ------------------------------------------------------------------------------
 
-    def counted(self, q: ca.MX, near: ca.MX) -> ca.MX:
-        """The angles that count turns, of all that look the same those nearest to ``near``."""
-        winding = self.model.winding
-        if not winding.count:
-            return near
-        sides = np.where(winding.sides == GROUND, self.expressions.layout.rotations, winding.sides)
+    def counted(self, q: ca.MX, unwrapped: ca.MX) -> ca.MX:
+        """The angles that count turns, of all that look the same those nearest to ``unwrapped``."""
+        unwrapping = self.model.unwrapping
+        if not unwrapping.count:
+            return unwrapped
+        sides = np.where(unwrapping.sides == GROUND, self.expressions.layout.rotations, unwrapping.sides)
         q = ca.horzcat(q, ca.DM([1.0, 0.0, 0.0, 0.0]))
-        crossed = np.asarray(winding.across.any(axis=1), dtype=float)
-        function = self.expressions.many(counted_angle(), winding.count)
+        crossed = np.asarray(unwrapping.across.any(axis=1), dtype=float)
+        function = self.expressions.many(counted_angle(), unwrapping.count)
         a, b = (q[:, side.tolist()] for side in sides.T)
-        return function(a, b, ca.DM(winding.axis.T), ca.DM(winding.across.T), ca.DM(crossed[None, :]), near.T).T
+        return function(
+            a, b, ca.DM(unwrapping.axis.T), ca.DM(unwrapping.across.T), ca.DM(crossed[None, :]), unwrapped.T
+        ).T
 
-    def _wound(self, q: ca.MX, near: ca.MX, phi: ca.MX, there: ca.MX) -> ca.MX:
+    def _unwrapped(self, q: ca.MX, unwrapped: ca.MX, phi: ca.MX, there: ca.MX) -> ca.MX:
         """The angles after rotations have turned by vectors about the fixed axes."""
-        winding = self.model.winding
-        if not winding.count:
-            return near
-        sides = np.where(winding.sides == GROUND, self.expressions.layout.rotations, winding.sides)
+        unwrapping = self.model.unwrapping
+        if not unwrapping.count:
+            return unwrapped
+        sides = np.where(unwrapping.sides == GROUND, self.expressions.layout.rotations, unwrapping.sides)
         q_all, phi_all = ca.horzcat(q, ca.DM([1.0, 0.0, 0.0, 0.0])), ca.horzcat(phi, ca.DM.zeros(3))
-        carried = self.expressions.many(turned_vector(True), winding.count)(
-            q_all[:, sides[:, 0].tolist()], ca.DM(winding.axis.T)
+        carried = self.expressions.many(turned_vector(True), unwrapping.count)(
+            q_all[:, sides[:, 0].tolist()], ca.DM(unwrapping.axis.T)
         )
         apart = phi_all[:, sides[:, 1].tolist()] - phi_all[:, sides[:, 0].tolist()]
         gained = ca.sum1(carried * apart).T
-        return self.counted(there, self.counted(q, near) + gained)
+        return self.counted(there, self.counted(q, unwrapped) + gained)
 
     def _prescribed(self) -> ca.MX:
-        """Angles that motions prescribe, where rotations turn about one axis each, (near,)."""
-        winding, n = self.model.winding, self.expressions.layout
+        """Angles that motions prescribe, where rotations turn about one axis each, (unwrapped,)."""
+        unwrapping, n = self.model.unwrapping, self.expressions.layout
         turn = ca.horzcat(ca.reshape(self.given.turn, 3, n.rotations), ca.DM.zeros(3))
-        sides = np.where(winding.sides == GROUND, n.rotations, winding.sides)
+        sides = np.where(unwrapping.sides == GROUND, n.rotations, unwrapping.sides)
         apart = turn[:, sides[:, 1].tolist()] - turn[:, sides[:, 0].tolist()]
-        about = ca.sum1(apart * ca.DM(winding.axis.T)).T
+        about = ca.sum1(apart * ca.DM(unwrapping.axis.T)).T
         return ca.sign(about) * ca.sqrt(ca.sum1(apart**2)).T
 
-    def _held_near(self, near: ca.MX) -> ca.MX:
+    def _prescribed_unwrapped(self, unwrapped: ca.MX) -> ca.MX:
         """Values near which angles count, those at their values that motions prescribe."""
-        winding = self.model.winding
-        held = np.append(self.model.rotations.kind == Turn.HELD, True)[winding.sides].all(axis=1)
-        known, prescribed = [near[i] for i in range(winding.count)], self._prescribed()
-        for i in np.flatnonzero(held).tolist():
+        unwrapping = self.model.unwrapping
+        fixed = np.append(self.model.rotations.kind == RotationFreedom.FIXED, True)[unwrapping.sides].all(axis=1)
+        known, prescribed = [unwrapped[i] for i in range(unwrapping.count)], self._prescribed()
+        for i in np.flatnonzero(fixed).tolist():
             known[i] = prescribed[i]
-        for angle, group, number, sign in winding.driven:
+        for angle, group, number, sign in unwrapping.driven:
             known[angle] = sign * self.given.loads[group][number]
         return ca.vertcat(*known)
 
@@ -230,20 +232,20 @@ class Program:
         q = ca.DM.zeros(n.components, n.rotations)
         if self.model.space:
             q[0, :] = 1.0
-        parts = [ca.vec(self.expressions.held(ca.MX(q), self.given)), ca.MX.zeros(n.y + n.lam)]
-        if n.near:
-            parts.append(self._held_near(self._prescribed()))
+        parts = [ca.vec(self.expressions.with_prescribed_rotations(ca.MX(q), self.given)), ca.MX.zeros(n.y + n.lam)]
+        if n.unwrapped:
+            parts.append(self._prescribed_unwrapped(self._prescribed()))
         return self._function("begin", {"given": self.symbol}, {"state": ca.densify(ca.vertcat(*parts))})
 
     @functools.cached_property
-    def held_expression(self) -> ca.MX:
+    def prescribed_expression(self) -> ca.MX:
         """The state with held rotations moved to their prescribed values."""
-        q, y, lam, near = self.parts
-        near = self._held_near(near) if self.expressions.layout.near else near
+        q, y, lam, unwrapped = self.parts
+        unwrapped = self._prescribed_unwrapped(unwrapped) if self.expressions.layout.unwrapped else unwrapped
         if self.model.space:
             # A start may come from anywhere.
             q = q / ca.repmat(ca.sqrt(ca.sum1(q**2)), 4, 1)
-        return ca.vertcat(ca.vec(self.expressions.held(ca.MX(q), self.given)), y, lam, near)
+        return ca.vertcat(ca.vec(self.expressions.with_prescribed_rotations(ca.MX(q), self.given)), y, lam, unwrapped)
 
     @property
     def moving(self) -> ca.MX:
@@ -256,17 +258,17 @@ class Program:
     @functools.cached_property
     def hold(self) -> ca.Function:
         """(state, given) -> the state with held rotations moved to their prescribed values."""
-        state, there = self._symbols[0], self.held_expression
+        state, there = self._symbols[0], self.prescribed_expression
         return self._function("hold", {"state": state, "given": self.symbol}, {"held": there})
 
     @functools.cached_property
     def move(self) -> ca.Function:
         """(state, step, share) -> the state after a share of a step of all unknowns and multipliers."""
-        state, (q, _, _, near) = self._symbols
+        state, (q, _, _, unwrapped) = self._symbols
         step, share = ca.MX.sym("step", self.expressions.total), ca.MX.sym("share")
         there, y, lam = self.moved_expression(share * step)
         phi = self.expressions.spins(share * step)
-        moved = ca.vertcat(ca.vec(there), y, lam, self._wound(q, near, phi, there))
+        moved = ca.vertcat(ca.vec(there), y, lam, self._unwrapped(q, unwrapped, phi, there))
         return self._function("move", {"state": state, "step": step, "share": share}, {"moved": moved})
 
     @functools.cached_property
@@ -280,8 +282,8 @@ class Program:
         return self._stationarity(entries=False)
 
     def _stationarity(self, *, entries: bool) -> Stationarity:
-        _, (q, y, lam, near) = self._symbols
-        return Stationarity(self.expressions, q, y, lam, self.given, near, entries=entries)
+        _, (q, y, lam, unwrapped) = self._symbols
+        return Stationarity(self.expressions, q, y, lam, self.given, unwrapped, entries=entries)
 
     def _matrix(self, entries: list[ca.MX]) -> ca.MX:
         """The matrix with its whole diagonal, which regularisation and shifts are put on."""
@@ -292,7 +294,7 @@ class Program:
     def potential(self) -> ca.MX:
         """Potential energy, zero of the undeformed, unloaded scene; without that of what has none."""
         y = self.parts[1]
-        return self._energies[0] - ca.dot(self.given.force, self.expressions.kept_places(y, self.given))
+        return self._energies[0] - ca.dot(self.given.force, self.expressions.retained_places(y, self.given))
 
     @functools.cached_property
     def _gaps(self) -> ca.MX:
@@ -392,16 +394,21 @@ class Program:
             acting = times(constant(model.positions.W.T.absolute), ca.fabs(lam[:closings]))
             acting += times(constant(model.positions.Y.T.absolute), ca.fabs(found.on_places))
             acting += UNLOADED * ca.norm_inf(acting) + 1e-12
-            turning = equations.turning_unknowns
-            total += ca.vertcat(ca.MX.zeros(turning), acting, ca.MX.zeros(equations.rows))
-            kept = equations.place_number[(model.positions.kept >= 0).all(axis=1)]
-            if len(kept):
-                flat = ca.reshape(total[kept.ravel().tolist()], expressions.axes, len(kept))
+            rotation_unknowns = equations.rotation_unknowns
+            total += ca.vertcat(ca.MX.zeros(rotation_unknowns), acting, ca.MX.zeros(equations.rows))
+            retained = equations.place_number[(model.positions.retained >= 0).all(axis=1)]
+            if len(retained):
+                flat = ca.reshape(total[retained.ravel().tolist()], expressions.axes, len(retained))
                 largest = functools.reduce(ca.fmax, ca.vertsplit(flat))
                 spread = ca.vec(ca.repmat(largest, expressions.axes, 1))
-                onto = sparse(kept.ravel(), np.arange(kept.size), np.ones(kept.size), (expressions.total, kept.size))
+                onto = sparse(
+                    retained.ravel(),
+                    np.arange(retained.size),
+                    np.ones(retained.size),
+                    (expressions.total, retained.size),
+                )
                 others = np.ones(expressions.total)
-                others[kept.ravel()] = 0.0
+                others[retained.ravel()] = 0.0
                 total = total * ca.DM(others) + ca.densify(ca.mtimes(onto, spread))
         return total
 

@@ -34,7 +34,7 @@ ARRIVED = 1e-5
 MOST = 200
 """Steps at most: leaving a nearly neutral state takes some ten, the way from one shape to another some thirty."""
 
-FIRMER, SMALL = 4.0, 1e-9
+SHIFT_GROWTH, LEAST_SHIFT = 4.0, 1e-9
 """Growth of ``s`` until a step is short enough, and the least that it begins with, in units of force.
 
 A spin of a member between balls is resisted by 1e-7 of its bending: a firmer beginning would creep along it.
@@ -58,8 +58,8 @@ def flow(
         At a point of the equations, and with what it was before: how far eigenvalues are below zero, or a number
         that is not much larger; zero where none is.
     """
-    diagonal = equations.diagonal[: equations.turning_unknowns]
-    deep, last, age = 0.0, SMALL, 0
+    diagonal = equations.diagonal[: equations.rotation_unknowns]
+    deep, last, age = 0.0, LEAST_SHIFT, 0
 
     def at(state: State) -> Point:
         return equations.at(state, loading)
@@ -75,7 +75,7 @@ def flow(
             entries[diagonal] += shift * equations.mass
             step = newton_step(equations, replace(here.point, entries=entries), equations.mass)
             length = turned_by(equations, step)
-            used, shift = shift, max(FIRMER * shift, last / FIRMER**2, SMALL)
+            used, shift = shift, max(SHIFT_GROWTH * shift, last / SHIFT_GROWTH**2, LEAST_SHIFT)
         last = used
         return step
 
@@ -104,7 +104,7 @@ class Drag:
 
     def __call__(self, state: State, point: Point) -> Point:
         """The point of the equations with drag."""
-        equations, n = self.equations, self.equations.turning_unknowns
+        equations, n = self.equations, self.equations.rotation_unknowns
         couples = self.size * equations.mass * turned_between(equations, state, self.since)
         residual, entries, scale = point.residual.copy(), point.entries.copy(), point.scale.copy()
         residual[:n] += couples

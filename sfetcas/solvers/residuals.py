@@ -37,8 +37,8 @@ def rounded(equations: Equations, state: State, point: Point) -> bool:
     """
     if not relative_residual(equations, point) <= tolerances.BALANCED or not balanced(equations, point):
         return False
-    turning, unknowns, total = equations.turning_unknowns, equations.unknowns, equations.total
+    rotation_unknowns, unknowns, total = equations.rotation_unknowns, equations.unknowns, equations.total
     sizes = [max(1.0, float(np.abs(part).max(initial=0.0))) for part in (state.q, state.y)]
-    size = np.concatenate([np.repeat(sizes, [turning, unknowns - turning]), np.abs(state.lam)])
+    size = np.concatenate([np.repeat(sizes, [rotation_unknowns, unknowns - rotation_unknowns]), np.abs(state.lam)])
     noise = np.bincount(equations.row, np.abs(point.entries) * size[equations.column], minlength=total)
     return bool((np.abs(point.residual) <= EPSILON * noise).all())

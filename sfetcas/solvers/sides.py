@@ -20,7 +20,7 @@ from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, first_of_largest
 from ..mechanics.equations import Equations
-from ..mechanics.rotations import Turn
+from ..mechanics.rotations import RotationFreedom
 
 __all__ = ["Sides", "alike"]
 
@@ -44,19 +44,21 @@ class Sides:
     ----------
     equations : Equations
     travels : ndarray, optional
-        Numbers of the displacements that stand after the turning unknowns in shapes, without it all of them.
+        Numbers of the displacements that stand after the rotation unknowns in shapes, without it all of them.
     """
 
     def __init__(self, equations: Equations, travels: Index | None = None) -> None:
         self._equations = equations
-        self._travels = slice(equations.turning_unknowns, equations.unknowns) if travels is None else travels
+        self._travels = slice(equations.rotation_unknowns, equations.unknowns) if travels is None else travels
 
     @functools.cached_property
     def fields(self) -> tuple[Array, ...]:
-        """The fields that are asked one after the other, (turning unknowns,)."""
+        """The fields that are asked one after the other, (rotation unknowns,)."""
         equations, model = self._equations, self._equations.model
         lines = model.scene.center_lines
-        about = np.flatnonzero(model.rotations.kind == Turn.AXIS) if model.space else np.zeros(0, dtype=np.intp)
+        about = (
+            np.flatnonzero(model.rotations.kind == RotationFreedom.AXIS) if model.space else np.zeros(0, dtype=np.intp)
+        )
         found = []
         for axis in (2, 1, 0) if model.space else (2,):
             for decay in DECAYS:
@@ -79,7 +81,7 @@ class Sides:
                 if len(about):
                     values = values.copy()
                     values[about, 0] = (vectors[about] * model.rotations.axis[about]).sum(axis=1)
-                field = np.zeros(equations.turning_unknowns)
+                field = np.zeros(equations.rotation_unknowns)
                 used = equations.number >= 0
                 field[equations.number[used]] = values[used]
                 found.append(field)
@@ -98,12 +100,12 @@ class Sides:
                 for node in model.scene.members[name].nodes:
                     ways[model.segments.place(node)] = frame[:axes, axis] / (1.0 + place)
             field = np.zeros(equations.unknowns)
-            field[equations.turning_unknowns :] = model.positions.Y.T @ ways.ravel()
+            field[equations.rotation_unknowns :] = model.positions.Y.T @ ways.ravel()
             found.append(field)
         return tuple(found)
 
     def taken(self, shapes: Array, metric: Array) -> Array:
-        """The shape (turning unknowns and more,) of a space of shapes (., n) that the rule takes.
+        """The shape (rotation unknowns and more,) of a space of shapes (., n) that the rule takes.
 
         Parameters
         ----------
@@ -141,13 +143,13 @@ class Sides:
 
     def _share(self, shapes: Array, metric: Array) -> Array:
         """What the rule takes of each shape, of length one."""
-        turning = self._equations.turning_unknowns
-        travels = shapes[turning:]
+        rotation_unknowns = self._equations.rotation_unknowns
+        travels = shapes[rotation_unknowns:]
         largest = float(np.linalg.norm(travels, axis=0).max(initial=0.0))
         size = max(np.sqrt(float((metric @ np.abs(shapes) ** 2).max())), tolerances.NEGLIGIBLE * largest)
         for field in self.fields:
-            weighted = metric[:turning] * field
-            parts = weighted @ shapes[:turning]
+            weighted = metric[:rotation_unknowns] * field
+            parts = weighted @ shapes[:rotation_unknowns]
             if np.linalg.norm(parts) > LEAST * size * np.sqrt(float(weighted @ field)):
                 # A complex shape is turned until its part in the field is real.
                 return np.asarray(parts.conj() / np.linalg.norm(parts))
@@ -160,7 +162,7 @@ class Sides:
 
     @functools.cached_property
     def seed(self) -> Array:
-        """All fields in one, (turning unknowns,): what inverse iteration makes of it lies to the side of the rule.
+        """All fields in one, (rotation unknowns,): what inverse iteration makes of it lies to the side of the rule.
 
         Each counts far less than the one before it, and far more than rounding.
         """

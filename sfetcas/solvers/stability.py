@@ -1,4 +1,4 @@
-"""Stability of an equilibrium: inertia of the energy on the closings, smallest eigenvalue, escape shape.
+"""Stability of an equilibrium: inertia of the energy on the closings, smallest eigenvalue, unstable mode.
 
 With ``H`` the second derivative of the potential by rotations, ``A`` the derivative of the closings and ``M`` a
 diagonal weight, the eigenvalues of ``H x = mu M x`` on the null space of ``A`` decide: all above zero is a strict
@@ -59,12 +59,12 @@ class Stability:
     negative : int
         Eigenvalues below zero: independent ways out.
     smallest : float
-        Rayleigh quotient of the escape shape by the integral of its square, dimensionless.
+        Rayleigh quotient of the unstable mode by the integral of its square, dimensionless.
     shape : ndarray
-        Escape shape: the turning unknowns of the smallest eigenvalue, largest size 1, to the side that
+        Unstable mode: the rotation unknowns of the smallest eigenvalue, largest size 1, to the side that
         :mod:`~sfetcas.solvers.sides` takes.
     travel : ndarray
-        The displacements kept as unknowns in it.
+        The displacements retained as unknowns in it.
     limit : float
         Below this, on the scale of the module's docstring, its eigenvalue cannot be told from zero.
     """
@@ -88,7 +88,7 @@ class StabilityTest:
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
         # Displacements that springs and bodies act upon count as rotations do; all others follow from the closings.
-        self._chosen = np.concatenate([np.arange(equations.turning_unknowns), equations.worked_displacements])
+        self._chosen = np.concatenate([np.arange(equations.rotation_unknowns), equations.worked_displacements])
         self._n = n = len(self._chosen)
         place = np.full(equations.total, -1, dtype=np.intp)
         place[self._chosen] = np.arange(n)
@@ -105,7 +105,7 @@ class StabilityTest:
 
     @functools.cached_property
     def weight(self) -> Array:
-        """The weight M of the module's docstring, (turning unknowns,)."""
+        """The weight M of the module's docstring, (rotation unknowns,)."""
         return self.equations.mass * self.softest
 
     @functools.cached_property
@@ -145,9 +145,9 @@ class StabilityTest:
         return np.asarray(point.entries[self._in_h] / (root[self._h_row] * root[self._h_column]))
 
     def test(self, point: Point) -> Stability:
-        """Inertia, smallest eigenvalue and escape shape at an equilibrium."""
+        """Inertia, smallest eigenvalue and unstable mode at an equilibrium."""
         equations, point = self.equations, self.equations.symmetric(point)
-        turning, nothing = equations.turning_unknowns, np.zeros(equations.displacement_unknowns)
+        rotation_unknowns, nothing = equations.rotation_unknowns, np.zeros(equations.displacement_unknowns)
         if self._n == 0:
             return Stability(True, 0, np.inf, np.zeros(0), nothing)
         entries = self._weighted(point)
@@ -157,17 +157,17 @@ class StabilityTest:
         else:
             values, vectors, negative = (self._dense if self._is_dense else self._sparse)(point, entries, limit)
         if not len(values):
-            return Stability(True, 0, np.inf, np.zeros(turning), nothing)
+            return Stability(True, 0, np.inf, np.zeros(rotation_unknowns), nothing)
         stable: bool | str = bool(values[0] > limit)
         if negative == 0 and not stable:
             stable = "neutral"
         shape = self.sides.taken(vectors / np.sqrt(self._weights)[:, None], self._weights)
         quotient = float(values[0]) / float(shape @ (self._masses * shape))
-        turned = shape[:turning] if np.abs(shape[:turning]).max(initial=0.0) > 0.0 else shape
+        turned = shape[:rotation_unknowns] if np.abs(shape[:rotation_unknowns]).max(initial=0.0) > 0.0 else shape
         shape = shape / np.abs(turned).max()
         travel = nothing.copy()
-        travel[equations.worked_displacements - turning] = shape[turning:]
-        return Stability(stable, negative, quotient, shape[:turning], travel, limit)
+        travel[equations.worked_displacements - rotation_unknowns] = shape[rotation_unknowns:]
+        return Stability(stable, negative, quotient, shape[:rotation_unknowns], travel, limit)
 
     @functools.cached_property
     def sides(self) -> Sides:
@@ -267,17 +267,17 @@ class StabilityTest:
         return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.worked_displacements) else DENSE)
 
     def spectrum(self, point: Point, count: int) -> tuple[Array, Array]:
-        """All eigenvalues, zero where they are neutral, and the lowest shapes (count or fewer, turning unknowns)."""
+        """All eigenvalues, zero where they are neutral, and the lowest shapes (count or fewer, rotation unknowns)."""
         point = self.equations.symmetric(point)
         entries, rows = self._weighted(point), self._rows(point)
         projected, basis = self._projected(entries, rows)
         values, vectors = np.linalg.eigh(projected)
-        turning, root = self.equations.turning_unknowns, np.sqrt(self._weights)[:, None]
+        rotation_unknowns, root = self.equations.rotation_unknowns, np.sqrt(self._weights)[:, None]
         # Of what has the eigenvalue of the last one the rule takes the shape, too.
         most = min(count, len(values))
         most += alike(values[most - 1 :]) - 1 if most else 0
         shapes = self.sides.in_groups(values[:most], basis @ vectors[:, :most] / root, self._weights)
-        shapes = shapes[:turning, :count].T
+        shapes = shapes[:rotation_unknowns, :count].T
         limit = tolerances.NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max(initial=0.0))
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
@@ -307,7 +307,7 @@ class StabilityTest:
         that is not counted; or each to a millionth of itself or to rounding, and those before them counted.
         """
         point = self.equations.symmetric(point)
-        entries, turning = self._weighted(point), self.equations.turning_unknowns
+        entries, turning = self._weighted(point), self.equations.rotation_unknowns
         root = np.sqrt(self._weights)[:, None]
         if self._is_dense:
             projected, basis = self._projected(entries, self._rows(point))
@@ -357,7 +357,9 @@ class StabilityTest:
 
         At zero itself a neutral direction takes all digits from the factors of the bordered matrix.
         """
-        low, high = (self._from_factors(point, shift, (SOFT_BORDER,)) for shift in (-CLEAR_OF_ZERO, CLEAR_OF_ZERO))
+        low, high = (
+            self._from_factors(point, shift, (BORDER_REGULARISATION,)) for shift in (-CLEAR_OF_ZERO, CLEAR_OF_ZERO)
+        )
         if low is None or high is None or limit > 0.1 * CLEAR_OF_ZERO or high - low > NEAREST:
             return None
         if low == high:
@@ -391,20 +393,22 @@ class StabilityTest:
         """
         # Without pivots the factors break down where displacements hang between two slides, or between many rigid
         # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
-        found = self._from_factors(point, shift, (SOFT_BORDER,) if self._n <= FULL else SOFTER_BORDERS)
+        found = self._from_factors(
+            point, shift, (BORDER_REGULARISATION,) if self._n <= FULL else BORDER_REGULARISATIONS
+        )
         return self._below_dense(point, shift) if found is None else found
 
-    def _from_factors(self, point: Point, shift: float, softness: tuple[float, ...]) -> int | None:
+    def _from_factors(self, point: Point, shift: float, regularisations: tuple[float, ...]) -> int | None:
         """The same with the first of several softnesses whose factors solve anything; None where none does."""
         equations = self.equations
         entries, diagonal = point.entries.copy(), equations.diagonal
         entries[diagonal[self._chosen]] -= shift * self._weights
-        size = float(np.abs(entries[diagonal[: equations.turning_unknowns]]).max(initial=1.0))
-        for soft in softness:
-            softened = entries.copy()
-            softened[diagonal[equations.turning_unknowns : equations.unknowns]] += soft * self.softest
-            softened[diagonal[equations.unknowns :]] -= soft / size
-            matrix, ones = ca.DM(self._bordered_pattern, softened), ca.DM.ones(equations.total)
+        size = float(np.abs(entries[diagonal[: equations.rotation_unknowns]]).max(initial=1.0))
+        for regularisation in regularisations:
+            regularised = entries.copy()
+            regularised[diagonal[equations.rotation_unknowns : equations.unknowns]] += regularisation * self.softest
+            regularised[diagonal[equations.unknowns :]] -= regularisation / size
+            matrix, ones = ca.DM(self._bordered_pattern, regularised), ca.DM.ones(equations.total)
             try:
                 self._bordered.nfact(matrix)
                 gap = (ca.mtimes(matrix, self._bordered.solve(matrix, ones)) - ones).full()
@@ -473,10 +477,10 @@ class StabilityTest:
     def _solved(self, point: Point, shift: float, loads: Array) -> Array:
         """Solution of the shifted Newton matrix, whose redundant rows a negative diagonal keeps from being singular."""
         equations = self.equations
-        for soft in (1e-14, 1e-12, 1e-10):
+        for dual in (1e-14, 1e-12, 1e-10):
             shifted = point.entries.copy()
             shifted[equations.diagonal[self._chosen]] -= shift * self._weights
-            shifted[equations.diagonal[equations.unknowns :]] -= soft
+            shifted[equations.diagonal[equations.unknowns :]] -= dual
             self._solver.factor(shifted)
             try:
                 return np.asarray(self._solver.solve(loads))
@@ -532,10 +536,10 @@ MANY_ROWS = 150
 LIGHT = 1e-3
 """Weight of a displacement over the length scale beside that of a rotation along the length."""
 
-SOFT_BORDER = 1e-9
-"""Softness of closings in the bordered matrix, and stiffness of displacements, beside the rest."""
+BORDER_REGULARISATION = 1e-9
+"""Regularisation of the bordered matrix: dual of closings, primal of displacements, beside the rest."""
 
-SOFTER_BORDERS = (SOFT_BORDER, 10.0 * SOFT_BORDER, 100.0 * SOFT_BORDER)
+BORDER_REGULARISATIONS = (BORDER_REGULARISATION, 10.0 * BORDER_REGULARISATION, 100.0 * BORDER_REGULARISATION)
 """The same one after the other, where full matrices would take long."""
 
 FULL = 600
@@ -549,7 +553,7 @@ def _left_null_space(equations: Equations) -> Array:
     """Combinations of the rows in which no displacement appears, (rows, combinations)."""
     w = np.zeros((equations.rows, equations.displacement_unknowns))
     w[: len(equations.model.positions.rows)] = equations.model.positions.W.full()
-    w = np.delete(w, equations.worked_displacements - equations.turning_unknowns, axis=1)
+    w = np.delete(w, equations.worked_displacements - equations.rotation_unknowns, axis=1)
     if not w.shape[1]:
         return np.eye(equations.rows)
     left, sizes, _ = np.linalg.svd(w)

@@ -15,7 +15,7 @@ import numpy as np
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
-from .critical import FIRM, Event, events_between
+from .critical import LARGEST_PRIMAL_FACTOR, Event, events_between
 from .residuals import relative_residual
 
 __all__ = ["FAR", "Traced", "passes", "switched", "trace", "without"]
@@ -102,7 +102,7 @@ def trace(
     At the knots of histories the curve has a corner: it is followed from one to the next.
     """
     usual = start.inertia.zero
-    start = curve.held_still(start) if usual and start.tangent.neutral is None else start
+    start = curve.without_neutral(start) if usual and start.tangent.neutral is None else start
     traced = Traced([start], [], "range")
     stops = [span[0], *knots, span[1]]
     while traced.end == "range":
@@ -235,7 +235,7 @@ def _to_start(curve: Curve, start: Standing, now: Standing, there: Standing) -> 
 
 
 def _longest(curve: Curve, now: Standing, stride: float) -> float:
-    turning = float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
+    turning = float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
     return min(STRIDE / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
 
@@ -260,7 +260,7 @@ def _step(
 def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, length: float) -> bool:
     if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST * TURNING):
         return False
-    turned = length * float(np.abs(now.tangent.z[: curve.equations.turning_unknowns]).max(initial=0.0))
+    turned = length * float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
     if curve.prepared.distance(expected, there.state) > FAR * turned + SHORTEST:
         return False
     folded = now.tangent.factor * there.tangent.factor < 0.0
@@ -305,7 +305,7 @@ def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int =
     across = _full_shape(curve, here, shapes[:, number - 1])
     across = replace(across, z=side * across.z, factor=side * across.factor)
     others = np.delete(shapes, number - 1, axis=1)
-    held = replace(across, neutral=curve.neutral(here.point, others, FIRM)) if others.size else across
+    held = replace(across, neutral=curve.neutral(here.point, others, LARGEST_PRIMAL_FACTOR)) if others.size else across
     for length in (0.01, 0.02, 0.04, 0.08, 0.16, 0.3):
         state, factor = curve.predicted(replace(here, tangent=across), length)
         for tangent in (held, across) if others.size else (across,):
@@ -319,7 +319,7 @@ def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int =
 
 def _full_shape(curve: Curve, here: Standing, shape: Array) -> Tangent:
     """A direction along the shape with the displacements and multipliers that belong to it, across the curve."""
-    along = curve.normed(Tangent(curve.neutral(here.point, shape[:, None], FIRM).motions[:, 0], 0.0))
+    along = curve.normed(Tangent(curve.neutral(here.point, shape[:, None], LARGEST_PRIMAL_FACTOR).motions[:, 0], 0.0))
     share = curve.inner(along, here.tangent)
     mixed = Tangent(along.z - share * here.tangent.z, along.factor - share * here.tangent.factor)
     return curve.normed(mixed)

@@ -123,18 +123,18 @@ class ControlledSystem:
     @property
     def reference(self) -> Array:
         """Initial rotations and turn-counting angles as one vector, see :meth:`referring`; the reference of ``d``."""
-        return self.referring(self.begin.state.q, self.begin.state.wound)
+        return self.referring(self.begin.state.q, self.begin.state.unwrapped)
 
     @staticmethod
-    def referring(q: Array, near: Array) -> Array:
+    def referring(q: Array, unwrapped: Array) -> Array:
         """Rotations (rotations, components) and turn-counting angles (angles,) as one vector."""
-        return np.concatenate([q.ravel(), near])
+        return np.concatenate([q.ravel(), unwrapped])
 
     @functools.cached_property
     def start(self) -> Array:
         """The vector ``d`` (total,) of the initial state, dimensionless: no rotation, displacements, multipliers."""
         state = self.begin.state
-        return np.concatenate([np.zeros(self.system.equations.turning_unknowns), state.y, state.lam])
+        return np.concatenate([np.zeros(self.system.equations.rotation_unknowns), state.y, state.lam])
 
     def result(self, name: str) -> Result:
         """Shape, unit and meaning of an answer.
@@ -169,18 +169,18 @@ class ControlledSystem:
     def _state(self, d: ca.MX, reference: ca.MX, numbers: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
         """Rotations, displacements, multipliers and counted angles."""
         system, n = self.system, self.system.layout
-        q0, near = ca.vertsplit(reference, [0, n.components * n.rotations, reference.shape[0]])
-        q = system.held(ca.MX(ca.reshape(q0, n.components, n.rotations)), system.given(numbers))
+        q0, unwrapped = ca.vertsplit(reference, [0, n.components * n.rotations, reference.shape[0]])
+        q = system.with_prescribed_rotations(ca.MX(ca.reshape(q0, n.components, n.rotations)), system.given(numbers))
         equations = system.equations
-        bounds = [0, equations.turning_unknowns, equations.unknowns, system.total]
+        bounds = [0, equations.rotation_unknowns, equations.unknowns, system.total]
         _, y, lam = ca.vertsplit(d, bounds)
-        return moved_by(system, q, system.spins(d)), y, lam, near
+        return moved_by(system, q, system.spins(d)), y, lam, unwrapped
 
     def _symbols(self) -> dict[str, ca.MX]:
         n = self.system.layout
         sizes = {"d": self.total, "v": n.x, "a": n.x, "numbers": n.factors}
         return {name: ca.MX.sym(name, size) for name, size in sizes.items()} | {
-            "reference": ca.MX.sym("reference", n.components * n.rotations + n.near)
+            "reference": ca.MX.sym("reference", n.components * n.rotations + n.unwrapped)
         }
 
     @functools.cached_property
@@ -191,15 +191,15 @@ class ControlledSystem:
         numbers and answers in their own units.
         """
         s, system = self._symbols(), self.system
-        q, y, lam, near = self._state(s["d"], s["reference"], s["numbers"])
-        found = system.stage(q, y, lam, system.forces(s["v"], s["a"]), s["numbers"], near)
-        quantities = system.moving(q, y, system.given(s["numbers"]), near)
-        answers = self.told(ca.vertcat(ca.vec(q), y, lam, near), s["numbers"], s["v"])
+        q, y, lam, unwrapped = self._state(s["d"], s["reference"], s["numbers"])
+        found = system.stage(q, y, lam, system.forces(s["v"], s["a"]), s["numbers"], unwrapped)
+        quantities = system.moving(q, y, system.given(s["numbers"]), unwrapped)
+        answers = self.outputs(ca.vertcat(ca.vec(q), y, lam, unwrapped), s["numbers"], s["v"])
         results = [ca.densify(part) for part in (found.residual, quantities, answers)]
         return ca.Function("stage", list(s.values()), results, list(s), ["balance", "quantities", "answers"])
 
     @functools.cached_property
-    def told(self) -> ca.Function:
+    def outputs(self) -> ca.Function:
         """``(state, numbers, v) -> answers``; state: rotations, displacements, multipliers, turn-counting angles."""
         return answers_of_motion(self.results, self.arguments, self.system, self.time)
 
@@ -207,8 +207,8 @@ class ControlledSystem:
     def turned(self) -> ca.Function:
         """``(d, numbers, reference) ->`` rotations, column by column, and angles that count turns."""
         s = self._symbols()
-        q, _, _, near = self._state(s["d"], s["reference"], s["numbers"])
-        counted = self.arguments.program.counted(q, near)
+        q, _, _, unwrapped = self._state(s["d"], s["reference"], s["numbers"])
+        counted = self.arguments.program.counted(q, unwrapped)
         names = ["d", "numbers", "reference"]
         result = ca.densify(ca.vertcat(ca.vec(q), counted))
         return ca.Function("turned", [s[name] for name in names], [result], names, ["rotations"])
@@ -223,12 +223,12 @@ class ControlledSystem:
         s, system = self._symbols(), self.system
         rows, free = system.layout.lam, slice(0, system.equations.unknowns)
         impulse, lam = ca.MX.sym("impulse", rows), ca.MX.sym("lam", rows)
-        q, y, _, near = self._state(s["d"], s["reference"], s["numbers"])
+        q, y, _, unwrapped = self._state(s["d"], s["reference"], s["numbers"])
         zeros = ca.MX.zeros(system.layout.x)
         momenta = system.forces(zeros, s["v"])
-        pushed = system.stage(q, y, impulse, momenta, s["numbers"], near).residual
-        without = system.stage(q, y, ca.MX.zeros(rows), zeros, s["numbers"], near).residual
-        still = system.stage(q, y, lam, zeros, s["numbers"], near).residual
+        pushed = system.stage(q, y, impulse, momenta, s["numbers"], unwrapped).residual
+        without = system.stage(q, y, ca.MX.zeros(rows), zeros, s["numbers"], unwrapped).residual
+        still = system.stage(q, y, lam, zeros, s["numbers"], unwrapped).residual
         symbols = {name: s[name] for name in ("d", "v", "reference", "numbers")} | {"impulse": impulse, "lam": lam}
         results = [ca.densify((pushed - without)[free]), ca.densify(still[free])]
         return ca.Function("rest", list(symbols.values()), results, list(symbols), ["momentum", "balance"])

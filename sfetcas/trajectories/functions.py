@@ -36,17 +36,19 @@ class _Differentiable(IndexOne):
 
     @functools.cached_property
     def balance(self) -> ca.Function:
-        """(q, y, w, near, a, lam, f, f1, f2) -> what is out of balance, then accelerations of the closings."""
+        """(q, y, w, unwrapped, a, lam, f, f1, f2) -> what is out of balance, then accelerations of the closings."""
         system, n = self.system, self.system.layout
-        names = ["q", "y", "w", "near", "a", "lam", "f", "f1", "f2"]
+        names = ["q", "y", "w", "unwrapped", "a", "lam", "f", "f1", "f2"]
         sizes = [*self.states, *self.algebraic, *[n.factors] * 3]
         symbols = [ca.MX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
-        q, y, w, near, a, lam, f, f1, f2 = symbols
+        q, y, w, unwrapped, a, lam, f, f1, f2 = symbols
         spin, faster = self._curve(q, w, a)
-        moved = slice(system.equations.turning_unknowns, self.unknowns)
-        seen = self._seen(ca.vertcat(q, y, f), ca.vertcat(spin, w[moved], f1), ca.vertcat(faster, a[moved], f2), near)
+        moved = slice(system.equations.rotation_unknowns, self.unknowns)
+        seen = self._seen(
+            ca.vertcat(q, y, f), ca.vertcat(spin, w[moved], f1), ca.vertcat(faster, a[moved], f2), unwrapped
+        )
         forces = system.forces(seen[1][: n.x], seen[2][: n.x])
-        stage = system.stage(self._full(q, f), y, lam, forces, f, near)
+        stage = system.stage(self._full(q, f), y, lam, forces, f, unwrapped)
         out = ca.vertcat(stage.residual[: self.unknowns], seen[2][n.x :])
         return ca.Function("balance", symbols, [out], names, ["missed"])
 
@@ -64,7 +66,7 @@ class MotionFunctions:
     sizes : mapping of str to int
         Sizes of ``x``, ``z``, ``u``, ``p`` and ``y``.
     parts : mapping of str to slice
-        Parts of ``x``: rotations ``q``, displacements ``y``, rates ``w``, turn-counting angles ``near``; of ``z``:
+        Parts of ``x``: rotations ``q``, displacements ``y``, rates ``w``, turn-counting angles ``unwrapped``; of ``z``:
         accelerations ``a``, multipliers ``lam``.
     default : mapping of str to ndarray
         Values of ``u`` and ``p`` in the scene, in its units.
@@ -174,10 +176,10 @@ class _Made:
         self.system, self.inputs, self.parameters, self.outputs = system, inputs, parameters, outputs
         self.form = _Differentiable(system.system, 0)
         length, time, force = system.model.scales.length, system.time, system.model.scales.force
-        n, turning = system.system.layout, system.system.equations.turning_unknowns
-        shifts = self.form.unknowns - turning
-        rates = np.repeat([1.0 / time, length / time], [turning, shifts])
-        self.x_unit = np.concatenate([np.ones(self.form.q_size), np.full(n.y, length), rates, np.ones(n.near)])
+        n, rotation_unknowns = system.system.layout, system.system.equations.rotation_unknowns
+        shifts = self.form.unknowns - rotation_unknowns
+        rates = np.repeat([1.0 / time, length / time], [rotation_unknowns, shifts])
+        self.x_unit = np.concatenate([np.ones(self.form.q_size), np.full(n.y, length), rates, np.ones(n.unwrapped)])
         self.z_unit = np.concatenate([rates / time, np.full(n.lam, force)])
         self.names = ["x", "z", "u", "p"]
         self.bounds = np.cumsum([0, *self.form.states]).tolist()
@@ -197,7 +199,7 @@ class _Made:
             "dae", symbols, [ca.DM(self.x_unit) * ode / self.system.time, alg], self.names, ["ode", "alg"]
         )
         dae = dae.expand("dae")
-        seen = ca.Function("outputs", [x, u, p], [self._told(states, ca.vertcat(u, p))], ["x", "u", "p"], ["y"])
+        seen = ca.Function("outputs", [x, u, p], [self._outputs(states, ca.vertcat(u, p))], ["x", "u", "p"], ["y"])
         kept = ca.Function("invariants", [x, u, p], self._kept(states, ca.vertcat(u, p)), ["x", "u", "p"], KEPT)
         found = MotionFunctions(
             inputs=self.inputs,
@@ -226,20 +228,20 @@ class _Made:
     def _seen(self, states: ca.MX, numbers: ca.MX) -> list[ca.MX]:
         """Quantities with gaps, and their rates."""
         form = self.form
-        q, y, w, near = self._split(states)
+        q, y, w, unwrapped = self._split(states)
         spin, _ = form._curve(q, w, ca.MX.zeros(form.unknowns))
         still = ca.MX.zeros(numbers.shape)
-        moved = slice(self.system.system.equations.turning_unknowns, form.unknowns)
+        moved = slice(self.system.system.equations.rotation_unknowns, form.unknowns)
         at, rate = ca.vertcat(q, y, numbers), ca.vertcat(spin, w[moved], still)
-        return list(form._seen(at, rate, ca.MX.zeros(at.shape), near))
+        return list(form._seen(at, rate, ca.MX.zeros(at.shape), unwrapped))
 
-    def _told(self, states: ca.MX, numbers: ca.MX) -> ca.MX:
-        q, y, _, near = self._split(states)
+    def _outputs(self, states: ca.MX, numbers: ca.MX) -> ca.MX:
+        q, y, _, unwrapped = self._split(states)
         system = self.system
         full = self.form._full(q, numbers)
         zeros = ca.MX.zeros(system.system.layout.lam)
         rates = self._seen(states, numbers)[1][: system.quantities]
-        return system.told(ca.vertcat(ca.vec(full), y, zeros, near), numbers, rates)
+        return system.outputs(ca.vertcat(ca.vec(full), y, zeros, unwrapped), numbers, rates)
 
     def _kept(self, states: ca.MX, numbers: ca.MX) -> list[ca.MX]:
         """Gaps of the closings, their rates, and squared lengths of quaternions less one."""
@@ -252,7 +254,9 @@ class _Made:
     def _begin(self) -> Array:
         begin = self.system.begin
         q = begin.state.q[self.form.turning].ravel()
-        return np.concatenate([q, begin.state.y, begin.rates[: self.form.unknowns], begin.state.wound]) * self.x_unit
+        return (
+            np.concatenate([q, begin.state.y, begin.rates[: self.form.unknowns], begin.state.unwrapped]) * self.x_unit
+        )
 
     def _check(self, found: MotionFunctions) -> None:
         """Refuse what has no accelerations.

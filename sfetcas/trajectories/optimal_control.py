@@ -372,11 +372,11 @@ class Search:
 
     def _stands(self, transcription: Transcription, after: GridMotion) -> bool:
         """Whether rotations are near what they are counted from, and the end is where its shapes are known."""
-        turning = transcription.system.system.equations.turning_unknowns
-        turned = float(np.abs(after.d[:, :turning]).max(initial=0.0))
+        rotation_unknowns = transcription.system.system.equations.rotation_unknowns
+        turned = float(np.abs(after.d[:, :rotation_unknowns]).max(initial=0.0))
         if transcription.system.model.space and turned > TURNED:
             return False
-        end = float(np.abs(after.d[-1, :turning]).max(initial=0.0))
+        end = float(np.abs(after.d[-1, :rotation_unknowns]).max(initial=0.0))
         return not (transcription.statement.resting and end > MOVED)
 
     def _motion(self, transcription: Transcription, result: NLPResult) -> ControlledMotion:

@@ -42,7 +42,7 @@ class GridMotion:
     d : ndarray (stages, total)
         Displacements and multipliers in their positions; the entries of rotation vectors are not used.
     x, v, a : ndarray (stages, quantities)
-    near : ndarray (stages, angles that count turns)
+    unwrapped : ndarray (stages, angles that count turns)
     controls : ndarray (points, controls)
         At the ends of intervals, where they are linear; in the intervals, where they are constant.
     variables : ndarray (variables,)
@@ -54,7 +54,7 @@ class GridMotion:
     x: Array
     v: Array
     a: Array
-    near: Array
+    unwrapped: Array
     controls: Array
     variables: Array
 
@@ -80,7 +80,7 @@ class Transcription:
         self._unknowns()
         self._move()
         self._control()
-        self._tell()
+        self._add_equations()
         self._ask()
 
     # -- unknowns ---------------------------------------------------------------------------------------
@@ -91,11 +91,11 @@ class Transcription:
         low, high = statement.duration
         unit = max(guess.end, TINY)
         self.end = pieces.unknowns("end time", guess.end, low, high, unit)
-        turning = system.system.equations.turning_unknowns
+        rotation_unknowns = system.system.equations.rotation_unknowns
         d = guess.d.copy()
         # Rotations are counted from those of the guess.
-        d[:, :turning] = 0.0
-        self.references = np.hstack([guess.q.reshape(len(d), -1), guess.near])
+        d[:, :rotation_unknowns] = 0.0
+        self.references = np.hstack([guess.q.reshape(len(d), -1), guess.unwrapped])
         self.d = pieces.unknowns("d", d.reshape(*shape, -1))
         self.x, self.v, self.a = (
             pieces.unknowns(name, getattr(guess, name).reshape(*shape, -1)) for name in ("x", "v", "a")
@@ -185,7 +185,7 @@ class Transcription:
 
     # -- answers ----------------------------------------------------------------------------------------
 
-    def _tell(self) -> None:
+    def _add_equations(self) -> None:
         """The equations of the stages, with the answers that are asked for as unknowns of their own."""
         system, shape = self.system, (self.intervals, self.stages)
         numbers = [*self.at_stages, *(np.broadcast_to(block.index, shape) for block in self.variables)]
@@ -350,7 +350,7 @@ class Transcription:
         """
         end = len(self.references) - 1
         d = self.guess.d[end].copy()
-        d[: self.system.system.equations.turning_unknowns] = 0.0
+        d[: self.system.system.equations.rotation_unknowns] = 0.0
         numbers = self.pieces.guess[self.numbers[-1, -1]]
         omega, momenta, forces = self.system.shapes(d, self.references[end], numbers)
         step = self.statement.shares[-1] * self.guess.end / self.system.time
@@ -454,7 +454,7 @@ class Transcription:
         """The motion of a solution x (n,) of the program."""
         value, n = self.pieces.value, self.intervals * self.stages
         d = value(self.d, x).reshape(n, -1)
-        q, near = self.rotations(d, x)
+        q, unwrapped = self.rotations(d, x)
         controls = [value(block, x) for block in self.controls]
         return GridMotion(
             end=float(value(self.end, x)[0]),
@@ -463,7 +463,7 @@ class Transcription:
             x=value(self.x, x).reshape(n, -1),
             v=value(self.v, x).reshape(n, -1),
             a=value(self.a, x).reshape(n, -1),
-            near=near,
+            unwrapped=unwrapped,
             controls=np.stack(controls, axis=1) if controls else np.zeros((self.intervals + self.statement.order, 0)),
             variables=np.array([value(block, x)[0] for block in self.variables]),
         )

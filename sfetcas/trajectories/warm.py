@@ -80,7 +80,7 @@ def at_rest(
         x=np.tile(begin.x, (n, 1)),
         v=still,
         a=still,
-        near=np.tile(begin.state.wound, (n, 1)),
+        unwrapped=np.tile(begin.state.unwrapped, (n, 1)),
         controls=np.stack(columns, axis=1) if columns else np.zeros((len(at), 0)),
         variables=np.array(variables),
     )
@@ -114,7 +114,7 @@ def _end_shape(statement: MotionStatement, system: ControlledSystem) -> Array | 
     if not rows:
         return None
     n, equations = system.quantities, system.system.equations
-    free, turning = equations.unknowns, equations.turning_unknowns
+    free, rotation_unknowns = equations.unknowns, equations.rotation_unknowns
     pieces = Pieces("interpreted")
     d = pieces.unknowns("d", system.start[:free])
     still = ca.DM.zeros(n)
@@ -133,21 +133,21 @@ def _end_shape(statement: MotionStatement, system: ControlledSystem) -> Array | 
             pieces.add_expression("end", expression[used.tolist()], row.low[used], row.high[used])
     if len(pieces.row_names()) > pieces.size:
         return None
-    pieces.add_term("turns", ca.sumsqr(d.symbol[:turning]))
+    pieces.add_term("turns", ca.sumsqr(d.symbol[:rotation_unknowns]))
     result = Ipopt(1e-6, 100).solve(pieces.nlp())
-    return pieces.value(d, result.x)[:turning] if result.status is Status.SOLVED else None
+    return pieces.value(d, result.x)[:rotation_unknowns] if result.status is Status.SOLVED else None
 
 
 def _still(statement: MotionStatement, system: ControlledSystem, start: GridMotion, q: Array) -> GridMotion:
     """A motion through rotations (stages, rotations, components), with controls and variables of a start."""
-    near = np.tile(system.begin.state.wound, (len(q), 1))
-    y, x = _placed(system, q, near, _numbers(statement, start))
+    unwrapped = np.tile(system.begin.state.unwrapped, (len(q), 1))
+    y, x = _placed(system, q, unwrapped, _numbers(statement, start))
     d = np.zeros((len(q), system.total))
     equations = system.system.equations
-    d[:, equations.turning_unknowns : equations.unknowns] = y
+    d[:, equations.rotation_unknowns : equations.unknowns] = y
     v = _rates(statement, start.end / system.time, x, system.begin.x)
     a = _rates(statement, start.end / system.time, v, system.begin.v)
-    return GridMotion(start.end, q, d, x, v, a, near, start.controls, start.variables)
+    return GridMotion(start.end, q, d, x, v, a, unwrapped, start.controls, start.variables)
 
 
 def carried_over(
@@ -175,7 +175,7 @@ def restaged(statement: MotionStatement, system: ControlledSystem, course: GridM
         return np.einsum("ij,kjm->kim", through, _whole(values, first, n, stages)).reshape(n * len(new), -1)
 
     equations = system.system.equations
-    kept = slice(equations.turning_unknowns, equations.unknowns)
+    kept = slice(equations.rotation_unknowns, equations.unknowns)
     q = moved(course.q, begin.state.q).reshape(n * len(new), *begin.state.q.shape)
     if system.model.space:
         q /= np.linalg.norm(q, axis=2, keepdims=True)
@@ -186,8 +186,8 @@ def restaged(statement: MotionStatement, system: ControlledSystem, course: GridM
     x = moved(course.x, begin.x)
     v = _rates(statement, course.end / system.time, x, begin.x)
     a = _rates(statement, course.end / system.time, v, begin.v)
-    near = moved(course.near, begin.state.wound)
-    return GridMotion(course.end, q, d, x, v, a, near, course.controls, course.variables)
+    unwrapped = moved(course.unwrapped, begin.state.unwrapped)
+    return GridMotion(course.end, q, d, x, v, a, unwrapped, course.controls, course.variables)
 
 
 def _sources(stiff: ControlledSystem, system: ControlledSystem) -> Index:
@@ -220,13 +220,17 @@ def _numbers(statement: MotionStatement, course: GridMotion) -> Array:
     return np.hstack([flat, np.tile(course.variables, (len(flat), 1))])
 
 
-def _placed(system: ControlledSystem, q: Array, near: Array, numbers: Array) -> tuple[Array, Array]:
+def _placed(system: ControlledSystem, q: Array, unwrapped: Array, numbers: Array) -> tuple[Array, Array]:
     """Displacements that close the members as well as they can, and quantities, of all stages."""
     own, n = system.system, system.system.layout
-    s = [ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("near", n.near), ca.MX.sym("numbers", n.factors)]
+    s = [
+        ca.MX.sym("q", n.components, n.rotations),
+        ca.MX.sym("unwrapped", n.unwrapped),
+        ca.MX.sym("numbers", n.factors),
+    ]
     y = ca.MX.sym("y", n.y)
     given = own.given(s[2])
-    held = own.held(ca.MX(s[0]), given)
+    held = own.with_prescribed_rotations(ca.MX(s[0]), given)
     closings = len(own.model.positions.rows)
     open_ = ca.Function("open", s, [own.gaps(held, ca.MX.zeros(n.y), given, s[1])[:closings]])
     moved = ca.Function("moved", [*s, y], [own.moving(held, y, given, s[1])])
@@ -236,7 +240,7 @@ def _placed(system: ControlledSystem, q: Array, near: Array, numbers: Array) -> 
         np.array(constant(own.model.positions.W).full()).reshape(closings, n.y), rcond=tolerances.RANK
     )
     ys, xs = [], []
-    for one, angles, values in zip(q, near, numbers, strict=True):
+    for one, angles, values in zip(q, unwrapped, numbers, strict=True):
         found = back @ np.array(open_(one.T, angles, values)).ravel() if n.y else np.zeros(0)
         ys.append(found)
         xs.append(np.array(moved(one.T, angles, values, found)).ravel())

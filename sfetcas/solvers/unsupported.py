@@ -23,7 +23,7 @@ from .constraints import free_motions, in_words
 from .newton import Iterate, moving, newton
 from .prepared import Prepared
 
-__all__ = ["refuse_unheld"]
+__all__ = ["refuse_unsupported"]
 
 STEP = 0.1
 """Of the fastest rotation from state to state of a round, rad."""
@@ -38,7 +38,7 @@ FAR = (1.0, 1e6)
 """Travels, in lengths of the scene, over which nothing may be strained."""
 
 
-def refuse_unheld(prepared: Prepared, factor: float) -> None:
+def refuse_unsupported(prepared: Prepared, factor: float) -> None:
     """Refuse a motion that is free and that the loads drive on without end.
 
     Raises
@@ -87,7 +87,7 @@ def _moved(prepared: Prepared, state: State, motion: Array) -> State:
 def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) -> Array | None:
     """The motion of displacements alone that the loads drive furthest, where nothing ever holds it."""
     equations = prepared.equations
-    unloaded, turning = prepared.model.loading(0.0, 0.0), equations.turning_unknowns
+    unloaded, turning = prepared.model.loading(0.0, 0.0), equations.rotation_unknowns
     _, sizes, right = np.linalg.svd(np.linalg.qr(motions[:turning], mode="r"))
     straight = motions @ right[np.append(sizes, np.zeros(len(right) - len(sizes))) < tolerances.NEGLIGIBLE].T
     motion = straight @ (straight.T @ _pull(prepared, start, loading))
@@ -109,7 +109,7 @@ def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) 
 def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) -> Array | None:
     """The motion of a mechanism that comes back to where it began, where the loads drive it all the way."""
     equations, unloaded = prepared.equations, prepared.model.loading(0.0, 0.0)
-    first = _of_unit_speed(equations.turning_unknowns, motion)
+    first = _of_unit_speed(equations.rotation_unknowns, motion)
     if first is None:
         return None
     speed, largest, work, furthest = first, 0.0, 0.0, 0.0
@@ -131,7 +131,7 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
             return None
         free = free_motions(equations, prepared.weight, state)
         # Where all links lie in one line there are two motions: on along the one that led there.
-        onward = _of_unit_speed(equations.turning_unknowns, free @ np.linalg.lstsq(free, speed, rcond=None)[0])
+        onward = _of_unit_speed(equations.rotation_unknowns, free @ np.linalg.lstsq(free, speed, rcond=None)[0])
         point = equations.at(state, unloaded)
         gap = np.abs(point.residual[equations.unknowns :]).max(initial=0.0)
         if onward is None or point.strain > tolerances.BALANCED * work or gap > tolerances.CLOSED:
@@ -168,9 +168,9 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
     return newton(begin, step, after, lambda here: here.length < tolerances.CLOSED, CORRECTIONS)[0].state
 
 
-def _of_unit_speed(turning: int, motion: Array) -> Array | None:
+def _of_unit_speed(rotation_unknowns: int, motion: Array) -> Array | None:
     """The motion with a fastest rotation of one; None of one that turns nothing."""
-    fastest = float(np.abs(motion[:turning]).max(initial=0.0))
+    fastest = float(np.abs(motion[:rotation_unknowns]).max(initial=0.0))
     return motion / fastest if fastest > tolerances.NEGLIGIBLE * np.abs(motion).max(initial=0.0) else None
 
 

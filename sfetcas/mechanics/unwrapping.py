@@ -17,10 +17,10 @@ from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index, numbers
 from .loading import Loading
-from .rotations import Turn
+from .rotations import RotationFreedom
 from .terms import GROUND, Group
 
-__all__ = ["Winding", "winding_of"]
+__all__ = ["Unwrapping", "unwrapping_of"]
 
 MISCOUNTED = 1e-6
 """Angle, rad, by which a counted angle may miss the one that a motion prescribes: they differ by turns or not."""
@@ -31,7 +31,7 @@ SWUNG = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Winding:
+class Unwrapping:
     """The angles of a model that count turns: of springs, stops and driven joints, and for moments about fixed axes.
 
     Attributes
@@ -63,14 +63,14 @@ class Winding:
         """Number of angles."""
         return len(self.sides)
 
-    def angles(self, q: Array, near: Array) -> Array:
-        """The angles (n,), rad, at q (rotations, 4): of all with the same rotation those nearest to ``near``."""
+    def angles(self, q: Array, unwrapped: Array) -> Array:
+        """The angles (n,), rad, at q (rotations, 4): of all with the same rotation those nearest to ``unwrapped``."""
         if not self.count:
-            return near
+            return unwrapped
         sine, cosine, share = self._parts(q)
         raw = share * np.arctan2(sine, cosine)
         period = 2.0 * np.pi * share
-        return np.asarray(raw + period * np.round((near - raw) / period))
+        return np.asarray(raw + period * np.round((unwrapped - raw) / period))
 
     def _parts(self, q: Array) -> tuple[Array, Array, Array]:
         """Sines, cosines of the angles over the share, and the share, of :class:`~sfetcas.mechanics.joints.Turning`."""
@@ -100,28 +100,28 @@ class Winding:
     def _share(self) -> Array:
         return np.where(self._crossed, 1.0, 2.0)
 
-    def moved(self, q: Array, near: Array, turn: Array, there: Array) -> Array:
+    def moved(self, q: Array, unwrapped: Array, turn: Array, there: Array) -> Array:
         """The angles (n,), rad, after ``q`` has changed by vectors ``turn`` (rotations, 3), rad, to ``there``."""
         if not self.count:
-            return near
+            return unwrapped
         if self._on_ground:
             gained = _dot(self.axis, turn[self.sides[:, 1]])
         else:
             turn, still = np.vstack([turn, np.zeros(3)]), np.vstack([q, [1.0, 0.0, 0.0, 0.0]])
             axis = quaternion.rotate(still[self.sides[:, 0]], self.axis)
             gained = _dot(axis, turn[self.sides[:, 1]] - turn[self.sides[:, 0]])
-        return self.angles(there, self.angles(q, near) + gained)
+        return self.angles(there, self.angles(q, unwrapped) + gained)
 
     def prescribed(self, kind: Index, loading: Loading) -> Array:
         """The angles (n,), rad, that prescribed rotations and driven joints determine; nan for all others."""
-        near = np.full(self.count, np.nan)
+        unwrapped = np.full(self.count, np.nan)
         if not self.count:
-            return near
-        held = np.append(kind == Turn.HELD, True)[self.sides].all(axis=1)
-        near[held] = self.of_vectors(loading.turn)[held]
+            return unwrapped
+        fixed = np.append(kind == RotationFreedom.FIXED, True)[self.sides].all(axis=1)
+        unwrapped[fixed] = self.of_vectors(loading.turn)[fixed]
         for angle, group, number, sign in self.driven:
-            near[angle] = sign * float(loading.loads[group][number, 0])
-        return near
+            unwrapped[angle] = sign * float(loading.loads[group][number, 0])
+        return unwrapped
 
     def of_vectors(self, turn: Array) -> Array:
         """The angles (n,), rad, where each rotation is by a vector ``turn`` (rotations, 3) about its fixed axis."""
@@ -129,7 +129,7 @@ class Winding:
         apart = turn[self.sides[:, 1]] - turn[self.sides[:, 0]]
         return np.asarray(np.sign(_dot(self.axis, apart)) * np.linalg.norm(apart, axis=1))
 
-    def doubt(self, q: Array, near: Array, loading: Loading) -> str | None:
+    def doubt(self, q: Array, unwrapped: Array, loading: Loading) -> str | None:
         """A sentence on why an angle is undetermined at a state; None where all are determined.
 
         The angle of a driven joint differs from the prescribed one by whole turns, or the axis of a spring between
@@ -137,7 +137,7 @@ class Winding:
         """
         if not self.count:
             return None
-        found, (sine, cosine, _) = self.angles(q, near), self._parts(q)
+        found, (sine, cosine, _) = self.angles(q, unwrapped), self._parts(q)
         for angle in np.flatnonzero(np.hypot(sine, cosine) < SWUNG).tolist():
             return f"{self.names[angle]}: its axis has swung half round, where its angle is not defined"
         for angle, group, number, sign in self.driven:
@@ -148,7 +148,7 @@ class Winding:
         return None
 
 
-def winding_of(terms: tuple[Group, ...], space: bool) -> Winding:
+def unwrapping_of(terms: tuple[Group, ...], space: bool) -> Unwrapping:
     """The angles of a model that count turns; none in the plane."""
     sides: list[tuple[int, int]] = []
     axis: list[Array] = []
@@ -167,7 +167,7 @@ def winding_of(terms: tuple[Group, ...], space: bool) -> Winding:
         across += list(counted[1])
     pairs = np.array(sides, dtype=np.intp).reshape(-1, 2)
     lines = numbers(axis).reshape(-1, 3)
-    return Winding(
+    return Unwrapping(
         sides=pairs,
         axis=lines,
         across=numbers(across).reshape(-1, 3),

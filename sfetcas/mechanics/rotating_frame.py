@@ -23,7 +23,7 @@ from .loading import Loading
 from .masses import Masses, masses_of
 from .terms import Group, Side, Term
 
-__all__ = ["Spinning", "SpunInner", "SpunPair", "SpunVectors", "with_spinning"]
+__all__ = ["CentrifugalInner", "CentrifugalPair", "CentrifugalVectors", "RotatingFrame", "with_rotating_frame"]
 
 
 def _matrix(load: ca.SX, axes: int) -> ca.SX:
@@ -33,7 +33,7 @@ def _matrix(load: ca.SX, axes: int) -> ca.SX:
 
 @final
 @dataclass(frozen=True)
-class SpunPair(Term):
+class CentrifugalPair(Term):
     """Centrifugal potential of a mass-matrix entry of two places; data: undeformed positions, mass; load: P."""
 
     is_load: ClassVar[bool] = True
@@ -52,7 +52,7 @@ class SpunPair(Term):
 
 @final
 @dataclass(frozen=True)
-class SpunInner(Term):
+class CentrifugalInner(Term):
     """Centrifugal potential of the inner nodes of an element, whose positions follow from the place at its start.
 
     Data: for each node its undeformed position, mass and integration weights, then the tangents of all nodes; load: P.
@@ -91,7 +91,7 @@ class SpunInner(Term):
 
 @final
 @dataclass(frozen=True)
-class SpunVectors(Term):
+class CentrifugalVectors(Term):
     """Centrifugal potential of the vectors that are the first rows of a quantity.
 
     Data: those of the quantity, for each vector its offset from the origin and its mass; load: P.
@@ -125,7 +125,7 @@ class SpunVectors(Term):
 
 
 @dataclass(frozen=True, eq=False)
-class Spinning:
+class RotatingFrame:
     """The rotation of the axes of a model, and its centrifugal terms; dimensionless.
 
     Attributes
@@ -167,7 +167,7 @@ class Spinning:
         return replace(model.groups[None].scaled(0.0), force=own + on_places, own=own, spread=spread, pull=pull)
 
 
-def with_spinning(model: Any) -> Any:
+def with_rotating_frame(model: Any) -> Any:
     """A :class:`~sfetcas.mechanics.model.Model` with the centrifugal terms of its rotating axes added.
 
     Raises
@@ -192,8 +192,8 @@ def with_spinning(model: Any) -> Any:
     empty = loadings[None].scaled(0.0)
     here = tuple(np.tile(matrix.ravel(), (len(group.names), 1)) for group in groups)
     loading = replace(empty, loads=(*empty.loads[:before], *here))
-    spinning = Spinning(masses, omega, before, bodies, *rest, loading)
-    return replace(model, connections=(*model.connections, *groups), groups=loadings, spinning=spinning)
+    rotating_frame = RotatingFrame(masses, omega, before, bodies, *rest, loading)
+    return replace(model, connections=(*model.connections, *groups), groups=loadings, rotating_frame=rotating_frame)
 
 
 def _at_rest(model: Any) -> tuple[Array, Array]:
@@ -230,7 +230,7 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple
 
     pairs = np.stack([masses.places.row, masses.places.column], axis=1)
     data = joined(rest[pairs], masses.places.value)
-    found = [_group(SpunPair(space), np.zeros((len(pairs), 0), np.intp), pairs, data, "mass")]
+    found = [_group(CentrifugalPair(space), np.zeros((len(pairs), 0), np.intp), pairs, data, "mass")]
     heavy = np.flatnonzero(masses.inner.any(axis=1))
     if len(heavy):
         arms = np.broadcast_to(element.to_points / element.weights, (len(heavy), n, n))
@@ -239,7 +239,7 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple
         start = np.array([segments.place(part.start) for part in segments.parts], dtype=np.intp)[segments.owner]
         data = joined(own, model.beams.tangent[heavy])
         turns = model.rotations.turns[heavy]
-        found.append(_group(SpunInner(space, n), turns, start[heavy][:, None], data, "element"))
+        found.append(_group(CentrifugalInner(space, n), turns, start[heavy][:, None], data, "element"))
     bodies = []
     for group in masses.observables:
         vectors = group.kind.vectors
@@ -250,5 +250,5 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple
         if group.kind.from_place:
             added[:, 0] = rest[group.places[:, 0]]
         data = joined(group.data, np.concatenate([added, mass[:, :, None]], axis=2))
-        bodies.append(_group(SpunVectors(space, group.kind), group.turns, group.places, data, "body"))
+        bodies.append(_group(CentrifugalVectors(space, group.kind), group.turns, group.places, data, "body"))
     return found, bodies
