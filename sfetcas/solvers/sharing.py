@@ -43,7 +43,7 @@ def shared(equations: Equations, state: State, loading: Loading, loose: Array, *
     Parameters
     ----------
     loose : ndarray (rows, n)
-        Combinations of rows that vanish here, orthonormal, of :func:`~sfetcas.solvers.newton.loose_rows`.
+        Combinations of rows that vanish here, orthonormal, of :func:`~sfetcas.solvers.redundancy.loose_rows`.
     reactions : bool
         Whether reactions are wanted: what changes them alone, and nothing that acts along a member, is left at the
         least multipliers without.
