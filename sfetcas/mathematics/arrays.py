@@ -59,6 +59,8 @@ def numbers(values: Any) -> Array:
     TypeError, ValueError
         They are no numbers.
     """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
     if hasattr(values, "expression"):
         found: Array = values
         return found

@@ -8,7 +8,7 @@ import numpy as np
 from .arrays import Array
 from .linear import SparseMap, places_of
 
-__all__ = ["by_axes", "constant", "hanging", "mapped", "picked", "sparse", "times"]
+__all__ = ["added", "by_axes", "constant", "hanging", "mapped", "picked", "sparse", "times"]
 
 
 def constant(matrix: SparseMap) -> ca.DM:
@@ -37,9 +37,25 @@ def by_axes(matrix: SparseMap, axes: int) -> SparseMap:
     return SparseMap(row, column, np.repeat(matrix.value, axes), (matrix.shape[0] * axes, matrix.shape[1] * axes))
 
 
-def times(matrix: ca.DM, vector: ca.MX) -> ca.MX:
+def times(matrix: ca.DM | SparseMap, vector: ca.MX) -> ca.MX:
     """Matrix times vector; a zero vector where the matrix has no entries."""
-    return ca.densify(ca.mtimes(matrix, vector)) if matrix.nnz() else ca.MX.zeros(matrix.shape[0], vector.shape[1])
+    return added((matrix, vector))
+
+
+def added(*products: tuple[ca.DM | SparseMap, ca.MX]) -> ca.MX:
+    """Sum of matrices times vectors; zeros where no matrix has an entry.
+
+    Each operation takes CasADi as long as one with numbers takes thousands of them: those with nothing are left out.
+    """
+    total = None
+    for matrix, vector in products:
+        if len(matrix.row) if isinstance(matrix, SparseMap) else matrix.nnz():
+            product = ca.mtimes(constant(matrix) if isinstance(matrix, SparseMap) else matrix, vector)
+            total = product if total is None else total + product
+    if total is None:
+        matrix, vector = products[0]
+        return ca.MX.zeros(matrix.shape[0], vector.size2())
+    return ca.densify(total)
 
 
 def picked(vector: ca.MX, entries: Array) -> ca.MX:

@@ -202,6 +202,7 @@ class Equations:
         unknown = np.where(cells < 0, -1, tables.unknown[cells])
         self._used = np.flatnonzero(unknown >= 0)
         self._onto, self._share = unknown[self._used], tables.weight[cells[self._used]]
+        self._absolute_share = np.abs(self._share)
 
     def _matrix(self, values: list[Array], ties: float = 1.0) -> Array:
         """Entries of the matrix from those that the terms give, in the order of their tables.
@@ -266,11 +267,19 @@ class Equations:
 
         ``gained`` (elements, axes) are the changes of the chords of the elements.
         """
-        positions = self.model.positions
-        delta = np.add.reduceat(gained, self._first, axis=0).ravel() if len(gained) else np.zeros(0)
+        positions, delta = self.model.positions, self._chords(gained)
         nodal = positions.E @ delta + positions.Y @ state.y + positions.B @ loading.shift
-        gap = positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift
-        return nodal, gap
+        return nodal, self._gaps(delta, state, loading)
+
+    def _chords(self, gained: Array) -> Array:
+        """Changes of the chords of the segments, (segments * axes,)."""
+        return np.add.reduceat(gained, self._first, axis=0).ravel() if len(gained) else np.zeros(0)
+
+    def _gaps(self, delta: Array, state: State, loading: Loading) -> Array:
+        positions = self.model.positions
+        if not len(positions.rows):
+            return np.zeros(0)
+        return np.asarray(positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift)
 
     def retained_places(self, state: State, loading: Loading) -> Array:
         """Displacements (places, axes), dimensionless, of kept places (unknown or prescribed); undefined for others."""
@@ -311,7 +320,7 @@ class Equations:
             sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
             # A node at which next to nothing acts is judged by a millionth of what acts elsewhere.
             scale[displacement] += sums + UNLOADED * sums.max(initial=0.0) + 1e-12
-        gap = self.displacements(state, loading, found[0][2])[1]
+        gap = self._gaps(self._chords(found[0][2]), state, loading)
         residual[self.unknowns :] = np.concatenate([gap, *(part[2].ravel() for part in found[1:])])
         # A component along which nothing acts is judged by what acts across it.
         scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
@@ -333,7 +342,7 @@ class Equations:
         sizes = [np.abs(part) for part in gradients]
         sizes[0] += carried[:, None]
         given = np.concatenate([part.ravel() for part in sizes])[self._used]
-        found = np.bincount(self._onto, weights=given * np.abs(self._share), minlength=self.total)
+        found = np.bincount(self._onto, weights=given * self._absolute_share, minlength=self.total)
         return found.astype(float, copy=False)
 
     def slope(self, state: State, point: Point, rate: Loading) -> Array:

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Index
-from ..mathematics.constants import constant, sparse, times
+from ..mathematics.constants import added, sparse, times
 from ..mathematics.kernels import Kernels, chosen
 from ..mathematics.linear import SparseMap
 from .equations import Equations
@@ -154,16 +154,16 @@ class SymbolicTerms:
     def retained_places(self, y: ca.MX, given: Given) -> ca.MX:
         """Displacements of kept places (unknown or prescribed), (places * axes,); undefined for others."""
         positions = self.model.positions
-        return times(constant(positions.Y), y) + times(constant(positions.B), given.shift)
+        return added((positions.Y, y), (positions.B, given.shift))
 
     def open_gaps(self, y: ca.MX, given: Given) -> ca.MX:
         """The part of the gaps of loop closures that unknown and prescribed displacements contribute."""
         positions = self.model.positions
-        return times(constant(positions.W), y) + times(constant(positions.BZ), given.shift)
+        return added((positions.W, y), (positions.BZ, given.shift))
 
     def gaps(self, q: ca.MX, y: ca.MX, given: Given, unwrapped: ca.MX) -> ca.MX:
         """Gaps of the loop closures, then of the rows of joints, (rows,)."""
-        return self.gaps_of(self.every(q, y, given, unwrapped), y, given)
+        return self.gaps_of(self.every(q, self.retained_places(y, given), given, unwrapped), y, given)
 
     def gaps_of(self, arguments: list[list[ca.MX]], y: ca.MX, given: Given) -> ca.MX:
         """As :meth:`gaps`, from the arguments that :meth:`every` gives."""
@@ -235,9 +235,8 @@ class SymbolicTerms:
         sides = self.sides(self.model.terms[number], q, places)
         return [*sides, self.data(number, given, unwrapped), self.load(number, given)]
 
-    def every(self, q: ca.MX, y: ca.MX, given: Given, unwrapped: ca.MX) -> list[list[ca.MX]]:
-        """Arguments of all groups of terms; an empty list for a group without terms."""
-        places = self.retained_places(y, given)
+    def every(self, q: ca.MX, places: ca.MX, given: Given, unwrapped: ca.MX) -> list[list[ca.MX]]:
+        """Arguments of all groups of terms, with :meth:`retained_places`; an empty list for a group without terms."""
         groups = enumerate(self.model.terms)
         return [self.arguments(i, q, places, given, unwrapped) if len(group.data) else [] for i, group in groups]
 
@@ -348,7 +347,7 @@ class Expressions(SymbolicTerms):
         residual = times(onto, force)
         for sides, values in shares:
             residual += times(self.onto_unknowns(sides), ca.vec(values))
-        below = ca.vertcat(times(constant(self.model.positions.W).T, lam), *rows)
+        below = ca.vertcat(times(self.model.positions.W.T, lam), *rows)
         return residual + ca.vertcat(ca.MX.zeros(self.equations.rotation_unknowns), below)
 
 

@@ -18,7 +18,7 @@ from ..description.records import unknown
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers
-from ..mathematics.constants import constant, times
+from ..mathematics.constants import times
 from ..mechanics.connections import connections_of
 from ..mechanics.load_terms import spread_of
 from ..mechanics.model import Model
@@ -367,16 +367,16 @@ class _Outputs:
 
     def _reaction(self, node: str, key: str) -> ca.MX:
         model, reactions, closings = self._model, self._reactions, len(self._model.positions.rows)
-        left, first = times(constant(reactions.left), self._cells), self._expressions.of_places
+        left, first = times(reactions.left, self._cells), self._expressions.of_places
         if key == "force":
             on_places = left[first:] + self._found.on_places
-            forces = times(constant(reactions.forces), ca.vertcat(on_places, self._lam[:closings, :]))
+            forces = times(reactions.forces, ca.vertcat(on_places, self._lam[:closings, :]))
             force = ca.reshape(forces, self._expressions.axes, -1)[:, model.segments.place(node)]
             return ca.mtimes(ca.DM(reactions.pushed(node)), self._three(force)).T * model.scales.force
         if reactions.shared(node):
             cells = ca.vertcat(self._cells, ca.MX(reactions.rigid.known.shape[1] - reactions.cells, 1))
             known = ("node", node) in reactions.rigid.unknowns
-            found = times(constant(reactions.rigid.share(node)), cells) if known else ca.MX.zeros(3)
+            found = times(reactions.rigid.share(node), cells) if known else ca.MX.zeros(3)
             return self._about(found).T * model.scales.moment
         moments = self._about(ca.reshape(left[:first], self._expressions.turns, -1))
         parts = (ca.mtimes(ca.DM(held), moments[:, turn]) for turn, held in reactions.turned(node))

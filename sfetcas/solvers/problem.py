@@ -15,7 +15,7 @@ import numpy as np
 
 from ..mathematics import interpolation, quaternion
 from ..mathematics.arrays import Array, Index
-from ..mathematics.constants import constant, picked, sparse, times
+from ..mathematics.constants import added, picked, sparse, times
 from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import NLP
 from ..mathematics.quaternion import product
@@ -98,7 +98,7 @@ class EquilibriumProblem:
         turned = held + times(self._spread, self.x) if tables.of_places else held
         self._q = ca.reshape(turned, element.components, len(model.rotations.kind))
         self._places = self.terms.retained_places(self._y, self._given)
-        self._arguments = self.terms.every(self._q, self._y, self._given, self._unwrapped)
+        self._arguments = self.terms.every(self._q, self._places, self._given, self._unwrapped)
         norms = [f"norm of rotation {i}" for i in self._unit]
         self.row_names = (*norms, *model.row_names)
 
@@ -141,17 +141,20 @@ class EquilibriumProblem:
         return found
 
     def _gradient(self) -> ca.MX:
-        tables = self._tables
-        total = ca.MX.zeros(tables.total)
-        for sides, (gradient, _) in zip(tables.sides, self._slopes, strict=True):
-            total += times(self.terms.onto_unknowns(sides), ca.vec(gradient))
-        loads = times(constant(self.model.positions.Y).T, self._given.force)
-        return ca.densify(total[: tables.unknowns] - ca.vertcat(ca.MX.zeros(tables.rotation_unknowns), loads))
+        tables, onto = self._tables, self.terms.onto_unknowns
+        parts = [(onto(sides), ca.vec(own)) for sides, (own, _) in zip(tables.sides, self._slopes, strict=True)]
+        gradient = added(*parts)[: tables.unknowns]
+        if not len(self.model.positions.Y.row):
+            return gradient
+        loads = times(self.model.positions.Y.T, self._given.force)
+        return gradient - ca.vertcat(ca.MX.zeros(tables.rotation_unknowns), loads)
 
     def _norms(self) -> ca.MX:
+        if not self._unit:
+            return ca.MX(0, 1)
         rows, columns = self._norm_parts
         adder = sparse(rows, columns, np.ones(len(rows)), (len(self._unit), self.x.numel()))
-        return times(adder, self.x**2) - 1.0 if self._unit else ca.MX(0, 1)
+        return times(adder, self.x**2) - 1.0
 
     def _jacobian(self) -> ca.MX:
         tables, w = self._tables, self.model.positions.W

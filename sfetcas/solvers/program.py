@@ -17,7 +17,7 @@ import numpy as np
 
 from ..mathematics.active import applied
 from ..mathematics.arrays import Array, numbers
-from ..mathematics.constants import constant, sparse, times
+from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
 from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
@@ -152,8 +152,12 @@ class Program:
 
     @functools.cached_property
     def _arguments(self) -> list[list[ca.MX]]:
-        q, y, _, unwrapped = self.parts
-        return self.expressions.every(q, y, self.given, unwrapped)
+        q, _, _, unwrapped = self.parts
+        return self.expressions.every(q, self._places, self.given, unwrapped)
+
+    @functools.cached_property
+    def _places(self) -> ca.MX:
+        return self.expressions.retained_places(self.parts[1], self.given)
 
     @functools.cached_property
     def strains(self) -> ca.MX:
@@ -293,8 +297,7 @@ class Program:
     @functools.cached_property
     def potential(self) -> ca.MX:
         """Potential energy, zero of the undeformed, unloaded scene; without that of what has none."""
-        y = self.parts[1]
-        return self._energies[0] - ca.dot(self.given.force, self.expressions.retained_places(y, self.given))
+        return self._energies[0] - ca.dot(self.given.force, self._places)
 
     @functools.cached_property
     def _gaps(self) -> ca.MX:
@@ -391,8 +394,8 @@ class Program:
             total += times(expressions.sizes_onto_unknowns(sides), ca.vec(sizes))
         if equations.displacement_unknowns:
             closings = len(model.positions.rows)
-            acting = times(constant(model.positions.W.T.absolute), ca.fabs(lam[:closings]))
-            acting += times(constant(model.positions.Y.T.absolute), ca.fabs(found.on_places))
+            acting = times(model.positions.W.T.absolute, ca.fabs(lam[:closings]))
+            acting += times(model.positions.Y.T.absolute, ca.fabs(found.on_places))
             acting += UNLOADED * ca.norm_inf(acting) + 1e-12
             rotation_unknowns = equations.rotation_unknowns
             total += ca.vertcat(ca.MX.zeros(rotation_unknowns), acting, ca.MX.zeros(equations.rows))
