@@ -95,7 +95,7 @@ WAYS = {
     "cushions": "obstacles are cushions that become hard",
 }
 """The ways to an equilibrium, in the words of :attr:`~sfetcas.equilibria.solution.Equilibrium.way`; in which order they
-are tried say :meth:`Ways.found`, :meth:`Ways.on_pilot` and, in contact,
+are tried say :meth:`Ways.result`, :meth:`Ways.on_pilot` and, in contact,
 :meth:`~sfetcas.contact.contact_statics.ContactRun.reached`."""
 
 
@@ -147,7 +147,7 @@ class Ways:
     def on_pilot(
         self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
     ) -> EquilibriumResult:
-        """The equilibrium on the pilot mesh; parameters and errors as of :meth:`found`.
+        """The equilibrium on the pilot mesh; parameters and errors as of :meth:`result`.
 
         It is the one that the loads lead to as they grow from zero.  It is a minimum of the energy under the full loads
         where growing loads cannot be followed, where the branch does not matter, or where start positions choose it.

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..description.answers import single_number
-from ..description.obstacles import obstacle
 from ..mathematics import curves, quaternion
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.keeping import kept
@@ -271,13 +270,6 @@ class Fields:
     def moment_on(self, turn: int) -> float:
         """Magnitude of the external moment on a rotation, given by its number; dimensionless."""
         return float(np.linalg.norm(self._loading.moment[turn]))
-
-    def obstacle_normal(self, touch: Touch, at: float) -> Array:
-        """Unit normal (3,) of an obstacle towards the member that touches it, at a fraction of the member's length."""
-        place = np.array([at])
-        position, tangent = self.positions(touch.member, place), self.tangents(touch.member, place)
-        stop = obstacle(self.model.scene.contacts[touch.contact], self.model.space)
-        return np.asarray(stop.normals(position, tangent, touch.way)[0])
 
     def own_force(self, node: str) -> Array:
         """Force (3,) N that acts as a load on a node itself, not on its members."""

@@ -43,7 +43,7 @@ def shared(equations: Equations, state: State, loading: Loading, loose: Array, *
     ----------
     equations, state, loading
     loose : ndarray (rows, n)
-        Redundant combinations of rows, of :func:`~sfetcas.solvers.redundancy.loose_rows`.
+        Redundant combinations of rows, orthonormal, of :func:`~sfetcas.solvers.redundancy.loose_rows`.
     reactions : bool
         Whether to make reactions least also where redundant combinations change no axial force of any member;
         otherwise the multipliers are least there.
