@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Output", "outputs_of", "outputs_of_sweep", "outputs_of_trade"]
 
 Writer = Callable[[Any, Path], Any]
-"""What writes an answer to a file."""
+"""A function that writes an answer to a path."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,13 @@ class Output:
 
     Attributes
     ----------
-    option, path
+    option : str
+        The option, as ``--json``.
+    path : Path
     writer : callable
-        Writes an answer to a path with the same ending.
+        (answer, path) writes an answer to a path with the same ending.
     folder : bool
-        It makes a folder of files.
+        Whether the path is a folder of files.
     """
 
     option: str
@@ -44,12 +46,12 @@ class Output:
     folder: bool = False
 
     def write(self, answer: Any) -> None:
-        """Write an answer.
+        """Write an answer, all of it or nothing.
 
         Raises
         ------
         SceneError
-            It could not be written; what was there before is left.
+            It could not be written; an earlier file or folder is left as it was.
         """
         if self.folder:
             write_folder(self.path, lambda path: self.writer(answer, path))
@@ -58,12 +60,12 @@ class Output:
 
 
 def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
-    """What the options ask for, before anything is solved.
+    """The files that the options of a run ask for, checked before anything is solved.
 
     Raises
     ------
     SceneError
-        It cannot be written, or not of such a scene.
+        A path cannot be written, or there is no such output for this type of analysis.
     """
     makers: dict[str, Callable[[Path, Scene], Writer]] = {
         "json": _json,
@@ -89,12 +91,12 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
 
 
 def outputs_of_trade(options: argparse.Namespace) -> list[Output]:
-    """Files of a trade that the options ask for, before anything is run.
+    """The files that the options of a trade ask for, checked before anything is run.
 
     Raises
     ------
     SceneError
-        They cannot be written.
+        A path cannot be written, is the scene itself, or is given twice.
     """
     from .tradeoff.tables import as_csv, as_json, as_markdown
 
@@ -115,12 +117,12 @@ def outputs_of_trade(options: argparse.Namespace) -> list[Output]:
 
 
 def outputs_of_sweep(options: argparse.Namespace) -> list[Output]:
-    """The tables of a sweep that the options ask for, before anything is run.
+    """The tables that the options of a sweep ask for, checked before anything is run.
 
     Raises
     ------
     SceneError
-        They cannot be written.
+        A path cannot be written, is an input of the sweep, or is given twice.
     """
     from .sweeps.result import check_table
 
@@ -149,7 +151,7 @@ def _front(path: Path) -> Writer:
 
 
 def _matrices(path: Path, scene: Scene) -> Output:
-    """Matrices of small motions, in one file or a folder of its own."""
+    """Output of the matrices of small motions, in a file ``.npz`` or a new folder."""
     if scene.analysis.type != "modes":
         raise SceneError(f"--matrices: found the analysis {scene.analysis.type!r}, accepted: 'modes'")
     folder = path.suffix != ".npz"
@@ -195,7 +197,7 @@ def _vtk(path: Path, scene: Scene) -> Writer:
 
 
 def _placed(path: Path, check: Callable[[], object]) -> None:
-    """A check whose sentence begins with the file."""
+    """Do a check, with the file at the beginning of the message if it fails."""
     try:
         check()
     except SceneError as error:
@@ -205,7 +207,7 @@ def _placed(path: Path, check: Callable[[], object]) -> None:
 def _check_writable(path: Path) -> None:
     try:
         plain = not path.is_symlink() and (path.is_file() or not path.exists())
-        # What permissions say is not all: some folders take no files from anybody.
+        # Permissions alone do not decide: some folders accept no files from anybody.
         with tempfile.TemporaryFile(dir=path.parent):
             pass
     except (OSError, ValueError):
@@ -216,7 +218,7 @@ def _check_writable(path: Path) -> None:
 
 
 OURS = re.compile(r"answers\.pvd|answer_\d+\.vtu")
-"""Files of an earlier run in a folder, which a later one replaces."""
+"""Names of the files of an earlier run in a folder, which a later one replaces."""
 
 
 def _check_folder(path: Path) -> None:

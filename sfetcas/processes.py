@@ -1,4 +1,4 @@
-"""Starting worker processes so that an interrupt neither leaves one half-started nor reaches the workers."""
+"""Start of worker processes: an interrupt neither leaves one half-started nor reaches the workers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 
 LONGEST = 70
-"""Longest path of the temporary folder, in bytes, with which names of sockets (32 bytes more) are valid everywhere."""
+"""Largest length of the path of the temporary folder, bytes, for ``forkserver``: names of its sockets add 32 bytes."""
 
 
 def context_of(preloaded: Sequence[str]) -> Any:
@@ -37,7 +37,7 @@ def postponed() -> Iterator[None]:
     """Context manager that delays SIGINT and SIGTERM until it is left: a process is started whole or not at all."""
     signals: list[int] = []
     try:
-        # Other threads take them, too, so that it is not enough to block them in this one.
+        # Other threads receive signals, too, so that it is not enough to block them in this one.
         with noted(forward=False) as signals, _blocked():
             yield
     finally:
@@ -47,11 +47,11 @@ def postponed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _blocked() -> Iterator[None]:
-    """For what is started meanwhile, until :func:`begin_apart`."""
+    """Context in which SIGINT and SIGTERM are blocked for processes that are started, until :func:`begin_apart`."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # Where this starts by itself, it lets signals through.
+    # The tracker unblocks signals when it starts by itself: it is started before they are blocked.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
@@ -61,7 +61,7 @@ def _blocked() -> Iterator[None]:
 
 
 def begin_apart() -> None:
-    """For the start of a worker process: ignore SIGINT, which its parent handles, and unblock signals."""
+    """Initialise signals in a worker process: ignore SIGINT, which its parent handles, and unblock both."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)

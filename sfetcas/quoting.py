@@ -27,7 +27,7 @@ __all__ = [
 
 
 def printable(text: str) -> str:
-    """On one line of a terminal: what is no character to be seen, as what steers the terminal, as its number.
+    """For one line of a terminal: characters that are not printable, as control codes, as Python's escapes.
 
     >>> printable("a\\x1b[2J\\n")
     'a\\\\x1b[2J\\\\n'
@@ -36,7 +36,7 @@ def printable(text: str) -> str:
 
 
 def identifiers(names: Iterable[str]) -> list[str]:
-    """As ends of identifiers of C, no two alike.
+    """For the ends of identifiers of C: capitals, other characters as _, equal ones numbered.
 
     >>> identifiers(["tip load", "tip-load", "*/"])
     ['TIP_LOAD', 'TIP_LOAD_2', '__']
@@ -52,9 +52,9 @@ def identifiers(names: Iterable[str]) -> list[str]:
 
 
 def c_string(text: str) -> str:
-    """As a string of C with its quotes: bytes of UTF-8, of which only plain ones stand for themselves.
+    """For C, as a string literal with its quotes: UTF-8, bytes that are not plain characters as octal escapes.
 
-    Three octal digits end an escape, whatever follows; a question mark could be one of a trigraph.
+    Three octal digits end an escape, whatever follows; question marks are escaped since they may begin a trigraph.
 
     >>> c_string('é"?1')
     '"\\\\303\\\\251\\\\042\\\\0771"'
@@ -64,7 +64,7 @@ def c_string(text: str) -> str:
 
 
 def c_comment(text: str) -> str:
-    """Within a comment of C, on one line: it neither ends there nor begins another one, and has no trigraphs.
+    """For a comment of C, on one line: the text neither ends the comment nor begins another, and has no trigraphs.
 
     >>> c_comment("a */ b ??/")
     'a * / b ? ?/'
@@ -74,12 +74,12 @@ def c_comment(text: str) -> str:
 
 
 def python_string(text: str) -> str:
-    """As a string of Python with its quotes, in plain characters."""
+    """For Python, as a string literal with its quotes, in ASCII."""
     return ascii(text)
 
 
 def in_docstring(text: str) -> str:
-    """Within a string of Python of three double quotes, which reads as the text again.
+    """For the inside of a Python string in three double quotes, the value of which is the text again.
 
     >>> in_docstring(3 * chr(34)) == 3 * (chr(92) + chr(34))
     True
@@ -88,12 +88,12 @@ def in_docstring(text: str) -> str:
 
 
 def shell_word(text: str) -> str:
-    """As one word of a shell, for an example to be copied from; empty without a text."""
+    """For a POSIX shell, as one word of an example; empty for an empty text."""
     return shlex.quote(text) if text else ""
 
 
 def markdown(text: str) -> str:
-    """As a part of a line of Markdown that shows just its characters: no link, picture, table, formula or HTML.
+    """For a line of Markdown that shows just these characters: no link, picture, table, formula or HTML.
 
     >>> markdown("<b> | $x$ tip_load")
     '\\\\<b\\\\> \\\\| \\\\$x\\\\$ tip\\\\_load'
@@ -102,12 +102,12 @@ def markdown(text: str) -> str:
 
 
 def markdown_cell(text: str) -> str:
-    """As code in a cell of a table of Markdown; what would not stay code as escaped text."""
+    """For a cell of a Markdown table: as code, or as escaped text if it has characters that would end the code."""
     return markdown(text) if re.search(r"[`|\\]", text) or text != text.strip() else f"`{printable(text)}`"
 
 
 def csv_cell(value: Any) -> Any:
-    """As a cell of a CSV table: a text that a spreadsheet would take for a formula after an apostrophe, as there.
+    """For a cell of a CSV table: a text that a spreadsheet would take for a formula gets an apostrophe; None is empty.
 
     >>> [csv_cell(value) for value in ("=1+1", "loads.tip", -1.5, None)]
     ["'=1+1", 'loads.tip', -1.5, '']

@@ -1,7 +1,7 @@
-"""SIGTERM as Ctrl-C: one sentence and the usual exit code, nothing half-written, no temporary files left.
+"""Interrupts of the command: SIGTERM as Ctrl-C, with one sentence and the usual exit code, and no partial files left.
 
-Also while the command still imports what it needs: the package asks for that before all else where it is the command
-that runs, and leaves signals alone where it is a library of another program.
+Importing this module, the first thing that the package does, handles signals for the time of all other imports if the
+process is the command line; as a library of another program it leaves signals alone.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ INTERRUPTED = 128 + signal.SIGINT
 SENTENCE = "sfetcas: interrupted; nothing was written"
 
 AGAIN = 0.2
-"""Seconds after which an interrupt is raised again that has not arrived."""
+"""Time, s, after which an interrupt that was not answered is raised again."""
 
 
 def _is_command() -> bool:
@@ -32,21 +32,24 @@ def _is_command() -> bool:
     if started or not sys.argv:
         return False
     if sys.argv[0] == "-m":
-        # What is run is not known yet where its package is imported.
+        # With -m, Python imports the package before it puts the name of the program into sys.argv.
         return "-msfetcas" in words or ("-m", "sfetcas") in zip(words, words[1:])
     return os.path.basename(sys.argv[0]).removesuffix(".exe") == "sfetcas"
 
 
 COMMAND = _is_command()
-"""As the package is imported: later the name of what is run is another one."""
+"""Whether this process is the command line, decided at import: later ``sys.argv`` has another name in it."""
 
 
 def leave_at_once() -> None:
-    """Until :func:`heard`, end the process of the command on a signal: there is nothing yet to be put in order."""
+    """Make SIGINT and SIGTERM end the command at once until :func:`heard`; does nothing in other processes or threads.
+
+    The message goes to the standard error; the exit code is 128 plus the number of the signal.
+    """
     if not COMMAND or threading.current_thread() is not threading.main_thread():
         return
     for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
-        # What is ignored, as in the background, stays so.
+        # Ignored signals, as in a background job, stay ignored.
         if signal.getsignal(number) == usual:
             signal.signal(number, _leave)
 
@@ -58,9 +61,9 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
 
 class _Interrupts:
-    """A handler that raises KeyboardInterrupt, in the command again and again until it has arrived.
+    """A handler that raises KeyboardInterrupt, in the command again and again until :func:`arrived` is called.
 
-    Libraries that call Python from C may take it for an exception of their own, and forget it.
+    Libraries that call Python from C may take it for an exception of their own, and drop it.
     """
 
     first: int | None = None
@@ -68,7 +71,7 @@ class _Interrupts:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         known, self.first = self.first is not None, self.first or number
-        # Whoever ends a group of processes sends it twice to some: what puts things in order is not disturbed.
+        # Ending a process group may send the signal twice: clean-up after the first one is not interrupted.
         if _on_its_way() or (known and not self.waiting and number != signal.SIGINT):
             return
         self.waiting = True
@@ -77,7 +80,7 @@ class _Interrupts:
         raise KeyboardInterrupt
 
     def again(self, number: int, frame: FrameType | None) -> None:
-        """The signal once more, which somebody may be noting."""
+        """Handler of the timer: raise the first signal again, for whichever handler is set now."""
         if self.waiting and self.first is not None:
             signal.raise_signal(self.first)
 
@@ -86,7 +89,7 @@ _interrupts = _Interrupts()
 
 
 def _on_its_way() -> bool:
-    """Whether what runs now runs because of an interrupt."""
+    """Whether a KeyboardInterrupt is being handled now."""
     error = sys.exc_info()[1]
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
@@ -94,12 +97,12 @@ def _on_its_way() -> bool:
 
 
 def asked() -> bool:
-    """Whether there was an interrupt that has not arrived: whatever else happened may be because of it."""
+    """Whether an interrupt was raised and not answered yet: other errors may be a consequence of it."""
     return _interrupts.waiting
 
 
 def arrived() -> None:
-    """An interrupt has come to where it is answered, and is not raised again."""
+    """Note that an interrupt is answered now, so that it is not raised again."""
     _interrupts.waiting = False
     if COMMAND and hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -107,7 +110,11 @@ def arrived() -> None:
 
 @contextlib.contextmanager
 def heard() -> Iterator[Callable[[int], int]]:
-    """Within this SIGTERM raises KeyboardInterrupt, too; given is what makes the exit code of that of an interrupt."""
+    """Context in which SIGTERM raises KeyboardInterrupt as SIGINT does, in the main thread.
+
+    It yields a function of the exit code: :data:`INTERRUPTED` becomes 128 plus the number of the first signal, other
+    codes stay.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield int
         return
@@ -134,7 +141,10 @@ def heard() -> Iterator[Callable[[int], int]]:
 
 @contextlib.contextmanager
 def noted(*, forward: bool) -> Iterator[list[int]]:
-    """Signals that come meanwhile, where Python handles them, in any thread; ``forward``: they are handled as well."""
+    """Context that collects SIGINT and SIGTERM in a list as they come; with ``forward`` they are handled as well.
+
+    Only signals with a handler of Python are caught, and only if the context is entered in the main thread.
+    """
     found: list[int] = []
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     # Only the main thread may change them.

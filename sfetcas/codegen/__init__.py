@@ -1,1 +1,1 @@
-"""Generated C: an equilibrium as one file without dependencies."""
+"""Generated C99 without dependencies: equilibrium solvers, time steps, and derivatives of an equilibrium's program."""

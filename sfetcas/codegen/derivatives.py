@@ -1,4 +1,4 @@
-"""Energy, constraints and their derivatives as functions for C: the nonlinear program of an equilibrium."""
+"""The nonlinear program of an equilibrium for C: energy, constraints and their derivatives as functions."""
 
 from __future__ import annotations
 
@@ -26,21 +26,23 @@ __all__ = ["Derivatives", "derivatives"]
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """The program of one scene on one mesh; every function of it is CasADi's, in process as in C.
+    """The program of one scene on one mesh; the same CasADi functions run in process and in C.
 
     Attributes
     ----------
     name : str
-        Beginning of all names in C.
+        Prefix of all names in C.
     scene : Scene
     arguments : Arguments
+        Numbers of the scene that are arguments, in their SI units.
     results : Results
-        None of them: a program has unknowns.
+        Empty: a program has unknowns instead.
     nlp : NLP
-    parameters : MX
-        Of the program, as an expression of what is given.
+        Dimensionless.
+    parameters : MX (parameters,)
+        Parameters of the program as an expression of what is given, see :class:`~sfetcas.solvers.program.Program`.
     guess : ndarray (unknowns,)
-        The answer of statics for the defaults.
+        The static equilibrium for the default arguments, dimensionless.
     """
 
     name: str
@@ -53,15 +55,15 @@ class Derivatives:
 
     @property
     def model(self) -> Model:
-        """The model, at values of the arguments where nothing vanishes by chance."""
+        """The model, assembled at values of the arguments for which no entry vanishes by chance."""
         return self.arguments.model
 
     @functools.cached_property
     def functions(self) -> dict[str, ca.Function]:
-        """(arguments, x) -> energy, gradient, constraints, jacobian; (arguments, x, weight, multipliers) -> hessian.
+        """CasADi functions by name: ``energy``, ``gradient``, ``constraints``, ``jacobian`` and ``hessian``.
 
-        The Hessian is that of ``weight energy + multipliers.constraints``, full; matrices are the entries of their
-        patterns.
+        Arguments are (arguments, x), for the Hessian (arguments, x, weight, multipliers).  It is the full one of
+        ``weight energy + multipliers.constraints``.  Matrices are given by the entries of :attr:`patterns`.
         """
         nlp, program = self.nlp, self.arguments.program
         p = ca.MX.sym("arguments", len(self.arguments.defaults))
@@ -84,7 +86,7 @@ class Derivatives:
 
     @property
     def patterns(self) -> dict[str, ca.Sparsity]:
-        """Of the matrices."""
+        """Sparsity of the Jacobian (constraints, unknowns) and of the Hessian (unknowns, unknowns)."""
         hessian = self.nlp.hessian(ca.MX(1), ca.MX.ones(self.nlp.g.numel()))
         return {"jacobian": self.nlp.jacobian.sparsity(), "hessian": hessian.sparsity()}
 
@@ -101,12 +103,12 @@ def derivatives(
     Parameters
     ----------
     scene, name, arguments, settings
-        As of :func:`~sfetcas.parametric.equilibrium.equilibrium_solver`; arguments are loads and motions.
+        As of :func:`~sfetcas.parametric.equilibrium.equilibrium_solver`; arguments can be loads and motions only.
 
     Raises
     ------
     SceneError
-        Loads without potential, or numbers that are no loads.
+        The scene has loads without potential or cannot be exported, or an argument is no load or motion.
     """
     solver = equilibrium_solver(scene, name, arguments=arguments, settings=settings)
     model, program = solver.model, solver.arguments.program

@@ -29,7 +29,7 @@ from .writing_steps import StepWriter
 __all__ = ["check_folder", "check_name", "export"]
 
 LARGEST = 100_000_000
-"""Bytes of a manifest that is looked at."""
+"""Largest size of a manifest that is read, bytes."""
 
 RESERVED = (
     " auto break case char const continue default do double else enum extern float for goto if inline int long "
@@ -39,7 +39,7 @@ RESERVED = (
     " ALL_BUILD INSTALL PACKAGE RUN_TESTS ZERO_CHECK package package_source preinstall edit_cache rebuild_cache depend "
     " complex fenv inttypes limits math setjmp stdarg stdbool stddef stdint stdio stdlib tgmath wchar wctype features "
 )
-"""Words that are no names in C, in C++ or of targets of CMake, files of the folder, and what its own would hide."""
+"""Names that an export cannot have: words of C, C++ and CMake, files of the folder, headers that it would hide."""
 
 
 def export(
@@ -61,9 +61,9 @@ def export(
     ----------
     scene : Scene
     folder : path
-        Made anew.
+        A new or empty folder, or with ``overwrite`` that of an earlier export.
     name : str
-        Of the files, and the beginning of all names in C.
+        Name of the files, and prefix of all names in C.
     arguments : names of numbers of the scene, or a mapping of them to their ranges (low, high)
         ``factor``, ``histories.NAME``, and any number or list of numbers: ``loads.tip.value``,
         ``sections.strip.EI3``.  Without them the factor, all loads and all motions.  A range limits what is accepted.
@@ -71,25 +71,26 @@ def export(
         ``nodes.B.position``, ``reactions.A.force``, ``members.beam.moment``, ``springs.S.angle``,
         ``energy.elastic``, and ``stiffness.B`` or ``compliance.B``.  Without them all but these two.
     places : mapping of members to fractions of their length
-        Where they are told of.
+        Where results along members are computed.
     sensitivities : bool
-        Derivatives of all results by all arguments, too.
+        Whether to add the derivatives of all results by all arguments.
     derivatives : bool
-        Instead of a solver energy, constraints and their derivatives: the nonlinear program of the equilibrium.
+        Whether to write, instead of a solver, the nonlinear program: energy, constraints and their derivatives.
     settings : Settings, optional
         Accuracy, elements.
     overwrite : bool
-        Replace what an existing folder holds.
+        Whether to replace an earlier export in the folder.
 
     Returns
     -------
     EquilibriumSolver, TimeStep or Derivatives
-        The same in process.
+        The functions of the export, for use in Python.
 
     Raises
     ------
     SceneError
-        A scene or a number that cannot be exported; a folder that is there.
+        The scene or one of its numbers cannot be exported, options contradict each other, or the name or the folder
+        cannot be used.
 
     Example
     -------
@@ -121,7 +122,7 @@ def _made(
     sensitivities: bool,
     derivatives: bool,
 ) -> tuple[EquilibriumSolver | TimeStep | Derivatives, dict[str, str]]:
-    """What is exported, and its files."""
+    """The object that is exported, and the texts of its files by name."""
     made: EquilibriumSolver | TimeStep | Derivatives
     given: dict[str, Any] = {"arguments": arguments, "settings": settings}
     writer: Writer
@@ -143,12 +144,12 @@ def _made(
 
 
 def check_name(name: str) -> None:
-    """Refuse what is no name in C.
+    """Refuse a name that cannot be the prefix of names in C and the name of a Python module.
 
     Raises
     ------
     SceneError
-        Says so.
+        It is no identifier, longer than 60 characters, or a word of C or CMake or a module of Python.
     """
     plain = re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII)
     # Constants begin with the name in capitals; a loader may not hide what Python itself imports.
@@ -161,12 +162,12 @@ def check_name(name: str) -> None:
 
 
 def check_folder(path: Path, *, overwrite: bool) -> None:
-    """Refuse a folder that holds anything.
+    """Refuse a folder that cannot be written, or holds anything but, with ``overwrite``, an earlier export.
 
     Raises
     ------
     SceneError
-        Says so.
+        It is such a folder, or its parent does not exist.
     """
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise SceneError(f"{path}: is no folder, accepted: a new folder")
@@ -179,7 +180,7 @@ def check_folder(path: Path, *, overwrite: bool) -> None:
 
 
 def _ours(path: Path) -> bool:
-    """Whether all that a folder holds is an earlier export, built or not."""
+    """Whether all files of a folder are those of an earlier export or made from it."""
     try:
         manifest = json.loads(read_file(path / "manifest.json", LARGEST))
         name = manifest["name"] if manifest["made_by"] == "sfetcas" else None

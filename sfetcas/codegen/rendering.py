@@ -1,4 +1,4 @@
-"""What is common to all that is written as C: names, tables, constants, manifest, build files."""
+"""Common parts of all exports to C: names, tables, constants, manifest, build files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from ..quoting import (
 __all__ = ["Status", "Writer", "enumerated", "filled", "numbers", "row", "rows", "template"]
 
 Status = tuple[str, int, str]
-"""How a call may end: name, number, meaning."""
+"""A result code of a call in C: name, number, meaning."""
 
 WARNINGS = """#if defined(__GNUC__)
 /* What CasADi generates takes arguments that it may not need. */
@@ -43,17 +43,17 @@ WARNINGS = """#if defined(__GNUC__)
 
 
 def template(name: str) -> str:
-    """A file that is filled in."""
+    """The text of a template, a file of the folder ``templates``."""
     return resources.files(__package__).joinpath("templates").joinpath(name).read_text()
 
 
 def filled(text: str, values: dict[str, object]) -> str:
-    """A template with its ``@marks@`` filled in."""
+    """A template with its ``@marks@`` replaced by values."""
     return re.sub(r"@(\w+)@", lambda match: str(values[match.group(1)]), text)
 
 
 def enumerated(values: Sequence[Status]) -> str:
-    """Constants of an enum with what they mean."""
+    """Lines of a C enum with the meanings as comments."""
     last = len(values) - 1
     ends = ["," if i < last else "" for i in range(len(values))]
     return "\n".join(
@@ -62,41 +62,44 @@ def enumerated(values: Sequence[Status]) -> str:
 
 
 def numbers(values: Array) -> str:
-    """Numbers in one line, no digit lost."""
+    """Numbers (any shape and unit) as C constants in one line, with all digits; 0.0 for an empty array."""
     return ", ".join(repr(float(x)) for x in np.asarray(values).ravel()) or "0.0"
 
 
 def row(values: Array) -> str:
-    """Numbers in lines of five; zero for what is none."""
+    """Numbers (n,) as C constants in lines of five, with all digits; 0.0 for nan, inf and an empty array."""
     texts = [repr(float(x)) if np.isfinite(x) else "0.0" for x in values] or ["0.0"]
     lines = [", ".join(texts[i : i + 5]) for i in range(0, len(texts), 5)]
     return ",\n   ".join(lines)
 
 
 def rows(values: Sequence[Array]) -> str:
-    """The lines of an array of arrays."""
+    """Arrays (n,) as the lines of a C initialiser of an array of arrays."""
     return ",\n".join(f"  {{{row(one)}}}" for one in values)
 
 
 class Writer(abc.ABC):
-    """Files of one export.
+    """The files of one export; a subclass for each kind of export gives templates, functions and tables.
 
     Parameters
     ----------
-    name, scene, arguments, results
-        Of what is exported.
+    name : str
+        Prefix of all names in C.
+    scene : Scene
+    arguments : Arguments
+    results : Results
     """
 
     header: str
-    """Templates of the header, of the example, of the check, of the loader and of the README."""
+    """Names of the templates of the header, the example, the check, the Python loader and the README."""
     example: str
     check: str
     loader: str | None
     readme: str
     bodies: tuple[str, ...]
-    """Templates of the driver."""
+    """Names of the templates of the driver, the C code that calls the generated functions."""
     last: tuple[str, ...] = ("defaults.c",)
-    """Those at its end."""
+    """Names of the templates at its end."""
 
     def __init__(self, name: str, scene: Scene, arguments: Arguments, results: Results) -> None:
         self.name, self.scene, self.arguments, self.results = name, scene, arguments, results
@@ -106,62 +109,62 @@ class Writer(abc.ABC):
     @property
     @abc.abstractmethod
     def functions(self) -> list[ca.Function]:
-        """What CasADi writes."""
+        """The CasADi functions that are written as C."""
 
     @property
     def roots(self) -> set[str]:
-        """What the driver calls: all functions, without others."""
+        """Names of the functions in C that the driver calls; by default all of :attr:`functions`."""
         return {function.name() for function in self.functions}
 
     @property
     @abc.abstractmethod
     def statuses(self) -> list[Status]:
-        """How a call may end."""
+        """Result codes of a call."""
 
     @property
     @abc.abstractmethod
     def tables(self) -> list[str]:
-        """Constants of the driver."""
+        """Definitions of the constants and tables of the driver, in C."""
 
     @property
     @abc.abstractmethod
     def states(self) -> int:
-        """Numbers of a state."""
+        """Length of a state."""
 
     @property
     @abc.abstractmethod
     def memory(self) -> int:
-        """Doubles of the memory beside those of the functions."""
+        """Number of doubles that the driver needs beside the memory of the functions."""
 
     @property
     @abc.abstractmethod
     def own(self) -> dict[str, object]:
-        """Marks that only this kind has."""
+        """Values of marks in templates that only this kind has."""
 
     @property
     @abc.abstractmethod
     def cases(self) -> dict[str, object]:
-        """Marks of the check: what was computed in process."""
+        """Values of marks in the template of the check: arguments and the results computed in process."""
 
     @property
     @abc.abstractmethod
     def about(self) -> dict[str, Any]:
-        """What the manifest says of this kind."""
+        """Entries of the manifest that only this kind has."""
 
     # -- files ----------------------------------------------------------------------------------------
 
     @property
     def model(self) -> Model:
-        """The model."""
+        """The model on which the functions are based."""
         return self.arguments.model
 
     @property
     def where(self) -> str:
-        """The dimension in words."""
+        """The dimension in words: ``space`` or ``the plane``."""
         return "space" if self.model.space else "the plane"
 
     def files(self) -> dict[str, str]:
-        """Texts by the names of their files."""
+        """The texts of all files by file name."""
         values = {**self._values(), **self.own}
         header = filled(template(self.header), values)
         parts = [
@@ -192,7 +195,7 @@ class Writer(abc.ABC):
         }
 
     def more(self, values: dict[str, object]) -> dict[str, str]:
-        """Further files of this kind."""
+        """Texts of further files of this kind by file name, from the values of marks."""
         return {}
 
     def _values(self) -> dict[str, object]:
@@ -225,13 +228,13 @@ class Writer(abc.ABC):
         }
 
     def _memory_bytes(self) -> int:
-        """An upper bound of the memory of a call, where pointers take eight bytes."""
+        """Upper bound of the memory of a call, bytes, with pointers of eight bytes."""
         sizes = sizes_of(self.functions)
         work = max(sizes["w"], self.arguments.expressions.total)
         return 8 * (work + self.memory + sizes["arg"] + sizes["res"]) + 4 * (sizes["iw"] + 1)
 
     def _manifest(self) -> dict[str, Any]:
-        """What every argument and result is."""
+        """The manifest: sizes, and name, place, unit, shape and meaning of every argument and result."""
         arguments, first = [], 0
         known, told = self.arguments.arguments, self.results.results
         for identifier, one in zip(identifiers(a.name for a in known), known, strict=True):
@@ -278,7 +281,7 @@ class Writer(abc.ABC):
         }
 
     def _words(self, manifest: dict[str, Any]) -> dict[str, object]:
-        """Tables of the README and of the example."""
+        """Values of marks for the tables of the README and the example."""
         arguments, results = manifest["arguments"], manifest["results"]
         example = arguments[0] if arguments else None
         name = "" if example is None else example["name"] + ("" if example["size"] == 1 else ".0")
@@ -302,7 +305,10 @@ class Writer(abc.ABC):
         }
 
     def units(self, results: Sequence[Array]) -> Array:
-        """What each result is compared by: the largest of its kind in all cases."""
+        """Reference (results,) for the comparison of each number in the check, in the unit of the result.
+
+        The largest size of any result of its kind in all cases; 1 for kinds that are zero.
+        """
         largest: dict[str, float] = {}
         kinds = [kind for one in self.results.results for kind in [one.asked.kind.key or one.name] * one.size]
         for values in results:
@@ -320,7 +326,7 @@ def _in_words(names: Sequence[str]) -> str:
 
 
 def _places(prefix: str, sizes: Sequence[tuple[str, int, str]]) -> str:
-    """An enum of where things begin."""
+    """A C enum of the positions at which arguments or results (name, size, unit) begin."""
     if not sizes:
         return ""
     names, first, found = identifiers(name for name, _, _ in sizes), 0, []

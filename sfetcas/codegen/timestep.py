@@ -1,4 +1,4 @@
-"""A time step of a motion ready to be written as C: one function of a flat state, loads and the length of the step."""
+"""A time step of a motion as one function of a flat state, loads and the length of the step, to be written as C."""
 
 from __future__ import annotations
 
@@ -32,20 +32,23 @@ __all__ = ["TimeStep", "time_step"]
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """A step of one scene on one mesh by one method; every function of it is CasADi's, in process as in C.
+    """A step of one scene on one mesh by one method; the same CasADi functions run in process and in C.
 
     Attributes
     ----------
     name : str
-        Beginning of all names in C.
+        Prefix of all names in C.
     scene : Scene
     arguments : Arguments
+        Numbers of the scene that are arguments, in their SI units.
     results : Results
+    system : ParametricStages
+        The equations of a step as expressions of the arguments.
     method : Method
     time : float
-        Unit of time, s.
-    begin : ndarray
-        State in which the motion begins.
+        Unit of time of the model, s.
+    begin : ndarray (states,)
+        First state of the motion, dimensionless; parts as in :attr:`sizes`.
     """
 
     name: str
@@ -59,12 +62,12 @@ class TimeStep:
 
     @property
     def model(self) -> Model:
-        """The model, at values of the arguments where nothing vanishes by chance."""
+        """The model, assembled at values of the arguments for which no entry vanishes by chance."""
         return self.arguments.model
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Numbers of the parts of a state: the motion, the last step, and its length (0 for a fresh start)."""
+        """Lengths of the parts of a state: the motion, data of the last step, and its length (0 for a fresh start)."""
         n, stages = self.system.layout, self.method.stages
         return {
             "q": n.components * n.rotations,
@@ -80,7 +83,7 @@ class TimeStep:
 
     @functools.cached_property
     def advance(self) -> ca.Function:
-        """(state, h, arguments) -> state after a step of h seconds, last change, iterations, what closings miss.
+        """(state, h, arguments) -> state after a step of h, s; last change of Newton's method, iterations, largest gap.
 
         Arguments are (numbers, times): a column for each of :attr:`times` of the step.
         """
@@ -106,7 +109,7 @@ class TimeStep:
 
     @functools.cached_property
     def tell(self) -> ca.Function:
-        """(state, arguments) -> results."""
+        """(state, arguments) -> results (results,) in their SI units."""
         layout = self.system.layout
         state, p = ca.MX.sym("state", len(self.begin)), ca.MX.sym("arguments", layout.factors)
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
@@ -121,15 +124,18 @@ class TimeStep:
 
     @property
     def times(self) -> Array:
-        """Shares of a step at which it asks for the arguments."""
+        """Times (times,) within a step at which arguments are needed, shares of the step."""
         return np.asarray(self.method.loaded)
 
     def step(self, state: Array, h: float, arguments: Array | None = None) -> Array:
-        """The state after a step of h seconds, not a number where Newton's method did not converge.
+        """The state (states,) after a step of h, s; nan if Newton's method did not converge.
 
         Parameters
         ----------
-        arguments : (numbers,) throughout the step, or (times, numbers); the defaults without
+        state : ndarray (states,)
+        h : float
+        arguments : ndarray (numbers,) or (times, numbers), optional
+            Constant during the step, or at its :attr:`times`; by default the values of the scene.
         """
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         p = np.broadcast_to(p, (len(self.times), self.arguments.defaults.size))
@@ -138,7 +144,7 @@ class TimeStep:
         return after if good else np.full(len(state), np.nan)
 
     def told(self, state: Array, arguments: Array | None = None) -> Array:
-        """The results at a state."""
+        """The results (results,) at a state, in their SI units."""
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
         return np.array(self.tell(state, p)).ravel()
 
@@ -162,7 +168,7 @@ def time_step(
     Raises
     ------
     SceneError
-        A scene that cannot be exported, a number or a result that it does not have.
+        The scene or its integrator cannot be exported, or it does not have an argument or result that was asked for.
     """
     simulation = motion_of(scene, settings or Settings())
     method = _method(simulation)
@@ -189,7 +195,7 @@ def time_step(
 
 
 def _method(simulation: Simulation) -> Method:
-    """The method that a scene asks for."""
+    """The integration method that a scene chooses; SceneError for one whose steps are those of a library."""
     made: Any = INTEGRATORS[simulation.name]
     method = getattr(made, "keywords", {}).get("method")
     if method is None:

@@ -1,4 +1,4 @@
-"""Energy, constraints and their derivatives as C: functions, patterns, and the evaluations of the check."""
+"""Energy, constraints and their derivatives as C: functions, patterns, and the cases of the check."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .rendering import Status, Writer, row, rows
 __all__ = ["DerivativesWriter"]
 
 WEIGHT = 0.7
-"""Weight of the energy in the second derivatives of the check."""
+"""Weight of the energy in the Hessians of the check, dimensionless."""
 
 
 class DerivativesWriter(Writer):
-    """Files of a program."""
+    """The files of a nonlinear program."""
 
     header, example, check = "derivatives.h", "derivatives_main.c", "derivatives_check.c"
     loader, readme, bodies = None, "derivatives_README.md", ("derivatives.c",)
@@ -32,22 +32,22 @@ class DerivativesWriter(Writer):
 
     @property
     def functions(self) -> list[ca.Function]:
-        """Energy and constraints, and their derivatives."""
+        """Energy, gradient, constraints, Jacobian and Hessian."""
         return list(self.program.functions.values())
 
     @property
     def statuses(self) -> list[Status]:
-        """A function has none."""
+        """Empty: a function always succeeds."""
         return []
 
     @property
     def states(self) -> int:
-        """Unknowns."""
+        """Number of unknowns."""
         return len(self.program.guess)
 
     @property
     def memory(self) -> int:
-        """Only what functions need."""
+        """0: nothing beside the memory of the functions."""
         return 0
 
     @property
@@ -56,7 +56,7 @@ class DerivativesWriter(Writer):
 
     @property
     def own(self) -> dict[str, object]:
-        """Numbers of entries, and the unit of energy."""
+        """Numbers of entries, the units of length and energy, and words for the README."""
         sizes = self._sizes
         flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
         rows_of = counted(sizes["constraints"], "constraint")
@@ -75,7 +75,7 @@ class DerivativesWriter(Writer):
 
     @property
     def about(self) -> dict[str, Any]:
-        """Functions, units and the names of the constraints."""
+        """Functions, units, names of the constraints, and patterns of the matrices."""
         names = ["energy", "gradient", "constraints", "jacobian", "hessian", "guess", "defaults"]
         scales = {"length": self.model.scales.length, "energy": self.model.scales.moment}
         found: dict[str, Any] = {"functions": names, "units": scales, "constraints": list(self.program.nlp.rows)}
@@ -85,7 +85,7 @@ class DerivativesWriter(Writer):
 
     @property
     def tables(self) -> list[str]:
-        """The guess and the patterns."""
+        """The guess, and the patterns of the matrices."""
         found = [table("sf_guess", self.program.guess)]
         for what, pattern in self.program.patterns.items():
             found.append(table(f"sf_{what}", np.array([*pattern.colind(), *pattern.row()]), "int"))
@@ -93,7 +93,7 @@ class DerivativesWriter(Writer):
 
     @property
     def cases(self) -> dict[str, object]:
-        """The guess, and places near it."""
+        """The functions at the guess and at two points near it, with other arguments and random multipliers."""
         random, program = np.random.default_rng(0), self.program
         base, count = self.arguments.defaults, self._sizes["constraints"]
         arguments, places, multipliers, results = [], [], [], []
@@ -112,7 +112,7 @@ class DerivativesWriter(Writer):
         }
 
     def _evaluated(self, p: Array, x: Array, multipliers: Array) -> Array:
-        """All functions, one after the other."""
+        """The values of all functions, one after the other, (numbers,)."""
         found = []
         for what, function in self.program.functions.items():
             values = function(p, x, WEIGHT, multipliers) if what == "hessian" else function(p, x)

@@ -18,11 +18,11 @@ __all__ = ["EquilibriumWriter"]
 PIVOTS = "with_pivots_as_they_come"
 
 SLOPES = "`{name}_sensitivities` gives the derivatives of all results by all arguments at a solution.\n\n"
-"""What the README says of them."""
+"""Sentence of the README about sensitivities."""
 
 
 class EquilibriumWriter(Writer):
-    """Files of an equilibrium solver, with the derivatives of results by arguments if so wanted."""
+    """The files of an equilibrium solver, optionally with the derivatives of results by arguments."""
 
     header, example, check = "solver.h", "main.c", "check.c"
     loader, readme = "loader.py.in", "README.md"
@@ -34,7 +34,7 @@ class EquilibriumWriter(Writer):
 
     @property
     def functions(self) -> list[ca.Function]:
-        """Those of the program, and what tells the results."""
+        """The functions of the solver and its program, and those that compute the results."""
         solver, program = self.solver, self.arguments.program
         found = [solver.prepare, solver.tell, program.begin, program.hold, program.move, program.at, program.left]
         if self.model.minimisable:
@@ -44,17 +44,17 @@ class EquilibriumWriter(Writer):
 
     @property
     def roots(self) -> set[str]:
-        """Factors are made and used one by one, by functions of CasADi's own."""
+        """All functions, with CasADi's factorisation and solution in place of the one that solves linear systems."""
         return super().roots - {PIVOTS} | {"casadi_ldl", "casadi_ldl_solve"}
 
     @property
     def statuses(self) -> list[Status]:
-        """Those of the method."""
+        """The codes of :class:`~sfetcas.solvers.globalised.Code`."""
         return [(code.name, int(code), MEANINGS[code]) for code in Code]
 
     @property
     def states(self) -> int:
-        """Those of the program."""
+        """Length of a state of the program."""
         return self.arguments.program.states
 
     @property
@@ -70,13 +70,13 @@ class EquilibriumWriter(Writer):
 
     @property
     def memory(self) -> int:
-        """States, residuals, matrices and factors."""
+        """Number of doubles for states, residuals, matrices and factors."""
         given, total, entries, lower = self._sizes.values()
         return 2 * given + 4 * max(1, self.states) + 8 * total + 5 * entries + lower
 
     @property
     def own(self) -> dict[str, object]:
-        """Sizes of the memory, and what is there of derivatives."""
+        """Sizes of the memory, and texts about the model and the sensitivities."""
         names: dict[str, object] = {"name": self.name, "NAME": self.name.upper()}
         flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
         unknowns = counted(self.arguments.expressions.total, "unknown")
@@ -93,13 +93,13 @@ class EquilibriumWriter(Writer):
 
     @property
     def about(self) -> dict[str, Any]:
-        """Functions, and the error for the defaults."""
+        """Functions, and the estimated error for the default arguments."""
         functions = ["solve", "defaults", "message", *(["sensitivities"] if self._sensitivities else [])]
         return {"functions": functions, "error_estimate": self.solver.answer.certificate.error_estimate}
 
     @property
     def _lower(self) -> tuple[ca.Sparsity, list[int]]:
-        """Pattern of the factors without pivots, and the order of the unknowns."""
+        """Pattern of the factor of the matrix without pivoting, and the order of the unknowns in it."""
         found, order = self.arguments.program.sparsity.ldl(True)
         return found, list(order)
 
@@ -109,7 +109,7 @@ class EquilibriumWriter(Writer):
 
     @property
     def tables(self) -> list[str]:
-        """Sizes, rules and patterns."""
+        """Sizes, rules of the method, ranges of arguments, start, and patterns of the matrix."""
         solver, program = self.solver, self.arguments.program
         equations = program.equations
         moments, loads = program.slice_of_moments, program.slice_of_loads
@@ -151,7 +151,7 @@ class EquilibriumWriter(Writer):
 
     @property
     def cases(self) -> dict[str, object]:
-        """The scene, its steps, and neighbours of it."""
+        """Solutions for the default arguments, for up to four steps of the scene, and for changed arguments."""
         solver, base = self.solver, self.arguments.defaults
         names = [name for one in self.arguments.arguments for name in one.names]
         chosen = [base]
@@ -171,6 +171,6 @@ class EquilibriumWriter(Writer):
 
 
 def _pivots() -> ca.Function:
-    """Any function that solves without pivots: the driver makes and uses factors itself, with what this one calls."""
+    """A small function that factorises without pivoting, so that CasADi writes the C code which the driver calls."""
     matrix, b = ca.MX.sym("matrix", 2, 2), ca.MX.sym("b", 2)
     return ca.Function(PIVOTS, [matrix, b], [ca.solve(matrix, b, "ldl")])

@@ -1,4 +1,4 @@
-"""Time steps as C: their function, where the motion begins, and the steps of the check."""
+"""Time steps as C: their functions, the first state of the motion, and the steps of the check."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ DONE = (
         "no step: its length is not positive, or an argument or the state not a finite number",
     ),
 )
-"""How a step may end."""
+"""Result codes of a step: name, number, meaning."""
 
 CHECKED = 10
-"""Steps of the check."""
+"""Number of steps of the check."""
 
 
 class StepWriter(Writer):
-    """Files of a time step."""
+    """The files of a time step."""
 
     header, example, check = "step.h", "step_main.c", "step_check.c"
     loader, readme, bodies = "step_loader.py.in", "step_README.md", ("step.c",)
@@ -41,16 +41,16 @@ class StepWriter(Writer):
 
     @property
     def functions(self) -> list[ca.Function]:
-        """The step, and what tells the results."""
+        """The step, and the results at a state."""
         return [self.step.advance, self.step.tell]
 
     def more(self, values: dict[str, object]) -> dict[str, str]:
-        """What makes a unit of FMI of the step."""
+        """The Python script that makes an FMI unit of the step."""
         named = {**values, "Name": self.name[:1].upper() + self.name[1:]}
         return {f"{self.name}_unit.py": filled(template("unit.py.in"), named)}
 
     def _manifest(self) -> dict[str, Any]:
-        """With other names in the unit for results whose numbers have the names of arguments."""
+        """The manifest, with other names in the FMI unit for results that have the names of arguments."""
         manifest = super()._manifest()
         given = {name for one in self.arguments.arguments for name in one.names}
         for one in manifest["results"]:
@@ -60,17 +60,17 @@ class StepWriter(Writer):
 
     @property
     def statuses(self) -> list[Status]:
-        """Those of a step."""
+        """The result codes of a step."""
         return list(DONE)
 
     @property
     def states(self) -> int:
-        """The motion and the last step."""
+        """Length of a state: the motion and data of the last step."""
         return len(self.step.begin)
 
     @property
     def memory(self) -> int:
-        """The state after a step, its arguments, and what it says."""
+        """Number of doubles for the state after a step, its arguments, and three numbers about its convergence."""
         return max(1, self.states) + self._columns + 3
 
     @property
@@ -79,7 +79,7 @@ class StepWriter(Writer):
 
     @property
     def own(self) -> dict[str, object]:
-        """Stages and spans."""
+        """Method, sizes, usual length of a step, and words about the model."""
         flexible = counted(self.model.mesh.elements, f"{self.model.element.name} element")
         unknowns = counted(self.arguments.expressions.total, "unknown")
         return {
@@ -101,19 +101,19 @@ class StepWriter(Writer):
 
     @property
     def about(self) -> dict[str, Any]:
-        """Functions and method."""
+        """Functions, integration method, and times within a step at which arguments are needed."""
         names = ["step", "step_through", "begin", "refresh", "times", "tell", "defaults", "message"]
         return {"functions": names, "integrator": self.step.method.name, "times": self.step.times.tolist()}
 
     @property
     def tables(self) -> list[str]:
-        """Where the motion begins, and when a step asks for arguments."""
+        """The first state, the times within a step at which arguments are needed, and the limit of convergence."""
         converged = f"#define SF_CONVERGED {LAST_CHANGE!r}\n"
         return [converged, table("sf_begin", self.step.begin), table("sf_times", self.step.times)]
 
     @property
     def cases(self) -> dict[str, object]:
-        """The first steps, with arguments that change a little from stage to stage."""
+        """Results after the first steps, with arguments that change a little within and between steps."""
         step, state = self.step, self.step.begin
         arguments, results = [], []
         for number in range(CHECKED):

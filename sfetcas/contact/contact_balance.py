@@ -1,8 +1,8 @@
-"""A last look at answers in contact: what acts within a stretch has to be something that an obstacle can hold.
+"""Final check of answers in contact: within a stretch no load may act that an obstacle cannot balance.
 
-A stretch that lies on an obstacle has its shape from that.  An obstacle can push against a force that presses a
-member onto it; it cannot pull, and it cannot hold a moment.  Where one acts within a stretch the member would lift
-off around it, and the answer is refused.
+On a stretch the member has the shape of its obstacle.  An obstacle can push against a force that presses a member onto
+it; it can neither pull nor exert a moment.  Where a load would need that the member would lift off around it, and the
+answer is refused.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from .touches import Touched
 __all__ = ["refuse_lost_forces", "refuse_unbalanced"]
 
 SHARE = 1e-5
-"""Forces and moments beside the largest ones that count: contact places leave a thousandth of this."""
+"""Smallest forces and moments that count, share of the largest; errors of contact places are a thousandth of this."""
 
 
 def refuse_unbalanced(fields: Fields) -> None:
-    """Refuse an answer in contact whose obstacles would have to pull or to hold a moment within a stretch.
+    """Refuse an answer in contact with a tensile contact force or a contact moment within a stretch.
 
     Raises
     ------
     SolveError
-        Names the member and the obstacle.
+        There is one; the message names the member and the obstacle.
     """
     for touch in fields.model.mesh.touches:
         if touch.to is None:
@@ -43,12 +43,12 @@ def refuse_unbalanced(fields: Fields) -> None:
 
 
 def refuse_lost_forces(fields: Fields, pushes: Sequence[Any]) -> None:
-    """Refuse an answer whose reactions and contact forces (N) do not carry the loads.
+    """Refuse an answer whose reactions and contact forces ``pushes``, (3,) or (n, 3) N each, do not balance the loads.
 
     Raises
     ------
     SolveError
-        Says what is missing.
+        A force is missing; the message has its components.
     """
     scene = fields.model.scene
     if any(spring.type == "translational" and spring.to is None for spring in scene.springs.values()):

@@ -1,4 +1,4 @@
-"""Stability of what touches obstacles: held on them, and free to slide along them."""
+"""Stability of states in contact: with the places of contact fixed along members, and free to slide."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .settling import Held, Settler, Way
 __all__ = ["ContactStability", "can_switch_branch"]
 
 IDLE = 1e-7
-"""Share of the force on a stretch below which it is without pressure between its ends."""
+"""Largest pressure between the ends of a stretch that counts as none, share of the force on the stretch."""
 
 STRAIGHT = 1e-4
-"""Curvatures, times the length of the scene, below this are those of a straight member on a coarse mesh."""
+"""Curvatures, times the length scale, that count as zero: those of a straight member on a coarse mesh."""
 
 
 def can_switch_branch(held: Held) -> bool:
-    """Whether there is an energy and anything left to move."""
+    """Whether the loads have a potential and the constraints leave an unknown free, so that a state can be left."""
     equations = held.prepared.equations
     return held.prepared.model.minimisable and equations.rows < equations.unknowns
 
@@ -33,7 +33,7 @@ class ContactStability:
         self.settler = settler
 
     def strictly(self, held: Held, way: Way) -> Stability | None:
-        """Stability with sliding places also where these take stability away; None where they take none."""
+        """The stability test with sliding places, with a nan eigenvalue; None if sliding changes nothing."""
         judged = held.prepared.stability(rolling(held))
         freed = self._freed(held, way) if judged.stable in (True, False) else 0
         if not freed:
@@ -42,9 +42,9 @@ class ContactStability:
         return replace(judged, stable=ways_out == 0, negative=ways_out, smallest=np.nan)
 
     def judged(self, held: Held, way: Way) -> Stability:
-        """Stability on what touches with a force, at places that slide.
+        """The stability test of a state; sliding places count only where they make an unstable state stable.
 
-        A stretch without pressure may leave its obstacle between its ends: only these hold it.
+        A stretch without pressure may leave its obstacle between its ends: only these are constrained.
         """
         held = self.pressing(held, way)
         stability = held.prepared.stability(rolling(held))
@@ -54,7 +54,7 @@ class ContactStability:
         return stability
 
     def pressing(self, held: Held, way: Way) -> Held:
-        """The state with the ends of stretches without pressure in their place; itself where there is none."""
+        """The state with stretches without pressure replaced by their ends; the same one if there are none."""
         touches: list[Touch] = []
         for touch in held.mesh.touches:
             if touch.to is None:
@@ -74,7 +74,7 @@ class ContactStability:
         return self.settler.solved(replace(held.mesh, touches=tuple(touches)), source, way) or held
 
     def _freed(self, held: Held, way: Way) -> int:
-        """How many more ways out there are when places of contact may slide along their members.
+        """Number of further negative eigenvalues when places of contact may slide along their members.
 
         With f the force and g the gap, the Lagrangian ``Pi - f g(x, s)`` has the places s among its unknowns;
         its inertia counted with s eliminated last and first gives the two numbers of ways out.

@@ -31,10 +31,10 @@ from .touching import Toucher
 __all__ = ["ContactRun", "Pressed"]
 
 STAYS = "unstable, and no stable equilibrium was found along its unstable mode"
-"""A note."""
+"""Note of an unstable answer."""
 
 LEFT = "left an unstable equilibrium in contact along its unstable mode"
-"""Another."""
+"""Note of an answer that was reached from an unstable equilibrium."""
 
 ELSEWHERE = (
     "the loads growing from zero could not be followed in contact all the way: this is a state in contact that "
@@ -43,12 +43,12 @@ ELSEWHERE = (
 """A note of answers that were found in another way."""
 
 LEVELS, MOST_ELEMENTS = 40, 20_000
-"""Most refinements of a mesh, and most elements."""
+"""Largest numbers of refinements of a mesh, and of elements."""
 
 
 @dataclass(frozen=True)
 class Pressed:
-    """An answer: the state, its stability with sliding places, the estimate of its error and what to say of it."""
+    """An answer: the state, its stability, the estimated error over the size of the scene, and notes for the user."""
 
     held: Held
     stability: Stability
@@ -57,7 +57,7 @@ class Pressed:
 
 
 class ContactRun:
-    """Contact over the load factors of a scene.
+    """States in contact at the load factors of a scene.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ class ContactRun:
     fixed : set of str
         Members whose mesh is prescribed.
     judge : callable, optional
-        Two states, the second on half the element lengths, and the factor -> how far they are apart, and the estimated
-        error of the second; of the positions where it is left out.
+        (state, state on half the element lengths, factor) -> their difference, and the estimated error of the second;
+        by default of the positions, over the size of the scene.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class ContactRun:
     # -- ways -----------------------------------------------------------------------------------
 
     def continued(self, base: Mesh, factor: float) -> Held | None:
-        """From the contact of the last factor, where that lies on the way from zero."""
+        """The state followed from that of the last factor, if that has contact and lies between zero and this one."""
         self.jumps = []
         if self.last is None or self.last[0] * (factor - self.last[0]) < 0.0 or not self.last[1].mesh.touches:
             return None
@@ -103,7 +103,7 @@ class ContactRun:
         return self._through(base, begin, factor, start)
 
     def grown(self, base: Mesh, factor: float) -> Held | None:
-        """From the undeformed scene, loads and motions growing together."""
+        """The state followed from the undeformed scene, loads and motions growing together; None if it is lost."""
         start: Held | tuple[Touch, ...] = self.first_touches
         if self.scene.histories and factor != 0.0:
             held = self.toucher.follow(base, lambda t: Way(lambda model: model.loading(0.0, t), {}), start)
@@ -132,12 +132,12 @@ class ContactRun:
 
     @property
     def jumped(self) -> tuple[str, ...]:
-        """What is to be said of the last way, and of states that it left."""
+        """Notes about the last way, and the factors at which it jumped to another state."""
         told = (self.elsewhere,) if self.elsewhere else ()
         return told + tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
 
     def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
-        """From the state without obstacles, these coming back from where they do not reach it."""
+        """The state followed from ``free``, without obstacles, as they move from outside of it to their places."""
         gaps = free.touched.inside({}, self.reviser.sides, 0.0)
         depths: dict[str, float] = {}
         for gap in gaps:
@@ -149,7 +149,7 @@ class ContactRun:
         return self.toucher.follow(base, way, free)
 
     def cushioned(self, base: Mesh, factor: float) -> Held | None:
-        """From the state that the loads lead to where obstacles are cushions."""
+        """The state near that of penalty contact (:mod:`~sfetcas.contact.cushions`); None if either is not found."""
         found = self.cushions.found(base, self._factors(0.0, factor))
         if found is None:
             return None
@@ -158,7 +158,7 @@ class ContactRun:
 
     @functools.cached_property
     def first_touches(self) -> tuple[Touch, ...]:
-        """What touches in the undeformed scene."""
+        """The touches in the undeformed scene."""
         found: list[Touch] = []
         for contact, stop in self.cushions.obstacles.items():
             for member in members_of(self.scene.contacts[contact], self.scene.members):
@@ -192,11 +192,11 @@ class ContactRun:
             yield Touch(contact, member, low, high)
 
     def at(self, factor: float) -> Way:
-        """The point of the way that a factor is."""
+        """The loads at a factor as a point of a way."""
         return Way(lambda model: model.loading(factor), {})
 
     def unstopped(self, prepared: Prepared) -> Callable[[State, Loading, State, Loading], bool]:
-        """Whether a step without obstacles stays clear of all of them on its way."""
+        """The check whether a step (state, loading, state, loading) computed without obstacles meets none of them."""
 
         def held(state: State, loading: Loading) -> Held:
             touched, point = Touched(prepared.equations, state, loading), prepared.equations.at(state, loading)
@@ -217,10 +217,10 @@ class ContactRun:
     def reached(
         self, base: Mesh, factor: float, free: Held | None, *, falls: bool
     ) -> Iterator[tuple[str, Held | None]]:
-        """States in contact by names of ways, tried one after the other: that of the growing loads is the answer.
+        """States in contact (None for failure) by the name of the way to them, preferred ones first.
 
-        Near the state without obstacles, ``free``, where a start place chooses it.  What ``falls`` onto obstacles, as
-        nothing else holds it, has no state under small loads to grow from.
+        Usually that of growing loads; near the state without obstacles, ``free``, where start places choose it.  A
+        structure that ``falls`` onto obstacles, as nothing else supports it, has no state under small loads.
         """
         ways: list[tuple[str, Callable[[], Held | None]]] = [("in contact", lambda: self.continued(base, factor))]
         if free is not None:
@@ -233,12 +233,12 @@ class ContactRun:
             yield name, way()
 
     def refuse_held_inside(self, pilot: Prepared, factor: float) -> None:
-        """Refuse a node that a support or a motion holds inside an obstacle, which the data alone tell.
+        """Refuse a node that a support or a motion fixes inside an obstacle at a factor.
 
         Raises
         ------
         SolveError
-            Naming the node and the obstacle.
+            There is one; the message names it and the obstacle.
         """
         model = pilot.model
         stops, axes = obstacles_of(model), model.element.axes
@@ -258,12 +258,12 @@ class ContactRun:
                     raise SolveError(Status.INFEASIBLE, detail)
 
     def refuse_unsupported(self, pilot: Prepared) -> None:
-        """Say why there can be no state where nothing holds a direction.
+        """Refuse a scene that neither supports nor plane obstacles hold in some direction.
 
         Raises
         ------
         SolveError
-            Naming the direction.
+            There is one; the message names the direction.
         """
         stops, axes = obstacles_of(pilot.model), pilot.model.element.axes
         free = np.array(pilot.diagnosis.drifts).reshape(-1, axes)
@@ -277,18 +277,18 @@ class ContactRun:
             raise SolveError(Status.FAILED, detail)
 
     def named(self, failure: SolveError | None) -> list[str]:
-        """What may be in the way, for a sentence."""
+        """Obstacles, and the failure if any, as the list of causes in a message."""
         return [*(f"contacts.{name}" for name in self.scene.contacts), *([str(failure)] if failure else [])]
 
     # -- accuracy -------------------------------------------------------------------------------
 
     def answered(self, held: Held, factor: float, target: Mesh, notes: tuple[str, ...]) -> Pressed:
-        """The state on a mesh that is fine enough, with its stability.
+        """The state on a mesh that is fine enough for the accuracy, with its stability and notes.
 
         Raises
         ------
         SolveError
-            What touches on a coarse mesh is not found again on a fine one.
+            The touches of the coarse mesh are not found on a finer one.
         """
         way = self.at(factor)
         held, left = self._settled(held, way)
@@ -339,7 +339,7 @@ class ContactRun:
         return {n: rough[model.elements_of(n)] & (n not in self.fixed) for n in model.members}
 
     def _onto(self, mesh: Mesh, held: Held, way: Way, *, anew: bool = False) -> Held:
-        """The same contact on another mesh; ``anew`` with what touches looked at again."""
+        """The state on another mesh with the same touches, or with ``anew`` touches that are determined again."""
         if not anew:
             found = self.settler.settle(mesh, (held.prepared.model, held.corrected.state), way)
             if isinstance(found, Held):
@@ -366,7 +366,7 @@ class ContactRun:
         return stability, notes
 
     def certified(self, held: Held, factor: float) -> tuple[Stability, tuple[str, ...]]:
-        """Stability of a state on its mesh with sliding places, also where these take stability away, and notes."""
+        """Stability of a state on its mesh, with sliding places counted in both directions, and notes."""
         way = self.at(factor)
         stability, notes = self._stability(held, way)
         return self.stability.strictly(held, way) or stability, tuple(notes)

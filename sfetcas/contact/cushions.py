@@ -1,9 +1,9 @@
-"""Obstacles as cushions: a first state in contact, wherever members touch, from which the touches are read.
+"""Penalty contact: a first state in contact, from which the touches are read.
 
-Cushions stand at many places of the members and push softly, so that the loads can be followed from zero as without
-obstacles: nothing begins or ends to touch, forces come and go smoothly.  They are then made thin and stiff, and where
-they push says which places touch and which stretches lie on what.  That state is no answer, it is the start for the
-equilibrium in which obstacles are what they are (see :mod:`~sfetcas.contact.touching`).
+Penalty forces (*cushions*) at many places of the members grow smoothly as the gap closes, so that the loads can be
+followed from zero as without obstacles.  The cushions are then made thin and stiff; the places where they push become
+touches and stretches.  That state is no answer but the start for the equilibrium with inequality constraints (see
+:mod:`~sfetcas.contact.touching`).
 """
 
 from __future__ import annotations
@@ -30,63 +30,69 @@ from .touches import Touched
 __all__ = ["Cushioned", "Cushions"]
 
 PLACES, LEAST, MOST = 48, 12, 64
-"""Elements along the longest member, and fewest and most along a member: a cushion stands at each of their ends."""
+"""Numbers of elements: along the longest member, fewest and most along any; a cushion stands at each of their ends."""
 
 FINENESS = 0.25
-"""Cushions stand nearer to each other than this share of an obstacle's radius."""
+"""Largest distance of cushions, share of the radius of an obstacle."""
 
 ORDER = 3
 """Order of the elements."""
 
 THICKEST, THINNEST = 3e-3, 3e-7
-"""Thickness of the cushions over the size of the scene, at first and in the end."""
+"""First and last thickness of the cushions, share of the size of the scene."""
 
 SHRINK, LEAST_SHRINK = 0.1, 0.8
-"""How cushions are made thinner from stage to stage, and the shrinkage at which that is given up."""
+"""Ratio of the thickness from stage to stage, and the ratio at which making cushions thinner is given up."""
 
 PUSHED = 1e-3
-"""Share of the largest force of a cushion from which a place counts as touching."""
+"""Force of a cushion from which its place counts as touching, share of the largest."""
 
 NEARLY = 0.9
-"""Share of a push that counts as all of it."""
+"""Share of the force on a run of places from which the force on its end node counts as all of it."""
 
 UNPRESSED = 1e-6
-"""Share of the largest push that stands for none where a member lies without pressure."""
+"""Force assigned to places that lie on a round obstacle without pressure, share of the largest."""
 
 NEARBY = 0.5
-"""Largest turn, rad, to what counts as the same state on thinner cushions."""
+"""Largest rotation, rad, between states on thicker and thinner cushions that count as the same."""
 
 REACH = 30.0
-"""Gaps over the thickness from which a cushion hardly reaches a place."""
+"""Gap over the thickness of a cushion from which its force is negligible."""
 
 FALLS, FALL = 60, (4, 0.1)
-"""What falls turns no node by more than 0.1 rad a step; every four steps it is asked whether it passed something."""
+"""Largest number of rounds of a fall; steps of each, after which passing of obstacles is checked, and their rad."""
 
 FAR = 1e3
-"""Sizes of the scene: what has fallen further falls past everything."""
+"""Displacement, in lengths of the scene, beyond which a structure has fallen past all obstacles."""
 
 BEGIN = 0.01
-"""Share of the loads under which a mechanism, which has no place of its own without loads, is looked for at first."""
+"""Share of the loads under which the first state of a mechanism is computed, which has none without loads."""
 
 
 @dataclass(frozen=True)
 class Cushioned:
-    """A state on cushions: held as one without touches, and what touches in it."""
+    """A state of penalty contact, without touches, and the touches that are read from it."""
 
     held: Held
     touches: tuple[Touch, ...]
 
 
 class Cushions:
-    """Cushions for the obstacles of one scene.
+    """Penalty contact for the obstacles of one scene.
 
     Parameters
     ----------
     scene : Scene
     prepare : callable
         Mesh -> Prepared.
-    sides : mapping
-        Of each edge and member where it is allowed, see :func:`~sfetcas.contact.touches.edge_sides`.
+    sides : mapping of (contact, member) to float
+        The allowed side of each edge, see :func:`~sfetcas.contact.touches.edge_sides`.
+
+    Attributes
+    ----------
+    obstacles : mapping of str to Obstacle
+    left : list of float
+        Factors at which the last search left an unstable state.
     """
 
     def __init__(
@@ -101,10 +107,7 @@ class Cushions:
     # -- the state ------------------------------------------------------------------------------
 
     def found(self, base: Mesh, factors: Sequence[float]) -> Cushioned | None:
-        """The state that the loads lead to through these factors, and what touches in it.
-
-        ``left``, an attribute, is then the factors at which an unstable state was left on the way.
-        """
+        """The state of penalty contact followed through load factors, and its touches; None if it is lost."""
         self.left = []
         mesh, loading = self._divided(base), lambda model: model.loading(factors[-1])
         # What is free to move without obstacles; cushions themselves count as springs.

@@ -1,8 +1,8 @@
 """Whether members may have passed an obstacle between two states, though neither of them is inside it.
 
-From one state to the next a place of a member does not move further from the chord between its two positions than an
-arc of its length that turns as much as the members do.  Where that tube stays out of an obstacle nothing was passed;
-where it does not, the step is too long to tell, and a shorter one has a thinner tube.
+The path of a place from one state to the next lies in a tube about the chord between its positions, as thick as an arc
+over the chord that turns as much as the members do.  Where the tube stays out of an obstacle nothing was passed;
+otherwise the step is too long to decide, and a shorter one has a thinner tube.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from .touches import Touched
 __all__ = ["STRIDE", "Course", "Passing"]
 
 FINENESS, LEAST, MOST = 0.25, 64, 400
-"""Places along a member stand nearer than this share of the smallest radius; fewest and most intervals of a member."""
+"""Largest distance of the places examined, share of the smallest radius; fewest and most intervals of a member."""
 
 STRIDE = 0.5
-"""Largest angle, rad, that a place turns in a step."""
+"""Largest rotation of a place in a step, rad."""
 
 DEVIATION = 0.2
 """How far a path of given length deviates from its chord over length times turn: 1/8 for an arc, 1/4 for a corner."""
@@ -36,24 +36,27 @@ PASSED = 1e-3
 is pushed out again to where it came from."""
 
 BEHIND = 1e-3
-"""Share of the size of the scene by which an edge that is left counts as farther away; what is deeper is inside."""
+"""Distance, share of the size of the scene, by which an edge is moved back for a member that leaves it."""
 
 ALONG = 0.25
-"""The same share of a radius for a member that touches the obstacle before and after: it slides along it."""
+"""Depth of a tube, share of the radius, allowed for a member that touches before and after, as it slides along."""
 
 FLAT = 0.02
-"""The same share of the size of the scene for planes, which nothing passes: only what touches first may change."""
+"""Depth of a tube in a plane or hollow obstacle, share of the size of the scene; nothing passes these.
+
+The limit keeps the order in which places begin to touch.
+"""
 
 
 @dataclass(frozen=True)
 class Course:
-    """Places (n, 3), m, and tangents (n, 3) of each member at fixed fractions of their lengths."""
+    """Positions (n, 3), m, and tangents (n, 3) of each member of a state at fixed fractions of the length."""
 
     positions: Mapping[str, Array]
     tangents: Mapping[str, Array]
 
     def turned(self, other: Course) -> float:
-        """Largest angle between tangents of the same place, rad."""
+        """Largest angle between the tangents of the same place in two states, rad."""
         cosines = [
             np.einsum("ni,ni->n", self.tangents[name], other.tangents[name]).min(initial=1.0) for name in self.tangents
         ]
@@ -61,13 +64,12 @@ class Course:
 
 
 class Passing:
-    """Steps of one scene between its obstacles.
+    """The check of steps for the obstacles of one scene.
 
     Parameters
     ----------
     scene : Scene
-    obstacles : mapping
-        By name.
+    obstacles : mapping of str to Obstacle
     """
 
     def __init__(self, scene: Scene, obstacles: Mapping[str, Obstacle]) -> None:
@@ -82,7 +84,7 @@ class Passing:
         self.fractions = {m: np.linspace(0.0, 1.0, int(np.clip(n, LEAST, MOST)) + 1) for m, n in counts.items()}
 
     def course(self, touched: Touched) -> Course:
-        """Where the members of a state are."""
+        """Positions and tangents of the members of a state."""
         known = self._courses.get(touched)
         if known is None:
             fields = touched.fields
@@ -93,7 +95,7 @@ class Passing:
         return known
 
     def departed(self, first: Held, before: Held, after: Held, share: float) -> float:
-        """Largest angle, rad, by which tangents depart from where they would go on to.
+        """Largest angle, rad, between the tangents of a state and their linear extrapolation from two earlier ones.
 
         The step from ``before`` to ``after`` is ``share`` times that from ``first`` to ``before``.
         """
@@ -103,11 +105,14 @@ class Passing:
         return Course({}, unit).turned(Course({}, there))
 
     def turned(self, before: Held, after: Held) -> float:
-        """Largest angle between tangents of the same place in two states, rad."""
+        """Largest angle between the tangents of the same place in two states, rad."""
         return self.course(before.touched).turned(self.course(after.touched))
 
     def possible(self, before: Held, after: Held, offsets: Mapping[str, float], stride: float = STRIDE) -> bool:
-        """Whether something may have been passed between two states, or they are more than a ``stride`` (rad) apart."""
+        """Whether an obstacle may have been passed between two states, or they are more than ``stride``, rad, apart.
+
+        ``offsets`` are the distances, m, by which obstacles are moved back.
+        """
         one, other = self.course(before.touched), self.course(after.touched)
         if self._over(before, after, one, other):
             return True
@@ -119,7 +124,7 @@ class Passing:
         )
 
     def over(self, before: Held | None, after: Held) -> bool:
-        """Whether a step, from the undeformed scene with None, surely leads over an obstacle, or across an edge."""
+        """Whether a step certainly leads across an obstacle or an edge; it begins at the undeformed scene for None."""
         return self._over(before, after, self._undeformed if before is None else self.course(before.touched))
 
     def _over(self, before: Held | None, after: Held, here: Course, there: Course | None = None) -> bool:

@@ -1,4 +1,4 @@
-"""Which touches to try next: what is wrong about a state in contact, and what becomes of its touches."""
+"""Active-set update: the touches to try next, from the violated conditions of a state in contact."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ __all__ = ["Reviser", "Tried"]
 Touches = tuple[Touch, ...]
 
 FLAT = 1e-7
-"""Curvature of a gap (times the length of the scene) below minus this gets inside: rounding of moments is less."""
+"""Size of a negative curvature of the gap, times the length scale, from which a member penetrates beside a place."""
 
 
 ROUNDED = 1e-14
-"""Gaps above this share of the size of the scene are more than rounding."""
+"""Gap that rounding may leave, share of the size of the scene."""
 
 LOADS = 1e-6
-"""Share of the largest force or moment from which a load may open a stretch."""
+"""Load from which a stretch may open, share of the largest force or moment."""
 
 CORNER = 1e-4
-"""Slope from which a member leaves an obstacle at its end whatever its curvature there: less is being tangential."""
+"""Slope, rad, from which a member leaves an obstacle at its end, whatever its curvature; below it is tangential."""
 
 
 @dataclass
 class Tried:
-    """What came to nothing while touches were looked for at one point of the way.
+    """Changes of touches that failed at one point of the way, so that they are not tried again.
 
     Attributes
     ----------
     crossed : set of str
-        Nodes to which places ran along their members.
+        Nodes that places of contact reached along their members.
     collapsed : set of (str, str)
-        Contact and member of stretches whose ends met.
+        Contact and member of stretches whose length became zero.
     """
 
     crossed: set[str] = field(default_factory=set)
@@ -59,19 +59,23 @@ class Reviser:
     ----------
     scene : Scene
     limit : float
-        How deep a place may be inside an obstacle, over the size of the scene.  ``noise``, an attribute, is the same
-        beside places where a member leaves it.
-    sides : mapping
-        Of each edge and member where it is allowed, see :func:`~sfetcas.contact.touches.edge_sides`.
+        Largest penetration that is accepted, over the size of the scene.
+    sides : mapping of (contact, member) to float
+        The allowed side of each edge, see :func:`~sfetcas.contact.touches.edge_sides`.
+
+    Attributes
+    ----------
+    noise : float
+        Largest penetration accepted beside places where a member leaves an obstacle, over the size of the scene.
     """
 
     def __init__(self, scene: Scene, limit: float, sides: Mapping[tuple[str, str], float]) -> None:
         self.scene, self.limit, self.noise, self.sides = scene, limit, NOISE, sides
 
     def ended(self, ran: Ran, tried: Tried) -> Touches:
-        """What becomes of a touch one of whose places ran to the end of its member or met the other one.
+        """The touches after a place reached the end of its member or the other place of its stretch.
 
-        It goes on along the next member; at a node that was crossed before it stays.  What was ``tried`` is added to.
+        It continues on the next member; at a node that was crossed before it stays.  ``tried`` is updated.
         """
         touches, i, k = ran.touches, ran.touch, ran.place
         touch, rest = touches[i], touches[:i] + touches[i + 1 :]
@@ -110,7 +114,7 @@ class Reviser:
         return self.numbered((*rest, joined))
 
     def lying_to_the_end(self, ran: Ran) -> Touches | None:
-        """A place that ran to an end where the end alone was wrong before: what is between them lies flat."""
+        """The touches with a stretch from a place to the end that it reached; None if there cannot be one."""
         if ran.met is not None:
             return None
         touches, i = ran.touches, ran.touch
@@ -123,12 +127,12 @@ class Reviser:
         return self.numbered((*touches[:i], replace(touch, at=low, to=high), *touches[i + 1 :])) if low < high else None
 
     def check(self, touches: Touches) -> None:
-        """Refuse what cannot be modelled.
+        """Refuse touches that cannot be modelled.
 
         Raises
         ------
         SolveError
-            A stretch on a round obstacle in space.
+            There is a stretch on a round obstacle in space.
         """
         space = self.scene.resolved_dimension == "space"
         for touch in touches:
@@ -138,12 +142,12 @@ class Reviser:
                 raise SolveError(Status.FAILED, detail)
 
     def takes_part(self, contact: str, node: str) -> bool:
-        """Whether an obstacle can push a node."""
+        """Whether an obstacle can exert a force on a node: supports and motions leave it free to move."""
         stop = obstacle(self.scene.contacts[contact], self.scene.resolved_dimension == "space")
         return takes_part(node, self.scene.nodes[node], self.scene.motions.values(), stop)
 
     def released(self, model: Model, loading: Loading, touches: Touches, way: Way) -> Touches:
-        """Stretches that reach a held end which is lifted off the obstacle end before it."""
+        """The touches with stretches shortened that reach a fixed end which is off the obstacle."""
         if not any(touch.to is not None and {0.0, 1.0} & {*touch.places} for touch in touches):
             return touches
         shift = loading.shift.reshape(-1, model.element.axes) * model.scales.length
@@ -163,7 +167,7 @@ class Reviser:
         return tuple(found)
 
     def wrong(self, held: Held, way: Way, tried: Tried | None = None) -> Touches | None:
-        """What has to touch otherwise at this state, after what was ``tried``; None where all is right."""
+        """The touches to try instead of those of this state, given the failures so far; None if no condition fails."""
         tried = tried or Tried()
         touched, touches = held.touched, held.mesh.touches
         smallest = tolerances.BALANCED * held.prepared.model.scales.force
@@ -400,7 +404,7 @@ class Reviser:
         return float(np.sign(stop.curvature(point, tangent))) or 1.0
 
     def numbered(self, touches: Touches) -> Touches:
-        """Touches of the same two told apart by numbers, in the order of their places; each place and node once."""
+        """The touches sorted, each place and node once, those of one member and obstacle numbered along the member."""
         count: dict[tuple[str, str], int] = {}
         found: list[Touch] = []
         lying: list[tuple[str, str, float | None]] = [

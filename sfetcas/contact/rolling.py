@@ -1,10 +1,10 @@
-"""What rolls over a plane: the share of rolling in the second variation.
+"""Rolling on a plane: its share in the second variation of the energy.
 
-A contact force is put where a member touches, and when it rolls that place moves.  Let a member touch a plane with the
-force f and with the curvature kappa away from it.  Turned there by a small angle a it would reach into the plane beside
-the place by ``a**2 / (2 kappa)``: the place has to rise by this much against the force, so that rolling adds
+The contact force acts where a member touches, and as it rolls that place moves.  Let a member touch a plane with the
+force f and with the curvature kappa away from it.  Rotated by a small angle a it would enter the plane beside the place
+by ``a**2 / (2 kappa)``: the place has to rise by this much against the force, so that rolling adds
 ``f a**2 / (2 kappa)`` to the energy, as a rotational spring of stiffness ``f / kappa`` would.  At a node through which
-two members go on smoothly the larger of two curvatures counts.
+two members continue smoothly the larger of two curvatures counts.
 
 Source: elimination of the place s from the Lagrangian ``Pi - f g(x, s)``.
 """
@@ -27,7 +27,7 @@ __all__ = ["rolling"]
 
 
 def rolling(held: Held) -> Corrected:
-    """The state with the stiffness against rolling among the entries, for tests of stability."""
+    """The state with the stiffness of rolling added to the entries of the Newton matrix, for tests of stability."""
     corrected, equations = held.corrected, held.prepared.equations
     entries = corrected.point.entries.copy()
     for turn, axis, stiffness in _rolled(held):

@@ -1,7 +1,7 @@
-"""Equilibria with given touches, and the places of contact that follow from their conditions.
+"""Equilibria with given touches, and the places of contact along members from their conditions.
 
-Each place is held while the equilibrium is solved; the places then follow by Newton's method on their conditions,
-with differences once and Broyden's updates.  The mesh moves with them.
+Places are fixed while the equilibrium is solved; they follow in an outer Newton iteration on their conditions, with a
+Jacobian by differences and Broyden's updates.  The mesh moves with them.
 """
 
 from __future__ import annotations
@@ -40,42 +40,52 @@ __all__ = [
 ]
 
 MAKES_WAY = 0.35
-"""Cuts nearer to a place of contact than this share of their element make way for it."""
+"""Distance from a place of contact within which element borders are removed, share of the element."""
 
 ONE_PLACE = 1e-7
-"""Places nearer to each other, or to the end of a member, are the same: fractions of the length."""
+"""Distance of places from each other, or from the end of a member, that counts as none, fraction of the length."""
 
 CLOSE = 1e-4
-"""Fractions of the length beside an end of a member in which a double root is lost in rounding."""
+"""Distance from an end of a member within which rounding hides a double root, fraction of the length."""
 
 TOGETHER = 1e-3
-"""The same before another touch, or before an end that a stretch comes to reach: moments there fall as the square."""
+"""Value of :data:`CLOSE` before another touch, or for the end of a stretch: moments there fall with the square."""
 
 SETTLED = 1e-11
-"""Steps of places shorter than this have arrived: fractions of the length."""
+"""Step of places at which their iteration has converged, fraction of the length."""
 
 OPEN = 1e-9
-"""Share of the largest singular value below which conditions leave places open: differences leave 1e-10 of it."""
+"""Singular values of the conditions that count as zero, share of the largest; differences leave 1e-10 of it."""
 
 MISSED = 1e-6
-"""Conditions of places, dimensionless, that are larger than this do not hold."""
+"""Largest value of a condition, dimensionless, that counts as fulfilled once steps are short."""
 
 MOST_STEPS = 40
-"""Steps of places before giving up."""
+"""Largest number of steps of places."""
 
 PATIENCE = 8
-"""Steps in a row in which a place may want beyond its room, before it counts as having got there."""
+"""Successive steps near an end or another touch after which a place counts as having reached it."""
 
 ARRIVING = 0.01
-"""A step that is so much shorter than the one before leads to a root within its member, however near to an end."""
+"""Ratio of a step to the one before from which on it converges to a root within the member, however near to an end."""
 
 MOST_TURN = 0.8
-"""A step along the way is too long when its corrections turn a node by more, rad."""
+"""Largest rotation of a node, rad, in a correction; with a larger one the step along the way is too long."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """An equilibrium in contact; ``slopes`` is the derivative of the conditions by the places."""
+    """An equilibrium in contact.
+
+    Attributes
+    ----------
+    prepared : Prepared
+    corrected : Corrected
+    loading : Loading
+    touched : Touched
+    slopes : ndarray (places, places), optional
+        Derivative of the conditions by the free places, dimensionless.
+    """
 
     prepared: Prepared
     corrected: Corrected
@@ -91,7 +101,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Way:
-    """A point of a way: the loading of a model there, and how far obstacles have stepped back, m.
+    """A point of a way: the loading of a model there, and the distances, m, by which obstacles are moved back.
 
     With ``drag`` rotations since the state ``since`` are resisted, see :mod:`~sfetcas.solvers.pseudo_transient`.
     """
@@ -104,9 +114,17 @@ class Way:
 
 @dataclass(frozen=True)
 class Ran:
-    """A place (0 or 1) of a touch that ran to the end of its member, or into the other place of its stretch.
+    """A place of contact that reached an end of its member, the other place of its stretch, or another touch.
 
-    Or into the touch of number ``met`` on the same obstacle.
+    Attributes
+    ----------
+    touches : tuple of Touch
+    touch, place : int
+        Number of the touch, and of its place: 0 or 1.
+    collapsed : bool
+        Whether it reached the other place of its stretch.
+    met : int, optional
+        Number of the touch of the same obstacle that it reached.
     """
 
     touches: tuple[Touch, ...]
@@ -117,7 +135,7 @@ class Ran:
 
 
 def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
-    """A mesh with an element border at each place of contact; cuts that are too near make way."""
+    """The mesh with an element border at each place of contact; borders too near to one are removed."""
     cuts = dict(base.cuts)
     for name in {touch.member for touch in touches}:
         places = sorted({x for touch in touches if touch.member == name for x in touch.places if 0.0 < x < 1.0})
@@ -133,17 +151,17 @@ def placed(scene: Scene, base: Mesh, touches: tuple[Touch, ...]) -> Mesh:
 
 
 def free_places(touches: tuple[Touch, ...]) -> list[tuple[int, int]]:
-    """(touch, 0 or 1 for the begin or end) of each place within a member."""
+    """Numbers (touch, 0 or 1 for its begin or end) of the places within members, which may slide."""
     return [(i, k) for i, touch in enumerate(touches) for k, x in enumerate(touch.places) if 0.0 < x < 1.0]
 
 
 def moved(touch: Touch, k: int, x: float) -> Touch:
-    """The touch with its begin (0) or end (1) at another place."""
+    """The touch with its begin (k = 0) or end (1) at another fraction of the length."""
     return replace(touch, at=x) if k == 0 else replace(touch, to=x)
 
 
 def stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | None:
-    """The mesh with its places of contact moved and the cuts between them in proportion; None where they cross."""
+    """The mesh with its places of contact moved and the borders between them in proportion; None if they cross."""
     cuts = dict(mesh.cuts)
     for name in {touch.member for touch in touches}:
         pairs = {x: x for x in breaks_of(scene, name)}
@@ -159,7 +177,7 @@ def stretched(scene: Scene, mesh: Mesh, touches: tuple[Touch, ...]) -> Mesh | No
 
 
 def balanced(equations: Equations, state: State, loading: Loading) -> State:
-    """The state with the multipliers that leave the least out of balance."""
+    """The state with the multipliers of least residual, by least squares; unchanged in large models."""
     n = equations.unknowns
     if not equations.rows or equations.rows * n > 4_000_000:
         return state
@@ -172,7 +190,7 @@ def balanced(equations: Equations, state: State, loading: Loading) -> State:
 
 
 def _carried(source: tuple[Model, State], loading: Loading, model: Model, state: State) -> State:
-    """The state with nodes where they were: of a body without support another node may lead its places now."""
+    """The state with nodes in their former positions also where other displacements are unknowns than before."""
     retained, known = model.positions.retained[: len(model.nodes)], set(source[0].positions.unknowns)
     new = [
         i for i in np.flatnonzero((retained >= 0).all(axis=1)) if model.positions.unknowns[retained[i, 0]] not in known
@@ -188,7 +206,7 @@ def _carried(source: tuple[Model, State], loading: Loading, model: Model, state:
 
 
 def closed(equations: Equations, state: State, loading: Loading, known: Collection[str]) -> State:
-    """The state with the displacements of places that are not known by name where the members lead."""
+    """The state with the displacements of new unknowns chosen such that the closings are met best."""
     n, positions = equations.unknowns, equations.model.positions
     rows, new = len(positions.rows), [i for i, name in enumerate(positions.unknowns) if name not in known]
     if not rows or not new or rows * len(new) > 4_000_000:
@@ -202,7 +220,7 @@ def closed(equations: Equations, state: State, loading: Loading, known: Collecti
 def carried_over(
     scene: Scene, source: tuple[Model, State], before: Loading, prepared: Prepared, loading: Loading
 ) -> State:
-    """A state of one model as the start on another: nodes where they were, closings met, multipliers in balance."""
+    """A state of one model as the start on another mesh: same positions of nodes, closings met, least residual."""
     state = _carried(source, before, prepared.model, transferred(source[0], source[1], prepared.model))
     known = {*source[0].positions.unknowns, *(f"{node}.{axis}" for node in scene.nodes for axis in "xyz")}
     state = closed(prepared.equations, prepared.equations.holding(state, loading), loading, known)
@@ -221,9 +239,9 @@ class Settler:
     Attributes
     ----------
     solves : int
-        Equilibria with places held that were solved so far.
+        Number of equilibria with fixed places that were solved so far.
     limit : float
-        Number of them after which settling gives up.
+        Number of them at which :meth:`settle` gives up.
     """
 
     def __init__(self, scene: Scene, prepare: Callable[[Mesh], Prepared]) -> None:
@@ -231,7 +249,10 @@ class Settler:
         self.solves, self.limit = 0, np.inf
 
     def solved(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way, *, same: bool = False) -> Held | None:
-        """The equilibrium with places held; None where Newton's method does not get there."""
+        """The equilibrium with the places of contact fixed; None if Newton's method does not converge.
+
+        It starts from ``source``, a model and its state, carried over unless the mesh is the ``same``.
+        """
         if _meet(mesh):
             return None
         touches = tuple(replace(t, offset=way.offsets.get(t.contact, 0.0)) for t in mesh.touches)
@@ -253,7 +274,7 @@ class Settler:
         return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
 
     def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | Ran | None:
-        """The equilibrium with the places of contact where their conditions hold."""
+        """The equilibrium with fulfilled conditions, or the place that reached an end or a touch; None for neither."""
         held = self.solved(mesh, source, way)
         if held is None:
             return None
@@ -326,7 +347,10 @@ class Settler:
         return x if not len(near) else float(near[0] + np.copysign(2.0 * ONE_PLACE, touch.places[k] - near[0]))
 
     def slopes(self, held: Held, way: Way) -> Array | None:
-        """Derivative of the conditions by the places, by differences."""
+        """Derivative (places, places) of the conditions by the free places, dimensionless, by differences.
+
+        None if an equilibrium beside the state is not found.
+        """
         free, here = free_places(held.mesh.touches), held.touched.conditions
         columns = []
         for j, (i, k) in enumerate(free):

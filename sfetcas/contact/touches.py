@@ -1,10 +1,10 @@
-"""What touches what at a state: forces of obstacles, conditions of the places of contact, gaps along members.
+"""Contact at a state: forces of obstacles, conditions of the places of contact, gaps along members.
 
-A place of contact within a member is an unknown of its own beside the equilibrium with that place held:
+A place of contact within a member is a further unknown beside the equilibrium with that place fixed:
 
 * on a plane or a round obstacle the member is tangential to it there;
 * to a point or an edge it is the nearest one;
-* where a stretch begins or ends, the bending moment is the one that the obstacle's shape takes.
+* where a stretch begins or ends, the bending moment is that of the member in the shape of the obstacle.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from ..mechanics.rotations import STIFF, end_joints
 __all__ = ["COARSE", "MOST_RISE", "NOISE", "Gap", "Loose", "Opened", "Touched", "answers", "edge_sides", "obstacles_of"]
 
 COARSE = 1e-6
-"""Share of the scene's size: from this limit on gaps are those of a coarse mesh, on the way to the answer."""
+"""Penetration that is accepted on coarse meshes, on the way to the answer, share of the size of the scene."""
 
 BESIDE_END = np.geomspace(1e-5, 1e-2, 10)
-"""Fractions of the length from an end that touches at which gaps are looked at too."""
+"""Distances from an end that touches at which gaps are computed as well, fractions of the length."""
 
 NOISE = 1e-4
-"""On coarse meshes members waver by less than this share of the scene's size about the obstacles that they leave."""
+"""Penetration by oscillation of coarse meshes beside places where members leave, share of the size of the scene."""
 
 GRID, FINER = 33, 6
-"""Places of an interval at which a smallest gap is looked for, and times it is cut to the parts beside the smallest: to
-6e-8 of the interval, a gap within rounding."""
+"""Number of places in an interval among which the smallest gap is chosen, and number of times the interval is reduced
+to its neighbours: to 6e-8 of itself, a gap within rounding."""
 
 FIRST_RISE, MOST_RISE = 0.05, 0.9
-"""Shares of a stretch: how much of it rises where nothing tells, and at most."""
+"""Part of a stretch that is assumed to rise if there is no estimate, and largest part; shares of its length."""
 
 BEHIND_EDGE = 0.2
-"""Share of the scene's size: a member that is further behind an edge is elsewhere, and not held up by it."""
+"""Distance behind an edge from which a member is not in contact with it, share of the size of the scene."""
 
 SAMPLES = 12
-"""Places in each element at which gaps are looked at."""
+"""Number of places in each element at which gaps are computed."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class Gap:
     ----------
     contact, member : str
     begin, end, at : float
-        Fractions of the length.
+        Fractions of the length; ``at`` is the deepest place.
     depth : float
-        m, negative.
+        Gap there, m, negative.
     way : float
         As in :class:`~sfetcas.mechanics.mesh.Touch`.
     """
@@ -78,13 +78,14 @@ class Gap:
 
 @dataclass(frozen=True)
 class Loose:
-    """An end of a stretch, 0 or 1, that cannot lie there.
+    """An end of a stretch, at an end of its member, that cannot lie on the obstacle.
 
     Attributes
     ----------
     at : float
+        0 or 1.
     risen : float
-        About how far the member rises from there, a fraction of its length.
+        Estimated part of the member that rises from there, a fraction of its length.
     stays : bool
         Whether the end itself is pressed on the obstacle, and the member rises beside it.
     """
@@ -96,9 +97,17 @@ class Loose:
 
 @dataclass(frozen=True)
 class Opened:
-    """A place of a stretch at which a load acts that an obstacle cannot hold: a pull (N) or a couple (N m).
+    """A place of a stretch with a load that an obstacle cannot balance.
 
-    ``node`` is the node there, or None.
+    Attributes
+    ----------
+    touch : Touch
+    at : float
+        Fraction of the length.
+    node : str or None
+        Node at this place.
+    pull, couple : float
+        Force away from the obstacle, N, and moment, N m.
     """
 
     touch: Touch
@@ -114,7 +123,7 @@ def obstacles_of(model: Model) -> Mapping[str, Obstacle]:
 
 
 def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
-    """Of each edge and member the sign that turns edge times tangent to the allowed side, in the undeformed scene."""
+    """For each edge and member 1 or -1: sign of (edge x tangent) on the allowed side, in the undeformed scene."""
     found = {}
     for name, contact in scene.contacts.items():
         stop = obstacle(contact, scene.resolved_dimension == "space")
@@ -129,14 +138,21 @@ def edge_sides(scene: Scene) -> dict[tuple[str, str], float]:
 
 
 class Touched:
-    """Contact at one state of a model."""
+    """Forces, conditions and gaps of contact at one state of a model.
+
+    Parameters
+    ----------
+    equations : Equations
+    state : State
+    loading : Loading
+    """
 
     def __init__(self, equations: Equations, state: State, loading: Loading) -> None:
         self._take(Fields(equations, state, loading), state)
 
     @classmethod
     def of(cls, fields: Fields) -> Touched:
-        """Contact at the state that fields were made of."""
+        """Contact at the state that fields evaluate."""
         self = cls.__new__(cls)
         self._take(fields, fields.state)
         return self
@@ -191,7 +207,7 @@ class Touched:
         )
 
     def goes_on(self, touch: Touch, at: float) -> bool:
-        """Whether another stretch of the same obstacle begins where a stretch reaches the end of its member."""
+        """Whether another stretch of the same obstacle begins at the node where a stretch ends (``at`` 0 or 1)."""
         node = self.model.scene.members[touch.member].nodes[int(at)]
         for other in self.model.mesh.touches:
             if other is not touch and other.contact == touch.contact and other.to is not None:
@@ -215,11 +231,11 @@ class Touched:
         return np.asarray((before[1] - before[0]) * self.model.scales.force)
 
     def push(self, touch: Touch) -> float:
-        """Force of a touch along the normal, N: below zero the obstacle would have to pull."""
+        """Contact force of a touch along the normal of the obstacle, N; negative for tension."""
         return float(self.force(touch) @ self.normal(touch, touch.at))
 
     def pressures(self, touch: Touch, x: Array) -> Array:
-        """Forces (n - 1,) of an obstacle between places of a stretch along the normals in their middles, N."""
+        """Contact forces (n - 1,), N, between places x (n,) of a stretch, along the normals in their middles."""
         forces = self.fields.along(touch.member, x)["force"]
         loads = self.fields.load_before(touch.member, x) * self.model.scales.force
         pushed = -np.diff(forces, axis=0) - np.diff(loads, axis=0)
@@ -229,7 +245,7 @@ class Touched:
     # -- what obstacles cannot hold -------------------------------------------------------------
 
     def loose_end(self, touch: Touch) -> Loose | None:
-        """The end of a stretch at a node that the obstacle would have to pull or to clamp; None where there is none."""
+        """The end of a stretch at a node with tension or a clamping moment between it and the obstacle, or None."""
         model = self.model
         for at in touch.places if touch.to is not None else ():
             node = model.scene.members[touch.member].node_at(at)
@@ -248,10 +264,9 @@ class Touched:
         return None
 
     def left_over(self, node: str, contact: str) -> tuple[Array, Array]:
-        """Moment (dimensionless) and force (N) on a node that neither its members, loads nor springs balance.
+        """Moment (3,), dimensionless, and force (3,), N, on a node that only one obstacle can balance.
 
-        Nor other obstacles than the one that is asked about.
-        Members that lie on obstacles count with what their shape takes.
+        They are the sum of the internal forces of its members, its loads, its springs and all other obstacles.
         """
         scene, fields = self.model.scene, self.fields
         moment, force = -fields.own_moment(node) + fields.balance.spring_moment(node), -fields.own_force(node)
@@ -294,9 +309,9 @@ class Touched:
         return float(self.pressures(touch, x)[i]) / (span / 8.0 * self._length(touch))
 
     def opened(self, touch: Touch, share: float) -> Opened | None:
-        """A place within a stretch where a load pulls or turns the member off the obstacle; None where none does.
+        """A place within a stretch where a load lifts or rotates the member off the obstacle, or None.
 
-        Loads that are smaller than a share of the largest force or moment do not count.
+        Loads smaller than ``share`` of the largest force or moment do not count.
         """
         model, fields = self.model, self.fields
         size, to = share * self._size, float(touch.to or 0.0)
@@ -330,7 +345,7 @@ class Touched:
         return max([*found, self.fields.largest_load])
 
     def hump(self, opened: Opened) -> float:
-        """Half of how far a heavy beam that lies on a plane rises around a load, as a fraction of the length.
+        """Half of the length over which a heavy beam on a plane rises around a load, as a fraction of the member's.
 
         A force P against the pressure p opens ``1.5 P / p``, a couple C about ``2 sqrt(C / p)`` to either side.
         """
@@ -342,7 +357,7 @@ class Touched:
         return float(np.clip(wide, 1e-3 * span, MOST_RISE * span))
 
     def normal(self, touch: Touch, at: float) -> Array:
-        """Normal (3,) of an obstacle at a place of a member."""
+        """Unit normal (3,) of an obstacle at a place of a member, fixed axes."""
         x = np.array([at])
         place, tangent = self.fields.positions(touch.member, x), self.fields.tangents(touch.member, x)
         return np.asarray(self.obstacles[touch.contact].normals(place, tangent, touch.way)[0])
@@ -354,7 +369,11 @@ class Touched:
 
     @functools.cached_property
     def conditions(self) -> Array:
-        """What has to be zero at each place of contact within a member, dimensionless, in their order."""
+        """Values (places,), dimensionless, that vanish at the right places of contact within members, in their order.
+
+        At single places the slope along the obstacle, at an edge the distance along the member; at ends of stretches
+        the jump of the moment.
+        """
         found: list[float] = []
         for touch in self.model.mesh.touches:
             if touch.to is not None:
@@ -399,14 +418,14 @@ class Touched:
     # -- gaps -----------------------------------------------------------------------------------
 
     def samples(self, member: str) -> Array:
-        """Fractions at which gaps are looked at: finely between the cuts."""
+        """Fractions (n,) of the length at which gaps are computed, rising from 0 to 1, several in each element."""
         cuts = self.model.mesh.cuts[member]
         # Towards the ends of an element, where contact begins, the samples are dense.
         inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / SAMPLES)
         return np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * inner).ravel(), 1.0)
 
     def gaps(self, contact: str, member: str, x: Array, offset: float, way: float = 1.0) -> Array:
-        """Gaps (n,) of places of a member, m."""
+        """Gaps (n,), m, at fractions x (n,) of a member, the obstacle moved back by ``offset``, m; negative inside."""
         place, tangent = self.fields.positions(member, x), self.fields.tangents(member, x)
         return self.obstacles[contact].gaps(place, tangent, offset, way)
 
@@ -417,9 +436,10 @@ class Touched:
         limit: float,
         noise: float = 0.0,
     ) -> list[Gap]:
-        """All runs of places that are deeper inside an obstacle than the limit (m), where members are free of it.
+        """All runs of places deeper inside an obstacle than ``limit``, m, outside of the stretches on it.
 
-        Within ``noise`` (m) of it a member may waver beside the places where it leaves.
+        Beside places where a member leaves an obstacle ``noise``, m, is accepted.  ``offsets`` are the distances, m, by
+        which obstacles are moved back, ``ways`` the allowed sides of edges.
         """
         found: list[Gap] = []
         for contact, stop in self.obstacles.items():
@@ -432,7 +452,7 @@ class Touched:
         return found
 
     def takes_part(self, contact: str, node: str) -> bool:
-        """Whether an obstacle can push a node."""
+        """Whether an obstacle can exert a force on a node: supports and motions leave it free to move."""
         scene = self.model.scene
         return takes_part(node, scene.nodes[node], scene.motions.values(), self.obstacles[contact])
 
@@ -524,17 +544,17 @@ class Touched:
         return found
 
     def passing(self, contact: str, member: str) -> list[float]:
-        """Fractions at which a member comes nearest to an edge."""
+        """Fractions of the length at which a member comes nearest to an edge."""
         fields = self.fields
         positions, tangents = (lambda x: fields.positions(member, x)), (lambda x: fields.tangents(member, x))
         return nearest(self.obstacles[contact], positions, tangents, self.samples(member))
 
     def course(self, member: str) -> Array:
-        """Places (n, 3) along a member, m, near enough to each other to be joined by lines."""
+        """Positions (n, 3), m, along a member, near enough to each other to be joined by straight lines."""
         return self.fields.positions(member, self.samples(member))
 
     def smallest_gap(self, contact: str, way: Mapping[tuple[str, str], float]) -> float:
-        """Smallest gap of all members that an obstacle stops, m; infinite where none passes an edge."""
+        """Smallest gap, m, between an obstacle and the members that it concerns; infinite if none passes an edge."""
         found = [np.inf]
         for member in members_of(self.model.scene.contacts[contact], self.model.scene.members):
             sharp = self.obstacles[contact].kind == "sharp"
@@ -549,7 +569,7 @@ class Touched:
 
 
 def answers(fields: Fields) -> dict[str, dict[str, Any]]:
-    """Of each obstacle the force on what touches it, where, the gap and the member; lists where several touch."""
+    """For each obstacle ``force`` (3,) N, ``at`` (fraction or stretch), ``gap`` m and ``member``; lists for several."""
     touched, sides = Touched.of(fields), edge_sides(fields.model.scene)
     found: dict[str, dict[str, Any]] = {}
     for contact in touched.obstacles:

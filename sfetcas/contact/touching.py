@@ -1,10 +1,10 @@
 """Equilibria in contact: which places of members touch which obstacles, and where exactly.
 
-1. *Settling*: with a given set of touches the equilibrium, and the places of contact from their conditions.
-2. *Which touches*: what gets inside an obstacle begins to touch it, what would be pulled leaves it, a place that the
-   member penetrates beside becomes a stretch, a stretch without length a place, until nothing is wrong.
-3. *Following*: both along a way of loads or of obstacles that come to their places, from a state whose touches are
-   known, so that the answer is the one that this way leads to.
+1. *Settling*: the equilibrium with a given set of touches, and the places of contact from their conditions.
+2. *Active set*: penetrating places are added, places in tension removed, places beside which the member penetrates
+   become stretches, and stretches of no length places, until no condition is violated.
+3. *Following*: both along a way of growing loads, or of obstacles that move to their places, from a state whose
+   touches are known, so that the answer is the one that this way leads to.
 """
 
 from __future__ import annotations
@@ -30,50 +30,50 @@ from .touches import Touched
 __all__ = ["Toucher"]
 
 CHANGES = 24
-"""Changes of what touches at one point of the way before the step is taken to be too long."""
+"""Largest number of changes of touches at one point of the way; with more the step counts as too long."""
 
 SHORTEST = 2e-5, 5e-4
-"""First and later steps below this part of the way end the search."""
+"""Shortest first and later step, parts of the way."""
 
 SNAPS = 5e-3, 2e-2, 5e-2
-"""Parts of the way beyond a limit point or a bifurcation at which a state is left for another, nearer ones first."""
+"""Distances beyond a limit or bifurcation point at which a jump to another state is tried, parts of the way."""
 
 MOST_SNAPS = 8
-"""Snaps on one way."""
+"""Largest number of jumps on one way."""
 
 MOST_SOLVES, MOST_ON_WAY = 200, 3000
-"""Equilibria with places held that are solved at one point of a way, and on all of it."""
+"""Largest number of equilibria with fixed places that are solved at one point of a way, and on all of it."""
 
 TRIES = 500
-"""Steps tried before giving up."""
+"""Largest number of trial steps on a way."""
 
 FALLS = 80
-"""Steps of a fall."""
+"""Largest number of steps of a fall, an overdamped motion from an unstable state."""
 
 FIRST_DRAG, LEAST_DRAG, MOST_DRAG, DRAG_BEYOND = 1.0, 1e-6, 1e7, 2.0
-"""Drag at first, least and most, and at least over the size of the lowest eigenvalue below zero."""
+"""Drag, dimensionless: first, least and largest; and least ratio of it to the size of the lowest eigenvalue."""
 
 SLOW = 0.1
-"""What turns by less in a step, rad, may be near where it comes to rest."""
+"""Rotation in a step of a fall, rad, below which the state may be near to rest."""
 
 NEARER = 0.3
-"""How much slower it has to be than where it was found not to rest yet, to be asked again."""
+"""Factor by which the rotation of a step has to fall after a failed attempt before rest is tried again."""
 
 NUDGE = 0.05
-"""Angle, rad, by which an unstable equilibrium is moved along its unstable mode to begin to fall."""
+"""Rotation, rad, by which an unstable equilibrium is displaced along its unstable mode to begin a fall."""
 
 SUDDEN, STEEP = 0.02, 4.0
-"""A step is sudden that turns a place by more than this angle, rad, and by so many times what the one before tells."""
+"""A step is sudden with a larger rotation of a place, rad, that also is this multiple of what the rate before gives."""
 
 DEPARTS = 0.15
-"""... or that turns it by so much, rad, elsewhere than the step before tells: onto another branch, or past a corner."""
+"""A step is also sudden that differs by this rotation, rad, from extrapolation: another branch, or a corner passed."""
 
 FIRST, AFTER_JUMP = 0.25, 0.05
-"""Parts of the way of the first step, and of the one after a state was left."""
+"""Length of the first step, and of the one after a jump, parts of the way."""
 
 
 class Toucher:
-    """Contact of one scene.
+    """Solver of states in contact of one scene.
 
     Parameters
     ----------
@@ -81,9 +81,14 @@ class Toucher:
     prepare : callable
         Mesh -> Prepared.
     limit : float
-        How deep a place may be inside an obstacle, over the size of the scene.
-    sides : mapping
-        Of each edge and member where it is allowed, see :func:`~sfetcas.contact.touches.edge_sides`.
+        Largest penetration that is accepted, over the size of the scene.
+    sides : mapping of (contact, member) to float
+        The allowed side of each edge, see :func:`~sfetcas.contact.touches.edge_sides`.
+
+    Attributes
+    ----------
+    snapped : list of float
+        Parts of the last way at which a state was left, or ceased to exist.
     """
 
     def __init__(
@@ -104,7 +109,10 @@ class Toucher:
     def resolved(
         self, base: Mesh, now: Held | None, touches: tuple[Touch, ...], way: Way, most: int | None = None
     ) -> Held | None:
-        """The equilibrium at a point of the way with nothing wrong about its touches; by ``most`` solves in all."""
+        """The equilibrium at a point of the way with the right touches, starting from ``touches``; None if not found.
+
+        ``most`` is the value of ``settler.solves`` at which the search gives up.
+        """
         self.settler.limit = self.settler.solves + MOST_SOLVES if most is None else most
         try:
             return self._resolved(base, now, touches, way)
@@ -138,17 +146,15 @@ class Toucher:
         return None
 
     def follow(self, base: Mesh, way: Callable[[float], Way], start: Held | tuple[Touch, ...]) -> Held | None:
-        """Follow from the begin of a way to its end; from a state there, or from the undeformed scene.
+        """The state at the end of a way, followed from one at its beginning or from touches of the undeformed scene.
 
-        No step turns a place by more than :data:`~sfetcas.contact.passing.STRIDE` or may have passed an obstacle, and
-        a state that ceases to be stable is left as soon as that is seen, if that is wanted.
-
-        ``snapped``, an attribute, is then the parts of the way at which a state was left, or ceased to be.
+        No step rotates a place by more than :data:`~sfetcas.contact.passing.STRIDE` or may have passed an obstacle, and
+        a state that ceases to be stable is left at once if the scene asks for it.  None if the state is lost.
 
         Raises
         ------
         SolveError
-            A small member bends beyond what it is for on the way.
+            A small member bends beyond the range of its linear model on the way.
         """
         self.snapped = []
         most = self.settler.solves + MOST_ON_WAY
@@ -220,11 +226,11 @@ class Toucher:
     # -- unstable states ------------------------------------------------------------------------
 
     def unstable(self, held: Held, way: Way) -> bool:
-        """Whether a state is unstable, and such states are to be left."""
+        """Whether a state is unstable, and the scene asks to leave such states."""
         return self.switch_branch and can_switch_branch(held) and self.stability.judged(held, way).negative > 0
 
     def left(self, base: Mesh, held: Held, way: Way) -> Held | None:
-        """A stable state that an unstable one goes to, past no obstacle; None where none is found."""
+        """A stable state to which an unstable one leads without passing an obstacle; None if none is found."""
         pressing = self.stability.pressing(held, way)
         loose = tuple(replace(touch, flat=False) for touch in pressing.mesh.touches)
         source = pressing.prepared.model, pressing.corrected.state
@@ -318,7 +324,7 @@ class Toucher:
         return Held(prepared, corrected, loading, Touched(prepared.equations, state, loading))
 
     def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
-        """The state in contact that one on cushions stands for."""
+        """The state in contact near one of penalty contact; None if it is not found."""
         for touches in _readings(found.touches):
             held = self.resolved(base, found.held, touches, way)
             if held is not None:

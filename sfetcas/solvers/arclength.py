@@ -1,11 +1,10 @@
-"""Following a curve of equilibria by its arc length, through limit points.
+"""Arc length continuation: following a curve of equilibria through limit points.
 
-The unknowns are those of the stationarity equations and the factor of loads and motions.  A step goes along the
-tangent, bent as the last two tangents say, and returns to the equilibria across it: Newton's method with one more
-row, which holds what is left across the tangent.  The length of a step is measured in the root mean square of
-the rotations, rad, and in the factor over a unit, so that it does not depend on the mesh.
-
-Multipliers take no part in lengths: where a structure carries more load without moving, only the factor counts.
+The unknowns are those of the stationarity equations and the factor of loads and motions.  The predictor of a step is
+the tangent with the curvature that the last two tangents give; the corrector is Newton's method with one more row,
+which keeps corrections orthogonal to the tangent.  Lengths are measured in the root mean square of the rotations, rad,
+and in the factor over a unit, so that they do not depend on the mesh; displacements that springs or joints act upon
+count a little, multipliers not at all: where a structure carries more load without moving, only the factor counts.
 """
 
 from __future__ import annotations
@@ -33,32 +32,39 @@ from .stability import LIGHT, Inertia
 __all__ = ["PASSING", "Curve", "Standing", "Tangent"]
 
 PASSING = 1e-10
-"""The same for points in passing, which nobody asked for by name."""
+"""Relative residual up to which intermediate points of a curve are iterated; points of an answer go to rounding."""
 
 TURN = 0.6
-"""No node turns by more than this, rad, in the corrections of a step."""
+"""Largest rotation of a node, rad, by all corrections of a step together."""
 
 LARGE_PRIMAL_FACTOR = 1e3
-"""Times the weight of the proximal term for a second attempt between two points of the curve."""
+"""Factor of the proximal term at a second attempt, where the usual one happens to make the matrix singular."""
 
 DOUBT = 30.0
-"""A load of size one that moves more than this may meet an eigenvalue that vanishes: one of 1e-7 answers 1e5 times."""
+"""Response to a random load of size one above which an eigenvalue may vanish; an eigenvalue of 1e-7 gives 1e5."""
 
 LIMITS = Limits(iterations=10, short=0.01, turned=TURN, near=tolerances.BALANCED, returns=False)
-"""Of corrections: beside a bifurcation the first ones wander along its shape, and short ones need not shrink."""
+"""Limits of corrections: beside a bifurcation the first ones wander along its mode, and short ones need not shrink."""
 
 FIXED_STEP = 1e-3
-"""Turn of held nodes, rad, over which the equations are differenced by the factor: fourth order, so 1e-13."""
+"""Change of prescribed rotations, rad, in differences of the equations by the factor: of fourth order, so 1e-13."""
 
 HISTORY = 1e-5
-"""Share of the unit of the factor over which loads with histories are differenced: second order, so 1e-10."""
+"""Step of the differences of loads with histories, share of the unit of the factor: of second order, so 1e-10."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """Direction of the curve, of length one: rates of the unknowns and multipliers, and of the factor.
+    """Direction of the curve, of length one in the metric of :meth:`Curve.inner`.
 
-    Where motions are neutral all along the curve, it goes along none of them.
+    Attributes
+    ----------
+    z : ndarray (total,)
+        Rates of unknowns and multipliers over the arc length, dimensionless.
+    factor : float
+        Rate of the factor.
+    neutral : Neutral, optional
+        Motions that are neutral all along the curve; the tangent has no part along them.
     """
 
     z: Array
@@ -78,10 +84,10 @@ class Standing:
     arc : float
         Arc length from the start of the curve.
     iterations : int
-        Newton iterations that led here.
+        Newton iterations of its correction.
     prepared : Prepared
     doubtful : bool
-        Whether an eigenvalue may vanish: something answers more than usual.
+        Whether an eigenvalue may vanish here: the response to a probing load exceeds :data:`DOUBT`.
     """
 
     state: State
@@ -107,14 +113,14 @@ class Curve:
     ----------
     prepared : Prepared
     unit : float
-        Change of the factor that counts as much as a radian.
+        Change of the factor that counts as much in lengths as a rotation by a radian.
     piece : tuple of float
-        Factors between which no history has a knot.
+        Range of factors within which no history has a knot.
 
     Attributes
     ----------
     searched : int
-        Points at which critical ones were looked for so far.
+        Number of points computed so far in searches for critical points.
     """
 
     def __init__(self, prepared: Prepared, unit: float, piece: tuple[float, float] = (-np.inf, np.inf)) -> None:
@@ -133,26 +139,26 @@ class Curve:
         self._has_superelements = any(member.type == "small" for member in prepared.model.scene.members.values())
 
     def too_large(self, state: State, loading: Loading) -> str:
-        """What is said of a small member that bends beyond what it is for; empty where none does."""
+        """Message naming a small member that bends beyond the range of its linear model; empty if none does."""
         return Fields(self.equations, state, loading).too_large() if self._has_superelements else ""
 
     def within(self, piece: tuple[float, float]) -> Curve:
-        """The same curve between two factors."""
+        """A copy of the curve with another ``piece``, the range of factors without a knot of a history."""
         there = copy.copy(self)
         there.piece = piece
         return there
 
     def without_neutral(self, standing: Standing) -> Standing:
-        """A point where motions are neutral as one of a curve that goes along none of them."""
+        """The point with the motions that are neutral there noted in its tangent, which has no part along them."""
         values, shapes = self.prepared.around_zero(standing.point)[1:]
         chosen = shapes[:, np.argsort(np.abs(values))[: standing.inertia.zero]]
         along = replace(standing.tangent, neutral=self.neutral(standing.point, chosen))
         return replace(standing, tangent=self.tangent(standing.state, standing.factor, standing.point, along)[0])
 
     def neutral(self, point: Point, shapes: Array, primal_factor: float = 1.0) -> Neutral:
-        """Motions from their shapes (rotation unknowns, n), neutral or held as if they were.
+        """Motions with the given shapes (rotation unknowns, n), rad, for corrections that leave them alone.
 
-        With a large ``primal_factor`` of the proximal term those are not taken to others that are open as well.
+        A large ``primal_factor`` of the proximal term keeps them from mixing with other neutral motions.
         """
         weight = self.prepared.weight
         weighted = Neutral.right(shapes, weight, self.equations.total)
@@ -161,16 +167,16 @@ class Curve:
     # -- lengths --------------------------------------------------------------------------------
 
     def inner(self, a: Tangent, b: Tangent) -> float:
-        """Inner product of two directions."""
+        """Inner product of two directions: weighted sum over the unknowns, plus factors over their unit."""
         return float(a.z @ (self.weight * b.z)) + a.factor * b.factor / self.unit**2
 
     def normed(self, direction: Tangent) -> Tangent:
-        """The direction with length one."""
+        """The direction scaled to length one in :meth:`inner`."""
         length = np.sqrt(self.inner(direction, direction))
         return replace(direction, z=direction.z / length, factor=direction.factor / length)
 
     def way(self, a: Standing, b: Standing) -> float:
-        """How far the second point lies ahead of the first, along the tangent there."""
+        """Distance of the second point ahead of the first along the tangent there; rotations and the factor count."""
         apart = np.zeros(self.equations.total)
         apart[: self._rotation_unknowns] = turned_between(self.equations, b.state, a.state)
         return self.inner(Tangent(apart, b.factor - a.factor), a.tangent)
@@ -178,17 +184,17 @@ class Curve:
     # -- derivative by the factor ---------------------------------------------------------------
 
     def with_prescribed(self, state: State, loading: Loading) -> State:
-        """The state with held rotations where the motions want them."""
+        """The state with prescribed rotations at the values of a loading."""
         return self.equations.holding(state, loading) if self._driven else state
 
     def loading(self, factor: float) -> Loading:
-        """Loads and motions at a factor; beyond the piece as they would go on without the knot at its end."""
+        """Loads and motions at a factor; outside of the piece extrapolated linearly from its end."""
         within = min(max(factor, self.piece[0]), self.piece[1])
         there = self.model.loading(within)
         return there if within == factor else there.plus(self.rate(within).scaled(factor - within))
 
     def rate(self, factor: float) -> Loading:
-        """Change of loads and motions with the factor; at a knot of a history, on the side of the piece."""
+        """Derivative of loads and motions by the factor; at a knot of a history the one-sided one within the piece."""
         if self._linear:
             return self.model.groups[None]
         low, high = self.piece
@@ -198,9 +204,9 @@ class Curve:
         return after.plus(before.scaled(-1.0)).scaled(0.5 / h)
 
     def slope(self, state: State, factor: float, point: Point) -> Array:
-        """Derivative of the residual by the factor at a state.
+        """Derivative (total,) of the residual by the factor at a state, dimensionless.
 
-        Exact but for the turns of held nodes, which enter by fourth order differences.
+        Exact but for prescribed rotations, which enter by central differences of fourth order.
         """
         rate = self.rate(factor)
 
@@ -225,13 +231,16 @@ class Curve:
     # -- points ---------------------------------------------------------------------------------
 
     def solved(self, point: Point, right: Array, primal_factor: float = 1.0) -> Array:
-        """Solutions for the Newton matrix of a point with the proximal term, which may be made larger."""
+        """Solutions for right sides (total, n) with the Newton matrix and ``primal_factor`` times the proximal term."""
         entries = self.equations.regularised(point.entries, primal_factor * self._proximal, tolerances.DUAL)
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
     def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> tuple[Tangent, bool]:
-        """Direction of the curve at a state, to the side of another, and whether an eigenvalue may vanish there."""
+        """Tangent of the curve at a state, signed as ``along``, and whether an eigenvalue may vanish there.
+
+        ``along`` itself where the regularised matrix is singular.
+        """
         rights = [-self.slope(state, factor, point), self._probe]
         rights += [] if along.neutral is None else [*along.neutral.weighted.T]
         try:
@@ -247,7 +256,7 @@ class Curve:
             rate = rate if neutral is None else neutral.without(rate)
         loose = loose_rows(self.equations, point) if redundant(self.equations, point) else np.zeros(0)
         if loose.size:
-            # What is shared is linear in the multipliers and loads, so that their rates are shared alike.
+            # The rule for redundant multipliers is linear in multipliers and loads: it holds for their rates as well.
             first = self.equations.unknowns
             way = shared(self.equations, replace(state, lam=rate[first:]), self.rate(factor), loose)
             rate[first:] = way.lam
@@ -257,7 +266,7 @@ class Curve:
 
     @functools.cached_property
     def _probe(self) -> Array:
-        """A load of size one that has a share in every shape: where an eigenvalue vanishes it moves much."""
+        """A random load (total,) of size one: its response is large where an eigenvalue of the matrix is near zero."""
         weight, probe = self.prepared.weight, np.zeros(self.equations.total)
         shape = np.random.default_rng(0).standard_normal(self._rotation_unknowns)
         probe[: self._rotation_unknowns] = weight * shape / np.sqrt(max(float(shape @ (weight * shape)), TINY))
@@ -266,14 +275,14 @@ class Curve:
     def standing(
         self, state: State, factor: float, along: Tangent, *, arc: float = 0.0, iterations: int = 0
     ) -> Standing:
-        """Everything that is known of an equilibrium on the curve."""
+        """The point of the curve at an equilibrium, with its tangent signed as ``along``."""
         loading = self.loading(factor)
         state, point = with_sharing(self.equations, state, loading, self.equations.at(state, loading), PASSING)
         tangent, doubtful = self.tangent(state, factor, point, along)
         return Standing(state, factor, loading, point, tangent, arc, iterations, self.prepared, doubtful)
 
     def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
-        """State and factor a length along the tangent, bent by the rate of the tangent over the arc."""
+        """State and factor at an arc length from a point: along its tangent, with the curvature ``bend`` if given."""
         z, factor = length * start.tangent.z, start.factor + length * start.tangent.factor
         if bend is not None:
             z, factor = z + 0.5 * length**2 * bend.z, factor + 0.5 * length**2 * bend.factor
@@ -289,10 +298,10 @@ class Curve:
         primal_factor: float = 1.0,
         sharp: bool = True,
     ) -> Standing | None:
-        """The equilibrium that lies across a direction from a state near the curve; None where none is found.
+        """The equilibrium in the hyperplane through a state near the curve orthogonal to ``across``; None if not found.
 
-        With a large ``primal_factor`` of the proximal term directions that the equations leave open stay as they are; a
-        ``sharp`` one is iterated to rounding.
+        With a large ``primal_factor`` of the proximal term neutral directions keep their values.  ``sharp`` iterates
+        to rounding instead of :data:`PASSING`.
         """
         system = _Across(
             self, across, primal_factor if across.neutral is None else max(primal_factor, LARGE_PRIMAL_FACTOR), sharp
@@ -306,9 +315,9 @@ class Curve:
         return Standing(found.state, found.factor, loading, point, tangent, arc, count, self.prepared, doubtful)
 
     def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
-        """The equilibrium at a factor, from a standing near it; None where Newton's method does not lead there.
+        """The equilibrium at a factor, from a point near it; None if Newton's method does not converge to one near.
 
-        ``most``: largest turn of a node (rad) from there.
+        ``most`` is the largest rotation of a node, rad, between the two.
         """
         if near.tangent.neutral is not None:
             across = Tangent(np.zeros(self.equations.total), 1.0, near.tangent.neutral)
@@ -323,7 +332,10 @@ class Curve:
     # -- between two points ---------------------------------------------------------------------
 
     def between(self, a: Standing, b: Standing) -> Callable[[float], Standing | None]:
-        """The curve from one of its points to the next as a function of the way along the first tangent."""
+        """Points of the curve between two neighbours, by their distance from the first along its tangent.
+
+        The function returns None if the corrector does not converge.
+        """
         bend = self.bend(a, b)
         if bend is not None:
             along = self.inner(bend, a.tangent)
@@ -338,7 +350,7 @@ class Curve:
         return at
 
     def bend(self, a: Standing, b: Standing) -> Tangent | None:
-        """Rate of the tangent over the arc, from two points."""
+        """Curvature of the curve, the derivative of the tangent by the arc length, from two points; None for one."""
         arc = b.arc - a.arc
         if arc == 0.0:
             return None
@@ -346,10 +358,10 @@ class Curve:
 
 
 class _Across:
-    """An equilibrium across a direction from a state near a curve, for :func:`~sfetcas.solvers.newton.correct`.
+    """The bordered system of an equilibrium with unknown factor, for :func:`~sfetcas.solvers.newton.correct`.
 
-    One unknown more, the factor, and one equation more, what is left across the direction.  Motions that are neutral
-    along the curve are found anew at each step, and no step goes along them.
+    Its further equation keeps steps orthogonal to a direction.  Motions that are neutral along the curve are updated
+    at each step, and no step goes along them.
     """
 
     complete = True
@@ -364,18 +376,18 @@ class _Across:
         return self.curve.loading(factor)
 
     def with_prescribed(self, state: State, loading: Loading) -> State:
-        """The state with held rotations where the motions want them."""
+        """The state with prescribed rotations at the values of a loading."""
         return self.curve.with_prescribed(state, loading)
 
     def seen(self, state: State, point: Point) -> Point:
-        """Without what is out of balance along neutral motions, and gaps that no unknown closes."""
+        """The equations without the residual along neutral motions and the gaps of redundant rows."""
         point = met(self.equations, point)
         if self.neutral is None:
             return point
         return replace(point, residual=self.neutral.balanced(point.residual))
 
     def step(self, here: Balance) -> Array:
-        """Newton's step of all unknowns, multipliers and the factor."""
+        """Newton's step (total + 1,) of all unknowns, multipliers and, last, the factor."""
         rights = [-here.point.residual, -self.curve.slope(here.state, here.factor, here.point)]
         rights += [] if self.neutral is None else [*self.neutral.weighted.T]
         both = self.curve.solved(here.point, np.column_stack(rights), self.primal_factor)
@@ -388,11 +400,11 @@ class _Across:
         return np.append(base + change * rate, change)
 
     def suffices(self, here: Balance) -> bool:
-        """Good enough for a point in passing; gaps are to be closed all the same: little slack lets much move."""
+        """Whether an intermediate point is accurate enough; its gaps must be closed too, as small ones move much."""
         gaps = float(np.abs(here.point.residual[self.equations.unknowns :]).max(initial=0.0))
         return not self.sharp and here.residual <= PASSING and gaps <= tolerances.CONVERGED
 
 
 def _kind(rate: Loading) -> tuple[float, bool]:
-    """Largest angle or travel of driven nodes and joints, and whether there is nothing but nodal loads and motions."""
+    """Largest rate of prescribed angles and travels, and whether loads and motions act on nodes only."""
     return max(float(np.abs(rate.turn).max(initial=0.0)), rate.driven), rate.nodal

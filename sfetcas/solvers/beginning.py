@@ -23,21 +23,27 @@ __all__ = ["begin_path", "check_slack"]
 STARTED = "the path begins at the equilibrium of factor 0 that start places of nodes choose"
 
 BEGINNING = 1e-3
-"""Where straight members have no slack, or nothing but loads holds a mechanism, the path starts at this share."""
+"""Share of its last factor at which a path starts that cannot start at 0: members lack slack, or it is a mechanism."""
 
 TAUT = 1e3
-"""Multipliers above this many times the loads, in members without slack, are those of a taut string."""
+"""Ratio of the largest multiplier to the loads above which members without slack carry them like a taut string."""
 
 
 def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, Standing, tuple[str, ...]]:
-    """The curve with its unit, its first point, and what is to be said of it.
+    """The curve with its unit, its first point, and notes for the user.
 
-    The path goes downwards where the range ends at 0, else upwards.
+    Parameters
+    ----------
+    prepared : Prepared
+    span : (low, high)
+        Range of factors.  The path goes towards smaller ones if the range ends at 0, else towards larger ones.
 
     Raises
     ------
     SolveError
         There is no equilibrium to start from.
+    SceneError
+        Loads drive a free motion without end.
     """
     up = 1.0 if span[1] > 0.0 else -1.0
     widest = max(map(abs, span))
@@ -46,7 +52,7 @@ def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, St
     along = Tangent(np.zeros(prepared.equations.total), up)
     tangent = curve.standing(state, factor, along).tangent
     share = (tangent.factor / widest) ** 2
-    # The unit is the factor that would turn the structure by a radian were it linear, if that is in the range.
+    # The unit is the factor at which the linear structure would rotate by a radian, if that is in the range.
     if share < 0.5:
         curve.unit = max(abs(tangent.factor) / np.sqrt(1.0 - share), tolerances.UNIT * widest)
     start = curve.standing(state, factor, along)
@@ -58,7 +64,7 @@ def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, St
 
 
 def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple[str, ...]]:
-    """The equilibrium at factor 0 or, where straight members have no slack for the motions, beside it."""
+    """The equilibrium at factor 0, or at ``beside`` where there is none at 0; its factor; notes for the user."""
     model, equations = prepared.model, prepared.equations
     unloaded = model.loading(0.0, 0.0)
     state = equations.start(unloaded)
@@ -81,7 +87,7 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
 
 
 def _at_start_places(prepared: Prepared, loading: Loading) -> State:
-    """The equilibrium that ``start`` places choose, as in statics: stable but where unstable ones are to be kept."""
+    """The equilibrium that ``start`` places choose, as in statics: a stable one unless unstable ones are wanted."""
     near = nearest(prepared, loading) if prepared.model.scene.analysis.unstable == "stay" else None
     return _stable(prepared, loading).state if near is None else near.state
 
@@ -106,12 +112,12 @@ def _stable(prepared: Prepared, loading: Loading) -> Corrected:
 
 
 def check_slack(curve: Curve, traced: Traced) -> None:
-    """Refuse members that are straight between held points from the start and carry the loads like a taut string.
+    """Refuse members that are straight between fixed points from the start and carry the loads like a taut string.
 
     Raises
     ------
     SolveError
-        They do.
+        Rows are redundant at the first point, and multipliers at the last exceed :data:`TAUT` times the loads.
     """
     equations, (first, *_, last) = curve.equations, traced.points
     loose = loose_rows(equations, first.point)

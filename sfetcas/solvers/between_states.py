@@ -1,4 +1,4 @@
-"""Rotations from one state of a model to another, whole turns of what nothing holds left out."""
+"""Rotations from one state of a model to another; whole turns of parts without fixed rotation do not count."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["free_parts", "turned_between"]
 
 
 def turned_between(equations: Equations, here: State, there: State) -> Array:
-    """Rotations from one state to another, ``there`` to ``here``, in the rotation unknowns, rad.
+    """Rotations from ``there`` to ``here`` as values of the rotation unknowns, (rotation unknowns,) rad.
 
-    Plane angles count turns, but for parts of the structure that nothing holds: a whole turn of such a part is no
+    Plane angles count turns, except of parts in which no rotation is fixed: a whole turn of such a part is no
     difference.
     """
     model = equations.model
@@ -45,7 +45,7 @@ def _rotation_vectors(model: Model, here: State, there: State) -> Array:
 
 @kept(1)
 def free_parts(model: Model) -> tuple[Index, ...]:
-    """Rotations that hang together and of which none is held."""
+    """Sets of rotations that elements connect, and of which none is fixed: the numbers (n,) of each set."""
     turns = model.rotations.turns
     label, before = np.arange(len(model.rotations.kind)), np.zeros(0)
     while not np.array_equal(label, before):

@@ -1,10 +1,9 @@
-"""Before anything is solved: what a structure is free to do, and what its joints hold twice.
+"""Constraint analysis before anything is solved: free motions and redundant constraints.
 
-*Mobility* is the number of motions that strain nothing and that closings, joints and supports allow; at the
-undeformed scene they are the null space of the elastic stiffness on the closings.  *Redundant* rows are
-combinations of closings and joints that no rotation or displacement changes: their multipliers are not unique.
-Both are found by inverse iteration with the sparse matrix of the equations, so the effort grows with the scene as
-that of a solve does.
+*Mobility* is the number of independent motions that strain nothing and that closings, joints and supports allow: the
+null space of the elastic stiffness of the undeformed scene on the closings.  *Redundant* rows are combinations of
+closings and joints that no rotation or displacement changes: their multipliers are not unique.  Both are found by
+inverse iteration with the sparse matrix of the equations, so the effort grows with the scene as that of a solve does.
 
 Source: Maxwell 1864 and Calladine 1978 (counting), here by rank; theory of mechanisms calls it mobility.
 """
@@ -28,31 +27,31 @@ from .redundancy import loose_rows, rows_in
 __all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
 
 MOST = 40
-"""Free motions looked for at most: a chain of as many links without any spring."""
+"""Largest number of free motions that is counted: that of a chain of as many links without any spring."""
 
 ITERATIONS = 4
-"""Inverse iterations: each gains the ratio of the softest stiffness to the shift, seven digits."""
+"""Inverse iterations: the error falls in each by the ratio of the shift to the softest stiffness, seven digits."""
 
 SHARE = 0.05
-"""A member takes part in a motion when it turns by this share of the largest rotation."""
+"""Share of the largest rotation from which a member is named in a motion; likewise for rows that contradict."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the joints leave free and what they hold twice, in the undeformed scene.
+    """Free motions and redundant constraints of the undeformed scene.
 
     Attributes
     ----------
     mobility : int
-        Independent motions that strain nothing.
+        Number of independent motions that strain nothing.
     motions : tuple of str
-        Each in words.
+        Each of them in words.
     redundant : tuple of str
-        Names of the closings and joints that take part in redundant combinations.
+        Names of the rows that take part in redundant combinations.
     excess : int
         Number of redundant combinations.
     drifts : tuple of tuple of float
-        Directions in which all nodes may move alike.
+        Unit vectors of the free motions in which all nodes move alike, along the fixed axes.
     """
 
     mobility: int
@@ -63,7 +62,7 @@ class Diagnosis:
 
     @property
     def sentence(self) -> str:
-        """One sentence for a report."""
+        """Mobility and redundancy in one sentence for a report."""
         least = " or more" if self.mobility == MOST else ""
         free = f"mobility {self.mobility}{least}" + (f": {self.told(4)}" if self.motions else "")
         if not self.excess:
@@ -72,14 +71,14 @@ class Diagnosis:
         return f"{free}; {self.excess} redundant among {held}"
 
     def told(self, most: int) -> str:
-        """The motions in words, each sentence once; how many are left out."""
+        """Up to ``most`` motions in words, each sentence once, and how many more there are."""
         said = list(dict.fromkeys(self.motions))[:most]
         more = len(self.motions) - sum(motion in said for motion in self.motions)
         return "; ".join([*said, *([f"and {more} more"] if more else [])])
 
 
 def diagnose(equations: Equations, motions: Array) -> Diagnosis:
-    """Mobility and redundancy of a model at its undeformed state, from its :func:`free_motions` there."""
+    """Mobility and redundancy of a model in its undeformed state, from its :func:`free_motions` (unknowns, n) there."""
     state = _undeformed(equations)
     loose = loose_rows(equations, equations.at(state, equations.model.loading(0.0, 0.0)))
     names = tuple(equations.row_names[row] for row in rows_in(loose))
@@ -94,7 +93,10 @@ def _undeformed(equations: Equations) -> State:
 
 
 def free_motions(equations: Equations, weight: Array, state: State) -> Array:
-    """Motions that strain nothing at an unstrained state: columns (unknowns, n), each with one unknown of its own."""
+    """Motions that strain nothing at an unstrained state, columns (unknowns, n), dimensionless.
+
+    Each has one unknown that is 1 in it and 0 in the others.  ``weight`` is that of the rotation unknowns.
+    """
     n, rotation_unknowns = equations.unknowns, equations.rotation_unknowns
     if n == 0:
         return np.zeros((0, 0))
@@ -116,7 +118,7 @@ def free_motions(equations: Equations, weight: Array, state: State) -> Array:
 
 
 def _lowest(equations: Equations, stiffness: Array, metric: Array, count: int) -> tuple[Array, Array]:
-    """Lowest eigenvalues of the stiffness on the closings against the metric, and their motions."""
+    """Lowest eigenvalues (count,) of the stiffness on the closings by the metric, and motions (unknowns, count)."""
     n, root = equations.unknowns, np.sqrt(metric)[:, None]
     block = np.random.default_rng(1).standard_normal((n, count))
     loads = np.zeros((equations.total, count))
@@ -127,16 +129,16 @@ def _lowest(equations: Equations, stiffness: Array, metric: Array, count: int) -
     chosen = equations.column < n
     matrix = SparseMap(equations.row[chosen], equations.column[chosen], stiffness[chosen], (equations.total, n))
     products, gaps = np.split(matrix @ motions, [n])
-    # What opens a closing is no motion.
+    # The squared gaps count as stiffness: a vector that opens a closing is no free motion.
     values, turn = np.linalg.eigh(motions.T @ products + gaps.T @ gaps)
     return values, motions @ turn
 
 
 def _told_apart(motions: Array) -> Array:
-    """The same space with a basis in which each motion has an unknown that the others leave alone."""
+    """A basis of the same space in which each motion has an unknown that is 1 in it and 0 in the others."""
     basis = motions.copy()
     for i in range(basis.shape[1]):
-        # Of unknowns that move alike the first is taken, whatever rounding makes of them.
+        # Of unknowns that move equally, but for rounding, the first is taken.
         row = first_of_largest(np.abs(basis[:, i:]).max(axis=1))
         pivot = i + first_of_largest(basis[row, i:])
         basis[:, [i, pivot]] = basis[:, [pivot, i]]
@@ -148,7 +150,7 @@ def _told_apart(motions: Array) -> Array:
 
 
 def in_words(equations: Equations, motion: Array) -> str:
-    """Which members turn, and which slide along their nodes, and which nodes move, in a motion."""
+    """Words for a motion (unknowns,) of any scale: members that rotate or slide along nodes, and nodes that move."""
     model = equations.model
     motion = np.where(np.abs(motion) > tolerances.NEGLIGIBLE * np.abs(motion).max(initial=0.0), motion, 0.0)
     turned = np.where(equations.number >= 0, motion[equations.number], 0.0)
@@ -171,7 +173,7 @@ def in_words(equations: Equations, motion: Array) -> str:
 
 
 def _slid(equations: Equations, travels: Array) -> dict[str, Array]:
-    """How far the end of each member that slides along its node travels from it, the first end of two."""
+    """For each member with an end that slides along its node the travel (axes,) of the first such end from it."""
     model = equations.model
     found: dict[str, Array] = {}
     for (name, i), place in model.segments.ends.items():
@@ -182,7 +184,7 @@ def _slid(equations: Equations, travels: Array) -> dict[str, Array]:
 
 
 def _alike(travels: Array) -> Array | None:
-    """The direction of nodes that travel alike, its largest component above zero; None of others."""
+    """Unit vector (axes,) of travels (nodes, axes) that are all equal, largest component above zero; else None."""
     size = float(np.linalg.norm(travels[0]))
     if np.abs(travels - travels[0]).max() > tolerances.PARALLEL * size or size < tolerances.PARALLEL:
         return None
@@ -197,13 +199,13 @@ def _together(travels: Array) -> str:
 
 
 def _node_travels(equations: Equations, motion: Array, state: State | None = None) -> Array:
-    """Where each node travels per unit of a motion (nodes, axes), by a small step both ways."""
+    """Derivative of the displacements of nodes by the amplitude of a motion, (nodes, axes), by central differences."""
     state = _undeformed(equations) if state is None else state
     return _travels(equations, motion, state)[: len(equations.model.nodes)]
 
 
 def _travels(equations: Equations, motion: Array, state: State) -> Array:
-    """The same of all places, the nodes first."""
+    """Derivative of the displacements of all places, (places, axes), nodes first, by the amplitude of a motion."""
     loading = equations.model.loading(0.0, 0.0)
     step = np.zeros(equations.total)
     step[: equations.unknowns] = STEP * motion
@@ -213,21 +215,21 @@ def _travels(equations: Equations, motion: Array, state: State) -> Array:
 
 
 STEP = 1e-5
-"""Step of the central difference: 1e-10 of the motion is left out."""
+"""Amplitude of a motion in central differences: their error is 1e-10 of the derivative."""
 
 
 STUCK = 0.01
-"""Share of the gaps that an unknown takes away, to first order, where they are still said to be stuck."""
+"""Largest gradient of half the squared gaps, over their size, at which they count as least: no unknown closes them."""
 
 DAMPED = 40
-"""Steps towards the smallest gaps."""
+"""Largest number of Levenberg-Marquardt steps towards the smallest gaps."""
 
 
 def contradiction(equations: Equations, state: State, loading: Loading) -> str:
-    """Which motions ask for what closings and joints do not give, in words; empty where that cannot be told.
+    """Message naming prescribed motions that closings and joints do not allow; empty if that cannot be decided.
 
-    From a state on, the gaps are made as small as can be.  What is left is a combination of rows that no unknown
-    changes to first order: the motions that change it contradict each other, or the rows of the combination.
+    From the state on the norm of the gaps is minimised.  If they do not vanish they form a combination of rows that no
+    unknown changes to first order: the motions that change it contradict each other, or the rows of the combination.
     """
     if not equations.model.scene.motions or not equations.rows:
         return ""
@@ -249,7 +251,7 @@ def contradiction(equations: Equations, state: State, loading: Loading) -> str:
 
 
 def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[State, Array, float]:
-    """A state with the smallest gaps near one, by Levenberg and Marquardt, and the largest slope of their square."""
+    """A state near one with the least norm of gaps, by Levenberg-Marquardt; gaps (rows,); their largest gradient."""
     n, soft = equations.unknowns, 1e-2
 
     def at(state: State) -> Point:
@@ -278,7 +280,7 @@ def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[Stat
 
 
 def _asked(equations: Equations, state: State, loading: Loading, name: str) -> Array:
-    """Derivative of the rows by a motion, what it holds carried along."""
+    """Derivative (rows,) of the gaps by the factor of one prescribed motion, at fixed unknowns."""
     motion = equations.model.motion(name).scaled(STEP)
     ahead, behind = (loading.plus(motion.scaled(sign)) for sign in (1.0, -1.0))
     rows = [equations.at(equations.holding(state, at), at).residual[equations.unknowns :] for at in (ahead, behind)]
@@ -286,7 +288,10 @@ def _asked(equations: Equations, state: State, loading: Loading, name: str) -> A
 
 
 def moves_nodes(equations: Equations, motion: Array, state: State) -> bool:
-    """Whether a motion moves any node, or in the plane turns any member: a spin about its own axis does not."""
+    """Whether a motion (unknowns,) of any scale moves a node at a state, or in the plane rotates a member.
+
+    In space the rotation of a member about its own axis moves none.
+    """
     if not equations.model.space and np.abs(motion[: equations.rotation_unknowns]).max(initial=0.0) > 0.0:
         return True
     return bool(

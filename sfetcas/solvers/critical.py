@@ -1,8 +1,8 @@
 """Limit and bifurcation points between two points of a curve of equilibria.
 
-At a limit point the factor ceases to grow along the curve; at any other point where an eigenvalue of the energy
-on the closings changes its sign, branches cross.  Both are roots of a smooth function of the arc length, which
-are bracketed by what the two points say.
+At a limit point the factor has an extremum along the curve; at any other point where an eigenvalue of the energy
+on the closings changes its sign, branches cross.  Both are roots of a function of the arc length - the rate of the
+factor, or the eigenvalue - which the two points bracket.
 """
 
 from __future__ import annotations
@@ -21,37 +21,37 @@ from .sides import Sides
 __all__ = ["LARGEST_PRIMAL_FACTOR", "ONE_EVENT", "Event", "at_factors", "events_between", "root", "shapes_at", "sought"]
 
 SHARP = 1e-10
-"""Roots are sought to this share of the arc between the two points."""
+"""Accuracy of roots, share of the arc between the two points."""
 
 ZERO = 1e-10
-"""Share of a function's values at the two points below which there is nothing but rounding."""
+"""Values of a function that count as zero, share of the smaller of its values at the two points."""
 
 BLUR = 1e-9
-"""What rounding leaves of an eigenvalue: nearer to a bifurcation Newton's method wanders along its shape."""
+"""Accuracy of eigenvalues (dimensionless) beside a bifurcation, where Newton's method wanders along its mode."""
 
 BLURRED = 100.0
-"""Times what it should be, the blur is no reason to go on where the place is known to the share that tells roots apart.
+"""Multiple of the blur below which a value suffices once the bracket is shorter than :data:`ONE_EVENT`.
 
-That is what counts as neutral.
+For eigenvalues this is what counts as neutral.
 """
 
 ONE_EVENT = 1e-6
 """Eigenvalues that vanish within this share of the arc between the two points vanish together."""
 
 CLOSE = 0.1
-"""Share of the arc between the two points within which a point leads to the next that is looked at."""
+"""Distance within which a point that was computed serves as start of the next, share of the arc between the two."""
 
 ASIDE = 0.01
-"""Share of the arc at which a bifurcation point is interpolated from both sides."""
+"""Distance from a bifurcation point of the two points that it is interpolated from, share of the arc."""
 
 LARGEST_PRIMAL_FACTOR = 1e6
-"""Times the weight of the proximal term that holds the open direction at a bifurcation point."""
+"""Factor of the proximal term that keeps the value along the critical mode at a bifurcation point."""
 
 TRUSTED = 0.02
-"""An interpolated point is this near, rad, to what Newton's method makes of it, or it is not trusted."""
+"""Largest correction of an interpolated point, rad; with a larger one the point is searched along the arc instead."""
 
 AROUND_LIMIT = 1e-3
-"""Share of the arc that is left out on both sides of a limit point when bifurcations are looked for."""
+"""Share of the arc on both sides of a limit point in which bifurcations are not searched."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +61,11 @@ class Event:
     Attributes
     ----------
     kind : str
-        limit or bifurcation.
+        ``limit`` or ``bifurcation``.
     standing : Standing
         The point itself.
     multiplicity : int
-        Number of eigenvalues that vanish there.
+        Number of eigenvalues that vanish there; 1 for a limit point.
     """
 
     kind: Literal["limit", "bifurcation"]
@@ -74,7 +74,7 @@ class Event:
 
 
 def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
-    """Limit and bifurcation points between two neighbouring points of the curve, in their order."""
+    """Limit and bifurcation points between two neighbouring points of the curve, in the order of the arc length."""
     if a.tangent.factor * b.tangent.factor >= 0.0:
         return _bifurcations(curve, a, b)
     limit = _limit(curve, a, b)
@@ -97,7 +97,7 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     found: list[Event] = []
     for rank in range(min(before, after), max(before, after)):
         value = _eigenvalue(curve, rank, min(a.inertia.zero, b.inertia.zero))
-        # Of two that vanish together rounding leaves the same root twice, by a search to the last digit.
+        # Two eigenvalues that vanish together have the same root but for rounding: no second search to the last digit.
         together = max(ONE_EVENT * abs(value(b) - value(a)), tolerances.NEUTRAL)
         same = next((e for e in found if abs(value(e.standing)) <= together), None)
         if same is not None:
@@ -118,10 +118,10 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
 
 
 def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing:
-    """A bifurcation point cleared of what rounding does in the direction that the equations leave open there.
+    """A bifurcation point without the rounding errors along its critical mode, where the matrix is singular.
 
-    State and tangent come from two points beside it, where the equations leave nothing open; Newton's method
-    then closes what that interpolation misses, held in the open direction.
+    State and tangent are interpolated from a point on either side, where the matrix is regular; Newton's method then
+    removes the error of the interpolation without changing the value along the mode.
     """
     at, place = curve.between(a, b), found.arc - a.arc
     reach = min(ASIDE * (b.arc - a.arc), 0.5 * place, 0.5 * (b.arc - found.arc))
@@ -129,7 +129,7 @@ def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standin
     if left is None or right is None or reach == 0.0:
         return replace(found, tangent=_mean(curve, a, b))
     tangent = _mean(curve, left, right)
-    # Between the two points what counts is the way along the tangent of a, as in looking for the point.
+    # Positions between the two points are measured along the tangent of a, as in the search for the point.
     left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
     state, factor = curve.predicted(left, reach, curve.bend(left, right))
     settled = curve.corrected(state, factor, a.tangent, found.arc, primal_factor=LARGEST_PRIMAL_FACTOR)
@@ -147,7 +147,7 @@ def _mean(curve: Curve, a: Standing, b: Standing) -> Tangent:
 
 
 def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], float]:
-    """The eigenvalue with so many below it; those that vanish all along the curve do not count."""
+    """The eigenvalue with ``rank`` smaller ones, without the ``neutral`` ones that vanish all along the curve."""
 
     def value(standing: Standing) -> float:
         first, values, _ = curve.prepared.around_zero(standing.point, sharp=False)
@@ -162,12 +162,15 @@ def _eigenvalue(curve: Curve, rank: int, neutral: int) -> Callable[[Standing], f
 def sought(
     curve: Curve, a: Standing, b: Standing, value: Callable[[Standing], float], blur: float = 0.0
 ) -> Standing | None:
-    """The point between two others at which a function of the points, known to a blur, vanishes."""
+    """The point between two others at which a function of points vanishes; its values are accurate to ``blur``.
+
+    One of the two if the function does not change its sign.
+    """
     at, arc = curve.between(a, b), b.arc - a.arc
     found: dict[float, Standing] = {0.0: a, arc: b}
 
     def beside(length: float) -> Standing | None:
-        """From the nearest point found so far: from afar Newton's method may miss what is nearly singular."""
+        """The point at a length, from the nearest one computed so far; None if none is near."""
         near = min(found, key=lambda place: abs(place - length))
         share = curve.inner(found[near].tangent, a.tangent)
         if near == arc or abs(length - near) > CLOSE * arc or share < 0.5:
@@ -187,12 +190,11 @@ def sought(
 
 
 def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: float, blur: float = 0.0) -> float:
-    """A place between a and b where a function changes its sign; the better end where it does not.
+    """A root of a function between a and b, where its values are fa and fb; the better end without a change of sign.
 
-    Inverse quadratic interpolation where it can be trusted; a straight line through the last two places on one side,
-    where that shortens the step, as at the kink that the lower of two eigenvalues has where both vanish; halving
-    otherwise.  Where the function is not a number, what is known so far decides; within its ``blur`` of zero there is
-    no more to know.
+    Inverse quadratic interpolation where it can be trusted; a straight line through the last two points on one side,
+    where that shortens the step, as at the kink that the lower of two eigenvalues has where both vanish; bisection
+    otherwise.  The search ends where the function is not finite, and where its value is within ``blur`` of zero.
 
     Source: Chandrupatla 1997, A new hybrid quadratic/bisection algorithm.
     """
@@ -224,7 +226,7 @@ def root(function: Callable[[float], float], a: float, fa: float, b: float, fb: 
 
 
 def at_factors(curve: Curve, points: list[Standing], factors: tuple[float, ...]) -> list[Standing]:
-    """The points of a curve at factors, in the order in which they are met."""
+    """The points of a curve at given factors, in their order along the curve; a factor may occur several times."""
     met: list[Standing] = [points[0]] * any(points[0].factor == factor for factor in factors)
     for a, b in zip(points, points[1:], strict=False):
         low, high = min(a.factor, b.factor), max(a.factor, b.factor)
@@ -255,9 +257,10 @@ def _at_factor(curve: Curve, a: Standing, b: Standing, factor: float) -> Standin
 
 
 def shapes_at(curve: Curve, event: Event) -> Array:
-    """Shapes of the eigenvalues that vanish at a bifurcation, (rotation unknowns, multiplicity), largest size 1.
+    """Modes whose eigenvalues vanish at a bifurcation, (rotation unknowns, multiplicity), largest entry 1 rad.
 
-    Of several, the first is what :mod:`~sfetcas.solvers.sides` takes of their space, the next of what that leaves.
+    Of several, the first is the one that :mod:`~sfetcas.solvers.sides` chooses of their space, the next that of the
+    space orthogonal to it.
     """
     _, values, shapes = curve.prepared.around_zero(event.standing.point)
     weight = curve.prepared.weight
@@ -265,7 +268,7 @@ def shapes_at(curve: Curve, event: Event) -> Array:
     if neutral is None:
         chosen = shapes[:, np.argsort(np.abs(values))[:count]]
     else:
-        # What is neutral all along the curve vanishes there, too.
+        # Eigenvalues that vanish all along the curve are among the smallest: their modes are taken out.
         still, root = neutral.weighted[: len(weight)], np.sqrt(weight)[:, None]
         chosen = shapes[:, np.argsort(np.abs(values))[: count + still.shape[1]]]
         chosen = chosen - still / root**2 @ (still.T @ chosen)

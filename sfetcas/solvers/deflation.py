@@ -1,4 +1,4 @@
-"""Newton's method that keeps away from equilibria which are known already.
+"""Deflation: Newton's method that keeps away from equilibria which are known already.
 
 Newton's method on the stationarity equations ``F`` finds minima, saddles and maxima alike.  Deflation solves
 ``m F = 0`` with ``m = prod(1 + 1/d_i^2)``, where ``d_i`` is the root mean square, over the length, of the rotation
@@ -24,20 +24,20 @@ from .prepared import Prepared
 __all__ = ["deflated", "nearest"]
 
 LONGEST = 0.7
-"""No node turns by more than this in an iteration, rad."""
+"""Largest rotation of a node in an iteration, rad."""
 
 UNDEFLATED = 1e-3
-"""Steps shorter than this, rad, go on without deflation."""
+"""Newton steps shorter than this, rad, end the deflated iteration; plain Newton steps converge from there."""
 
 OTHER_TURN = 1.5
-"""An equilibrium that turns a node by more than this, rad, from where it was led to is not the one that was meant."""
+"""Largest rotation of a node, rad, between the state that start places lead to and the equilibrium beside it."""
 
 ITERATIONS = 40
 """Iterations of a run: those that arrive at something new need 5 to 35 (measured)."""
 
 
 def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence[State]) -> Corrected | None:
-    """A run of Newton's method that keeps away from known states; None where it does not arrive."""
+    """An equilibrium by Newton's method from a state, kept away from the known states; None without convergence."""
     equations = prepared.equations
 
     def at(state: State) -> Point:
@@ -64,9 +64,9 @@ def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence
 
 
 def nearest(prepared: Prepared, loading: Loading) -> Corrected | None:
-    """The equilibrium beside the ``start`` places of nodes, stable or not; None where Newton's method finds none.
+    """The equilibrium beside the ``start`` places of nodes, stable or not; None if Newton's method finds none near.
 
-    A minimisation from there would slide down from one that is unstable.
+    A minimisation from there would leave an unstable one.
     """
     state, gap = prepared.guess(loading, settle=False)
     found = deflated(prepared, state, loading, ()) if gap <= tolerances.REACHED else None
@@ -74,7 +74,7 @@ def nearest(prepared: Prepared, loading: Loading) -> Corrected | None:
 
 
 def _slope(equations: Equations, state: State, other: State, step: Array) -> float:
-    """Derivative of ``log(1 + 1/d^2)`` along a step."""
+    """Derivative of ``log(1 + 1/d^2)`` along a step (rotation unknowns,), with d the distance of two states, rad."""
     share = equations.mass / equations.mass.sum()
     between = turned_between(equations, state, other)
     squared = float(share @ between**2) + 1e-30

@@ -6,8 +6,8 @@ one of them is zero.  Along a path a real one does so by changing its sign, and 
 them equal: then the determinant keeps its sign, while the number of eigenvalues with a negative real part changes by
 two.  A complex pair whose real part changes its sign leaves the tangent regular.
 
-What these numbers say of stability is one thing only: at a zero another equilibrium is adjacent (static divergence).
-Flutter does not show in them.
+At a zero another equilibrium is adjacent (static divergence); nothing else follows for stability: flutter does not
+show in these numbers.
 
 Source: Bolotin 1963, Nonconservative problems of the theory of elastic stability; Leipholz 1987.
 """
@@ -25,17 +25,17 @@ from .stability import ENTRIES_BLUR, LIGHT, Inertia, Stability
 __all__ = ["TangentTest"]
 
 ON_THE_AXIS = 1e-6
-"""Imaginary parts below this leave the tangent singular where the real part vanishes: eigenvalues are of size one."""
+"""Imaginary parts that count as zero where the real part vanishes, dimensionless: eigenvalues are of size one."""
 
 
 class TangentTest:
-    """The test for one model.
+    """Eigenvalues of the unsymmetric tangent on the closings, for one model; dense matrices.
 
     Parameters
     ----------
     equations : Equations
     softest : float
-        What weights are of masses, see :class:`~sfetcas.solvers.stability.StabilityTest`.
+        Ratio of weights to :attr:`Equations.mass`, see :attr:`~sfetcas.solvers.stability.StabilityTest.softest`.
     """
 
     def __init__(self, equations: Equations, softest: float) -> None:
@@ -47,9 +47,10 @@ class TangentTest:
         self._in_a = np.flatnonzero((equations.row >= n) & (equations.column < n))
 
     def _tangent(self, point: Point) -> tuple[Array, float, int]:
-        """The weighted tangent on the null space of the closings, what counts as zero, and the size of that space.
+        """The weighted tangent (n, n), the limit up to which eigenvalues count as zero, the size of the null space.
 
-        Across the null space it has its largest entry for an eigenvalue: projecting costs less than a basis does.
+        The tangent acts on the null space of the closings; on its complement it is a positive multiple of the identity,
+        larger than its largest entry, since projecting costs less than a basis of the null space.
         """
         equations, n = self._equations, self._equations.unknowns
         h, rows = np.zeros((n, n)), np.zeros((equations.rows, n))
@@ -67,22 +68,23 @@ class TangentTest:
         return h, tolerances.NEUTRAL + ENTRIES_BLUR * largest, free
 
     def _eigenvalues(self, tangent: Array) -> Array:
-        """Eigenvalues by rising real part."""
+        """Complex eigenvalues (n,) by rising real part."""
         values = np.linalg.eigvals(tangent)
         return np.asarray(values[np.argsort(values.real)])
 
     def inertia(self, point: Point) -> Inertia:
-        """Numbers of eigenvalues with a negative real part, and of vanishing ones."""
+        """Numbers of eigenvalues with negative real part, and of those that are zero to rounding."""
         tangent, limit, _ = self._tangent(point)
         values = self._eigenvalues(tangent)
         zero = int((np.abs(values) <= limit).sum())
         return Inertia(int(((values.real < 0.0) & (np.abs(values) > limit)).sum()), zero)
 
     def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
-        """Real parts of all eigenvalues, rising; zero, as none is before them; shapes, those of the smallest first.
+        """Zero, the real parts (n,) of all eigenvalues, rising, and shapes (rotation unknowns, n), rad.
 
-        All are sharp.  The shapes are columns in the order of the real parts; they are singular vectors: where
-        eigenvalues vanish these span what the tangent leaves open, while eigenvectors may coincide.
+        Zero is the number of eigenvalues below those listed; ``sharp`` changes nothing.  Shapes are right singular
+        vectors, that of the least singular value at the real part nearest to zero: where eigenvalues vanish these span
+        the null space of the tangent, while eigenvectors may coincide.
         """
         tangent = self._tangent(point)[0]
         values, vectors = self._eigenvalues(tangent).real, np.zeros_like(tangent)
@@ -90,24 +92,24 @@ class TangentTest:
         return 0, values, (vectors / self._root[:, None])[: self._equations.rotation_unknowns]
 
     def singular(self, point: Point, count: int) -> bool:
-        """Whether so many eigenvalues vanish at a point where their real parts do."""
+        """Whether the ``count`` eigenvalues nearest to the imaginary axis are real, and no complex pair."""
         values = self._eigenvalues(self._tangent(point)[0])
         nearest = values[np.argsort(np.abs(values.real))[:count]]
         return bool((np.abs(nearest.imag) <= ON_THE_AXIS).all())
 
     def depth(self, point: Point, near: float = 0.0) -> float:
-        """How far eigenvalues, or their real parts, are below zero, by ``equations.mass``; zero where none is."""
+        """Minus the lowest real part, as an eigenvalue by :attr:`Equations.mass`; zero if none is below zero."""
         tangent, limit, free = self._tangent(point)
         lowest = float(self._eigenvalues(tangent)[0].real) if free else 0.0
         return -lowest * self._softest if lowest < -limit else 0.0
 
     def below(self, point: Point) -> int:
-        """Number of real eigenvalues below zero: where there are some the tangent was singular on the way there."""
+        """Number of negative real eigenvalues; with any, the tangent was singular on the way to this state."""
         tangent, limit, _ = self._tangent(point)
         values = self._eigenvalues(tangent)
         return int(((values.real < -limit) & (np.abs(values.imag) <= limit)).sum())
 
     def test(self, point: Point) -> Stability:
-        """Without an energy there is nothing to tell."""
+        """The result "not defined": without an energy there is no stability in the sense of a minimum."""
         turning = np.zeros(self._equations.rotation_unknowns)
         return Stability("not defined", 0, np.nan, turning, np.zeros(self._equations.displacement_unknowns))

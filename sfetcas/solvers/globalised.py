@@ -1,10 +1,11 @@
-"""Newton's method from afar: the equilibrium from the undeformed state, without IPOPT.
+"""Globalised Newton method: the equilibrium from the undeformed state, without IPOPT.
 
-An iteration turns every node by a rotation vector, so that norms hold by construction and what is left is a
-minimisation of the energy on the closings.  Where the energy is not convex on them, which the signs of the pivots of
-the factorised matrix tell (Sylvester), a positive matrix takes the place of the elements' share, made firmer until the
-signs are right; steps are shortened until potential and gaps fall.  Near the answer steps are taken whole.  What is
-unstable is left along its softest shape.  Loads without potential, and what does not come down, are followed from zero.
+An iteration rotates every node by a rotation vector, so that norms hold by construction and a minimisation of the
+energy on the closings remains.  Where the energy is not convex on them, which the signs of the pivots of the factorised
+matrix show (Sylvester), positive matrices replace those of the elements, and the diagonal is shifted until the signs
+are right; steps are shortened until potential and gaps fall.  Near the answer steps are taken whole.  Unstable
+equilibria are left along the lowest mode.  Loads without potential, and cases in which no minimum is found, are
+followed from zero loads.
 
 Every operation on numbers is one of the functions of :class:`~sfetcas.solvers.program.Program`; generated C takes the
 same decisions on the same numbers, with the same :class:`Rules`.
@@ -31,7 +32,7 @@ __all__ = ["MEANINGS", "NOT_DEFINED", "Code", "Globalised", "Outcome", "Rules"]
 
 
 class Code(enum.IntEnum):
-    """How a solve ended."""
+    """How a solve ended; :data:`MEANINGS` has a sentence for each."""
 
     SOLVED = 0
     UNSTABLE = 1
@@ -49,64 +50,68 @@ MEANINGS = {
     Code.NOT_FINITE: "no equilibrium, or a result of it is not finite: the numbers left what can be computed",
     Code.BAD_ARGUMENT: "an argument or the start is not a finite number, or an argument outside of its range",
 }
-"""What the codes say."""
+"""A sentence for each code."""
 
 
 NOT_DEFINED = -1
-"""Ways out where no energy tells."""
+"""Stands for the number of negative eigenvalues where loads have no potential."""
 
 FAILED = -1_000_000
-"""Pivots of a matrix that could not be factorised."""
+"""Stands for the number of negative pivots of a matrix that could not be factorised."""
 
 FIRMEST = 1e12
-"""Firmness at which there is no use in more."""
+"""Shift of the diagonal, over the weight, at which attempts to make the matrix positive end."""
 
 LEAST = 1e-9
-"""What displacements have beside rotations where the softest shape is looked for from."""
+"""Entry of the first displacement in the start vector for the lowest mode, whose rotations are of the size of one.
+
+It decides only where no rotation takes part.
+"""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """The numbers that decide.
+    """Numbers that control the method, in process and in generated C.
 
     Attributes
     ----------
     iterations : int
-        At most, of all that is tried.
+        Largest number of Newton iterations, of all attempts together.
     converged, rounding : float
-        Relative residual that counts as converged; at which there is nothing left to gain.
+        Relative residual that counts as converged; and at which the iteration stops at once.
     gain : float
-        Share of a converged residual that a further step must leave at most, to be worth it.
+        The iteration goes on as long as a step reduces a converged residual to this share of it.
     turn : float
-        Largest rotation of a node in a step under forces, rad; moments may roll up at once.
+        Largest rotation of a node in a downhill step under forces, rad; with moments there is no limit.
     near : float
-        Steps shorter than this, rad, are taken whole.
+        Newton steps shorter than this, rad, are taken without line search.
     proximal, soft : float
-        Weight on the diagonal of rotations; softness of displacements and closings, which refinement takes back.
+        Primal regularisation, share of the weight; further regularisation of displacements (primal) and rows (dual) in
+        the factors only, whose effect iterative refinement removes.
     firm, firmer : float
-        First share of the weight by which a matrix is made firmer, and by how many times it grows.
+        First shift that makes the matrix positive, share of the weight; factor by which it grows.
     rounds : int
-        Of refinement at most.
+        Largest number of rounds of refinement.
     left : float
-        Share of the right side that refinement may leave.
+        Largest residual after refinement, share of the right side.
     armijo : float
-        Share of the promised decrease that is asked for.
+        Share of the decrease that a quadratic model promises which a step has to bring.
     noise : float
-        Rounding of the potential.
+        Rounding of the merit function, share of it.
     halvings : int
-        Of a step at most.
+        Largest number of trial lengths of a step, each half of the one before.
     escapes : int
-        Unstable equilibria that are left; none to keep what is found.
+        Largest number of unstable equilibria that are left; 0 accepts an unstable one.
     nudge : float
-        Largest rotation by which they are left, rad.
+        Largest rotation of a node along the mode by which they are left, rad.
     sweeps : int
-        Of inverse iteration for their softest shape.
+        Inverse iterations for that mode.
     corrections : int
-        Newton steps at one share of the loads.
+        Largest number of Newton steps at one share of the loads.
     shortest : float
-        Least share of the loads in a step from zero.
+        Least increment of the loads that grow from zero, share of the whole.
     far : float
-        Largest rotation of a Newton step that follows loads, rad.
+        Largest rotation of a Newton step at growing loads, rad.
     """
 
     iterations: int = 300
@@ -134,17 +139,17 @@ class Rules:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the method arrived.
+    """Result of the method.
 
     Attributes
     ----------
     code : Code
-    state : ndarray
-        As :meth:`~sfetcas.solvers.program.Program.state` reads it.
+    state : ndarray (states,)
+        As :meth:`~sfetcas.solvers.program.Program.state` reads it; nan for a bad argument.
     residual : float
-        Relative to what is added up.
+        Largest residual over its scale, dimensionless.
     negative : int
-        Ways out of the equilibrium; -1 where no energy tells.
+        Number of negative eigenvalues of the energy on the closings; -1 where loads have no potential.
     iterations : int
     """
 
@@ -157,7 +162,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Here:
-    """A state and the equations there."""
+    """A state with the results of :attr:`Program.at`; ``size`` is the relative residual, ``gaps`` a sum."""
 
     state: ca.DM
     residual: Array
@@ -179,6 +184,15 @@ class Globalised:
     program : Program
     weight : ndarray (rotation unknowns,)
         See :class:`~sfetcas.solvers.stability.StabilityTest`.
+    rules : Rules, optional
+
+    Attributes
+    ----------
+    mass, soft, seed : ndarray (total,)
+        Diagonal of shifts and of the proximal term; signs of the further regularisation; start vector for the lowest
+        mode.
+    diagonal : ndarray (total,)
+        Positions of the diagonal among the entries of the matrix.
     """
 
     def __init__(self, program: Program, weight: Array, rules: Rules | None = None) -> None:
@@ -189,7 +203,7 @@ class Globalised:
             equations.unknowns,
             equations.total,
         )
-        # What firmness acts upon: rotations by their weight, displacements; softness, with the signs of the pivots.
+        # Diagonals of shifts (rotations by their weight, displacements by 1), and of the further regularisation.
         self.mass = np.concatenate(
             [weight, np.ones(self._unknowns - self._rotation_unknowns), np.zeros(equations.rows)]
         )
@@ -198,10 +212,10 @@ class Globalised:
         )
         row, column = places_of(program.sparsity)
         self.diagonal = np.flatnonzero(row == column)
-        # Where the softest shape is looked for from: a rule of the scene, and next to nothing where nothing turns.
+        # Start vector for the lowest mode: the fields of the rule of sides, and tiny displacements.
         beside = LEAST / (1.0 + np.arange(self._unknowns - self._rotation_unknowns))
         self.seed = np.concatenate([Sides(equations).seed, beside, np.zeros(equations.rows)])
-        # What is large stays with CasADi from function to function: to change hands costs more than most of these.
+        # Large vectors stay in CasADi's type between functions: conversion costs more than most of these calls.
         self._made_firm = self._firmness()
         self._symmetric = program.model.has_potential
         if self._symmetric and self._total:
@@ -212,7 +226,7 @@ class Globalised:
     # -- linear algebra -----------------------------------------------------------------------------
 
     def _firmness(self) -> ca.Function:
-        """(entries, firm) -> entries made firmer, and the matrix of these made soft."""
+        """(entries, firm) -> entries with their diagonal shifted, and the matrix of these that is factorised."""
         entries, firm = ca.MX.sym("entries", self.program.sparsity.nnz()), ca.MX.sym("firm")
         diagonal = self.diagonal.tolist()
         target = ca.MX(entries)
@@ -222,7 +236,10 @@ class Globalised:
         return ca.Function("firmness", [entries, firm], [target, ca.MX(self.program.sparsity, soft)])
 
     def _factor(self, entries: ca.DM, firm: float) -> int:
-        """Factorise a matrix made firmer; its negative pivots, less those of the closings."""
+        """Factorise a matrix with its diagonal shifted; the number of its negative pivots less that of rows.
+
+        :data:`FAILED` if the factors break down, 0 for unsymmetric matrices.
+        """
         self._target, self._matrix = self._made_firm(entries, firm)
         if not self._symmetric or not self._total:
             return 0
@@ -240,7 +257,7 @@ class Globalised:
         return _flat(self._solver.solve(self._matrix, b))
 
     def _solved(self, b: Array) -> Array | None:
-        """Solution for the matrix factorised last, the softness taken back by refinement; None where that fails."""
+        """Solution (total,) for the last matrix without the further regularisation, by refinement; None if it fails."""
         x, best, left, last = np.zeros(self._total), None, b, np.inf
         largest = float(np.abs(b).max(initial=0.0))
         for _ in range(self.rules.rounds):
@@ -255,12 +272,12 @@ class Globalised:
         return best if last <= self.rules.left * largest else None
 
     def _newton(self, here: _Here) -> tuple[Array | None, int]:
-        """Newton's step, None where there is none, and the number of ways out."""
+        """Newton's step (total,), None if the solution fails, and the number of negative eigenvalues."""
         negative = self._factor(here.entries, 0.0)
         return (None if negative == FAILED else self._solved(-here.residual)), negative
 
     def _downwards(self, here: _Here, given: ca.DM) -> Array | None:
-        """A step downhill by a positive matrix, as firm as it takes."""
+        """A descent direction (total,) from a matrix that is positive on the closings; None if no shift gives one."""
         entries = self.program.convex(here.state, given)
         firm = 0.0
         while firm < FIRMEST:
@@ -289,10 +306,18 @@ class Globalised:
 
     # -- the method -----------------------------------------------------------------------------------
 
-    # What overflows is seen where it is not finite, in C as here.
+    # Overflow is detected by results that are not finite, as in C.
     @np.errstate(over="ignore", invalid="ignore")
     def __call__(self, given: Array, start: Array | None = None) -> Outcome:
-        """The equilibrium from a state, or from the undeformed one."""
+        """Solve for an equilibrium.
+
+        Parameters
+        ----------
+        given : ndarray (given,)
+            Loads and data that vary, dimensionless, see :meth:`~sfetcas.solvers.program.Program.given_of`.
+        start : ndarray (states,), optional
+            State to begin with; the undeformed one by default.
+        """
         program, rules = self.program, self.rules
         if not np.isfinite(given).all() or (start is not None and not np.isfinite(start).all()):
             return Outcome(Code.BAD_ARGUMENT, np.full(program.states, np.nan), np.inf, NOT_DEFINED, 0)
@@ -308,7 +333,7 @@ class Globalised:
         return replace(found, iterations=rules.iterations - self._left)
 
     def _from(self, state: ca.DM, given: ca.DM) -> Outcome:
-        """Downhill from a state, and out of what is unstable."""
+        """Downhill from a state to an equilibrium, and on from unstable ones, ``escapes`` times."""
         if not self.program.model.minimisable:
             return self._corrected(self._at(state, given), given, self._left)
         for _ in range(self.rules.escapes + 1):
@@ -355,7 +380,7 @@ class Globalised:
         return self._ended(Code.ITERATIONS, here)
 
     def _shortened(self, here: _Here, step: Array, scale: float, given: ca.DM) -> tuple[_Here, float] | None:
-        """Where a step leads, shortened until potential and gaps fall, and its share; None where they never do."""
+        """The state after a step that is halved until potential and gaps fall enough, and its share; None if never."""
         rules, n = self.rules, self._unknowns
         lam = self._multipliers(here.state)
         penalty = 2.0 * float(np.abs(lam + step[n:]).max(initial=0.0))
@@ -378,7 +403,7 @@ class Globalised:
     # -- out of what is unstable ----------------------------------------------------------------------
 
     def _nudged(self, state: ca.DM, given: ca.DM) -> ca.DM:
-        """The state moved along its softest shape to the side of lower energy."""
+        """The state displaced along its lowest mode to the side of lower energy."""
         shape = self._softest(self._at(state, given).entries)
         shape *= self.rules.nudge / max(self._length(shape), TINY)
         sides = [self._moved(state, shape, share) for share in (1.0, -1.0)]
@@ -387,7 +412,7 @@ class Globalised:
         return sides[1] if up - down > tolerances.LEVEL * max(abs(up), abs(down)) else sides[0]
 
     def _softest(self, entries: ca.DM) -> Array:
-        """The shape of the lowest eigenvalue, by inverse iteration from below it."""
+        """The mode (total,) of the lowest eigenvalue, largest entry 1, by inverse iteration with a shift below it."""
         firm = self.rules.firm
         while self._factor(entries, firm) != 0 and firm < FIRMEST:
             firm *= self.rules.firmer
@@ -401,7 +426,7 @@ class Globalised:
     # -- loads that grow ------------------------------------------------------------------------------
 
     def _followed(self, given: Array) -> Outcome:
-        """Where the loads lead, growing from zero."""
+        """The equilibrium that is reached as the loads grow from zero."""
         program, rules = self.program, self.rules
         share, reached, step = 0.0, program.begin(self._shared(given, 0.0)), 1.0
         found = None
@@ -423,7 +448,7 @@ class Globalised:
         return found
 
     def _shared(self, given: Array, share: float) -> ca.DM:
-        """What is given with a share of all loads and motions."""
+        """The vector of what is given with a share of all loads and motions; data are not scaled."""
         loads = self.program.slice_of_loads
         return ca.DM(np.concatenate([given[: loads.start], share * given[loads]]))
 

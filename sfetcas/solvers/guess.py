@@ -1,4 +1,4 @@
-"""States to start from: supports, closings and motions satisfied as far as possible, straight chains bent."""
+"""Start states: supports, closings and motions satisfied as far as possible, straight chains bent."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from .redundancy import loose_rows
 __all__ = ["first_guess", "lacks_slack", "lead", "restore"]
 
 LEADING, SETTLING = 30, 10
-"""Steps in which nodes are led to the places wished for them, and in which they settle there."""
+"""Steps in which the targets of nodes move to their start places, and further steps with the targets at rest."""
 
 LONGEST, CLOSING = 0.5, 60
-"""Steps that close gaps and lead nodes turn no node by more, rad; so many of them close gaps, at most."""
+"""Largest rotation of a node, rad, in a step that closes gaps or leads nodes; most steps to close gaps."""
 
 SPRING = 300.0
 """Stiffness of the springs that lead nodes, EI/L^3 of the scene: stiffer than beams, soft enough to yield."""
 
 SHORT_STEP = 0.3
-"""The same, rad, from a ``start`` that a user gave: the basin it lies in is not to be left."""
+"""Largest rotation of a node, rad, in a step downhill from a ``start`` of a user, so as not to leave its basin."""
 
 BOW = 0.2
 """Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
 
 
 def lacks_slack(equations: Equations) -> bool:
-    """Whether straight members keep closings from giving way to first order; what joints hold twice does not count.
+    """Whether straight members make rows redundant: they cannot shorten to first order.
 
-    A bow of the members gives slack, redundant joints stay redundant.
+    Redundant joints do not count: their rows stay redundant when the members are bent slightly.
     """
     state = equations.start(equations.model.loading(0.0, 0.0))
     nothing = equations.model.loading(0.0, 0.0)
@@ -49,10 +49,10 @@ def lacks_slack(equations: Equations) -> bool:
 
 
 def restore(equations: Equations, state: State, loading: Loading, weight: Array) -> tuple[State, float]:
-    """A state near the given one that satisfies closings, motions and joints, and the gap that is left.
+    """A state near the given one that satisfies closings, motions and joints, and its largest gap, dimensionless.
 
-    Each step is the smallest change in the elastic energy of the undeformed scene that closes the linearised
-    gaps, shortened to :data:`LONGEST`.
+    Each step closes the linearised gaps with the least elastic energy by the stiffness of the undeformed scene, and is
+    shortened to :data:`LONGEST`.  ``weight`` is that of the rotation unknowns; the multipliers of the state are zero.
     """
     state = replace(equations.holding(state, loading), lam=np.zeros(equations.rows))
     n, rows = equations.unknowns, equations.rows
@@ -79,10 +79,11 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
 
 
 def lead(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> tuple[State, float]:
-    """The unloaded scene with some nodes pulled towards places, and how far they stay from them.
+    """The unloaded scene with springs between some nodes and targets, and the largest distance from these.
 
-    ``targets`` (nodes * axes, nan where none) are displacements.  Springs pull the nodes along straight ways, so
-    that beams take the short turn, and yield where a place cannot be reached.
+    ``targets`` (places * axes,) are displacements, dimensionless, nan for components without one; ``weight`` is that
+    of the rotation unknowns.  The targets move to their places on straight lines, so that beams rotate the short way;
+    the springs yield where a place cannot be reached.
     """
     unloaded = loading.unloaded()
     chosen = np.flatnonzero(np.isfinite(targets))
@@ -107,11 +108,12 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
 
 
 def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle: bool = True) -> tuple[State, float]:
-    """A state to start from, and the gap of the closings that is left.
+    """A start state and its largest gap, dimensionless (lengths over that of the model, or rad).
 
-    The undeformed scene, its rotations carried along by the prescribed ones; straight members bent where the
-    closings would otherwise have no slack (a straight member cannot shorten to first order); then closings,
-    motions and the ``start`` places of nodes satisfied as far as possible; then, to ``settle``, downhill.
+    The undeformed scene with the prescribed rotations interpolated between their nodes; straight members bent where
+    the closings would otherwise have no slack (a straight member cannot shorten to first order); then closings,
+    motions and the ``start`` places of nodes satisfied as far as possible; then, with ``settle``, steps downhill in
+    the potential.  ``weight`` (rotation unknowns,) is the one of the stability test.
     """
     state = equations.start(loading)
     if np.any(loading.turn):
@@ -128,7 +130,7 @@ def first_guess(equations: Equations, loading: Loading, weight: Array, *, settle
 
 
 def _placed(equations: Equations, state: State, loading: Loading, weight: Array, targets: Array) -> State:
-    """The state with its nodes near their targets, of two slight bows or, if need be, of several ways to curl up."""
+    """The state with its nodes near their targets, from two slightly bent shapes or, if needed, several curled ones."""
 
     def tried(turns: tuple[float, ...]) -> tuple[float, float, State]:
         sides = []
@@ -139,16 +141,16 @@ def _placed(equations: Equations, state: State, loading: Loading, weight: Array,
         return _least(sides)
 
     best = tried((0.5, -0.5))
-    # Where both ends are held, curls would change the twist that motions prescribe.
+    # With both ends fixed, curls would change the twist that motions prescribe.
     if best[0] > 0.0 and equations.rows <= equations.displacement_unknowns:
         best = _least([best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0))])
     return replace(best[2], lam=np.zeros(equations.rows))
 
 
 def _curls(equations: Equations, turns: tuple[float, ...]) -> list[Array]:
-    """Rotation vectors growing with the distance from the ground to the given turns, rad, about section axes.
+    """Fields of rotation vectors (rotations, 3), rad, growing with the distance from the ground to the given angles.
 
-    The axes are those of the member that comes first in the alphabet.
+    They rotate about section axes of the member that comes first in the alphabet.
     """
     model = equations.model
     far = _distances(model)
@@ -159,7 +161,7 @@ def _curls(equations: Equations, turns: tuple[float, ...]) -> list[Array]:
 
 
 def _distances(model: Model) -> Array:
-    """Shortest length along members from the ground to each rotation."""
+    """Shortest length (rotations,) along members from the ground to each rotation, m; 0 where there is no way."""
     lengths = {name: line.length for name, line in model.scene.center_lines.items()}
     to_node = {name: 0.0 if node.support != "free" else np.inf for name, node in model.scene.nodes.items()}
     for _ in model.nodes:
@@ -177,7 +179,7 @@ def _distances(model: Model) -> Array:
 
 
 def _turned_by(equations: Equations, state: State, vectors: Array) -> Array:
-    """Rotations of a state turned further by rotation vectors where they are free."""
+    """Rotations of a state after further rotation by vectors (rotations, 3), rad, of those that are free."""
     vectors = np.where((equations.model.rotations.kind == RotationFreedom.FREE)[:, None], vectors, 0.0)
     if equations.model.space:
         return quaternion.multiply(quaternion.from_rotation_vector(vectors), state.q)
@@ -185,7 +187,7 @@ def _turned_by(equations: Equations, state: State, vectors: Array) -> Array:
 
 
 def _wished(equations: Equations) -> Array | None:
-    """Displacements to the ``start`` places, dimensionless, nan where none is given."""
+    """Displacements (places * axes,) to the ``start`` places, dimensionless, nan for other nodes; None without any."""
     model = equations.model
     axes = model.element.axes
     targets = np.full((len(model.segments.places), axes), np.nan)
@@ -196,7 +198,7 @@ def _wished(equations: Equations) -> Array | None:
 
 
 def _carried(equations: Equations, loading: Loading) -> State:
-    """Prescribed rotation vectors spread over the scene like heat, members being rods."""
+    """The undeformed state with prescribed rotation vectors interpolated harmonically, members as conducting rods."""
     model = equations.model
     count = len(model.rotations.kind)
     names = tuple(name for name, ends in model.rotations.ends.items() if len(ends) == 2)
@@ -228,7 +230,7 @@ def _carried(equations: Equations, loading: Loading) -> State:
 
 
 def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -> State:
-    """Straight members bent by a slight bow, each or as chains, to the side that takes least energy."""
+    """Straight members bent slightly, each by itself or chains as a whole, to the side of least potential."""
     sides = []
     for vectors in (_bow(equations), _tent(equations)):
         for sign in (1.0, -1.0):
@@ -239,27 +241,27 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
 
 
 def _least(sides: list[tuple[float, float, State]]) -> tuple[float, float, State]:
-    """The state of least gap, then energy: symmetric ones differ by rounding only, of them the first."""
+    """The entry of least gap, then energy; of those that differ by rounding only, as mirror images do, the first."""
     least = min(side[:2] for side in sides)
     margin = 1e-9 * max(1.0, abs(least[1]))
     return next(side for side in sides if side[0] == least[0] and side[1] <= least[1] + margin)
 
 
 def _tent(equations: Equations) -> Array:
-    """Rotations that raise the middle of chains between held nodes: one way going out, the other coming back."""
+    """Rotation vectors (rotations, 3), rad, that raise the middle of chains between fixed nodes like a tent."""
     model, bow = equations.model, _bow(equations)
     far, vectors = _distances(model), np.zeros((len(equations.model.rotations.kind), 3))
     for name in model.members:
         chain = model.chain(name)
         direction = np.abs(bow[chain]).max(axis=0) * np.sign(bow[chain][1])
         slope = np.gradient(far[chain], model.along(name)) / model.scene.center_lines[name].length
-        # In the middle of a chain it is zero, but for rounding.
+        # The slope vanishes in the middle of a chain, but for rounding.
         vectors[chain] = np.sign(np.round(slope, 6))[:, None] * direction
     return vectors
 
 
 def _bow(equations: Equations) -> Array:
-    """Rotation vectors of a slight bow of each straight member about its weak axis."""
+    """Rotation vectors (rotations, 3), rad, of a slight bow of each straight member about its weak axis."""
     model = equations.model
     vectors = np.zeros((len(model.rotations.kind), 3))
     for name in model.members:

@@ -1,8 +1,8 @@
-"""Motions along which an equilibrium stays one: a curve of equilibria is then one of many, and does not go along them.
+"""Neutral motions: families of equilibria, as the buckled shape of a ring that can travel round it.
 
-A mesh resists such a motion a little where the structure does not, as a round ring of elements does that of its buckled
-shape round it.  What is out of balance along the motion is then the mesh's share: it is left, and no step of Newton's
-method goes along the motion.  From point to point of a curve the motion is found anew by one inverse iteration.
+A curve of equilibria then is one of many, and does not go along such motions.  The mesh resists them a little where the
+structure does not; the residual along them is this artefact of the mesh: it is ignored, and no step of Newton's method
+goes along them.  From point to point of a curve the motions are updated by one inverse iteration.
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ __all__ = ["Neutral"]
 
 @dataclass(frozen=True, eq=False)
 class Neutral:
-    """Motions of one state.
+    """Neutral motions of one state, dimensionless.
 
     Attributes
     ----------
     weighted : ndarray (total, motions)
         The rotation unknowns of the motions times their weight, zero elsewhere.
     motions : ndarray (total, motions)
-        The same motions with the displacements and multipliers that belong to them; ``weighted.T @ motions`` is the
-        unit matrix.
+        The motions with all unknowns, and with the rates of the multipliers; ``weighted.T @ motions`` is the identity.
     """
 
     weighted: Array
@@ -34,7 +33,10 @@ class Neutral:
 
     @staticmethod
     def right(shapes: Array, weight: Array, total: int) -> Array:
-        """Right sides (total, motions) for which the Newton matrix answers with the motions, near these shapes."""
+        """Right sides (total, motions) of an inverse iteration from shapes (rotation unknowns, motions).
+
+        Weight times the shapes, orthonormalised in the weight; zero for displacements and rows.
+        """
         weighted = np.zeros((total, shapes.shape[1]))
         root = np.sqrt(weight)[:, None]
         columns, turn = np.linalg.qr(root * shapes)
@@ -43,20 +45,23 @@ class Neutral:
 
     @classmethod
     def answered(cls, weighted: Array, answer: Array, weight: Array) -> tuple[Neutral, Array]:
-        """The motions from the answer of the Newton matrix to weighted shapes, and their eigenvalues."""
+        """The motions and their eigenvalues (motions,) from the solution for the right sides ``weighted``.
+
+        ``answer`` (total, motions) is the solution with the Newton matrix.
+        """
         compliance = weighted.T @ answer
         values = np.linalg.eigvals(np.linalg.inv(compliance))
         right = cls.right(answer[: len(weight)], weight, len(answer))
         return cls(right, answer @ np.linalg.inv(right.T @ answer)), values.real
 
     def moved(self, answer: Array) -> Neutral:
-        """What stands still with the same weighted shapes at a state whose Newton matrix answers so to these."""
+        """The motions at another state, from the solution (total, motions) of its matrix for :attr:`weighted`."""
         return Neutral(self.weighted, answer @ np.linalg.inv(self.weighted.T @ answer))
 
     def without(self, step: Array) -> Array:
-        """A step (total,) or several, (total, n), but for what goes along the motions."""
+        """A step (total,), or several (total, n), without its part along the motions."""
         return np.asarray(step - self.motions @ (self.weighted.T @ step))
 
     def balanced(self, residual: Array) -> Array:
-        """What is out of balance (total,) but for the share along the motions."""
+        """A residual (total,) without its part along the motions."""
         return np.asarray(residual - self.weighted @ (self.motions.T @ residual))

@@ -1,8 +1,8 @@
-"""Newton's method, stated once: the loop that all iterations of states go through, and corrections to rounding.
+"""Newton's method: the loop that all iterations of states share, and corrections to rounding.
 
-What differs between its uses, the matrix of a step, how far it is taken and when it has arrived, are functions given to
-:func:`newton`.  :func:`correct` goes from a near state to an equilibrium of a :class:`System`: under given loads, or
-across a direction of a curve whose factor is unknown, too.  :func:`descend` goes downhill from a far one.
+What differs between its uses - the matrix of a step, the length of it, the end of the iteration - are functions given
+to :func:`newton`.  :func:`correct` converges from a near state to an equilibrium of a :class:`System`: under given
+loads, or with unknown factor, orthogonal to a direction of a curve.  :func:`descend` minimises from a far state.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 TURN = 1.2
-"""Largest rotation (rad) of a step downhill under forces."""
+"""Largest rotation of a node, rad, in a step of :func:`descend` under forces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Iterate:
     ----------
     state : State
     point : Point
-        The equations there, as the steps see them.
+        The equations there, as the functions of steps take them.
     length : float
         Largest rotation of the step that led here, rad; infinite at the first state.
     count : int
@@ -71,20 +71,21 @@ def newton(
     arrived: Callable[[Reached], bool],
     iterations: int,
 ) -> tuple[Reached, bool]:
-    """The loop: where it ended, and whether it has arrived there.
+    """The loop of Newton's method: its last iterate, and whether that one has converged.
 
     Parameters
     ----------
     here : Iterate
-        Where it begins.
+        The first iterate.
     step : callable
-        The change of all unknowns and multipliers from an iterate; a singular matrix ends the loop.
+        Iterate -> change (total,) of all unknowns and multipliers; LinAlgError and values that are not finite end the
+        loop.
     after : callable
-        Where a step leads; None where it is refused, which ends the loop.
+        (iterate, change) -> next iterate, or None to end the loop.
     arrived : callable
-        Whether an iterate is what is looked for.
+        Iterate -> whether it has converged.
     iterations : int
-        Steps at most.
+        Largest number of steps.
     """
     for _ in range(iterations):
         if arrived(here):
@@ -103,7 +104,10 @@ def newton(
 def moving(
     equations: Equations, at: Callable[[State], Point], longest: float = np.inf
 ) -> Callable[[Iterate, Array], Iterate]:
-    """Where a step leads that is shortened to turn no node by more than ``longest``, rad, for :func:`newton`."""
+    """The function ``after`` of :func:`newton` that shortens a step (total,) to rotations of at most ``longest``, rad.
+
+    ``at`` evaluates the equations at a state.
+    """
 
     def after(here: Iterate, step: Array) -> Iterate:
         length = turned_by(equations, step)
@@ -114,16 +118,19 @@ def moving(
 
 
 def turned_by(equations: Equations, step: Array) -> float:
-    """Largest rotation of a step, rad."""
+    """Largest rotation, rad, in a step (unknowns or more,)."""
     return float(np.abs(step[: equations.rotation_unknowns]).max(initial=0.0))
 
 
 def newton_step(equations: Equations, point: Point, weight: Array) -> Array:
-    """The step of all unknowns and multipliers, with a proximal term of a ``weight`` (rotation unknowns,)."""
+    """Newton's step (total,), dimensionless, with a proximal term of a ``weight`` (rotation unknowns,).
+
+    Multipliers of redundant rows do not change.
+    """
     equations.solver.factor(equations.regularised(point.entries, tolerances.PROXIMAL * weight, tolerances.DUAL))
     step = equations.solver.solve(-point.residual)
     if redundant(equations, point):
-        # Of redundant closings only the softness above limits the multipliers: their loose part has no meaning.
+        # Only the dual regularisation above limits the multipliers of redundant rows: that part has no meaning.
         rows, loose = slice(equations.unknowns, None), loose_rows(equations, point)
         if loose.size:
             step[rows] -= loose @ (loose.T @ step[rows])
@@ -144,25 +151,25 @@ class System(Protocol):
         """Loads and motions at a factor."""
 
     def with_prescribed(self, state: State, loading: Loading) -> State:
-        """The state with prescribed rotations where the motions want them."""
+        """The state with prescribed rotations at the values of a loading."""
 
     def seen(self, state: State, point: Point) -> Point:
-        """The equations as the steps see them, from those at a state."""
+        """The equations to be solved at a state, from the stationarity equations there."""
 
     def step(self, here: Balance) -> Array:
-        """Newton's step of all unknowns and multipliers, and then of the factor where it is unknown."""
+        """Newton's step, dimensionless: (total,), or (total + 1,) with the factor last where that is unknown."""
 
     def suffices(self, here: Balance) -> bool:
-        """Whether the iterate is good enough for what is wanted of it, before rounding is reached."""
+        """Whether the iterate is accurate enough for its purpose, before rounding is reached."""
 
     @property
     def complete(self) -> bool:
-        """Whether the steps see nothing but what acts on the structure, so that what is found is an equilibrium."""
+        """Whether :meth:`seen` adds no force, so that a solution is an equilibrium."""
 
 
 @dataclass(frozen=True)
 class AtLoads:
-    """An equilibrium under given loads and motions.
+    """An equilibrium under given loads and motions, dimensionless.
 
     Attributes
     ----------
@@ -171,12 +178,12 @@ class AtLoads:
     weight : ndarray (rotation unknowns,)
         Weight of the proximal term, see :class:`~sfetcas.solvers.stability.StabilityTest`.
     tangent : ndarray, optional
-        Entries of the Newton matrix of the equilibrium that is left, for the first step: then it goes along the
-        path, while the matrix under the new load may already point away from it.
+        Entries of the Newton matrix at the equilibrium under the loads before, for the first step: it then goes along
+        the path, while the matrix under the new loads may already point away from it.
     flat : ndarray, optional
-        Shapes of a flat energy, columns (rotation unknowns, shapes): no step goes along them.
+        Neutral modes, columns (rotation unknowns, modes): no step goes along them.
     drag : callable, optional
-        Adds couples that resist to the equations, see :class:`~sfetcas.solvers.pseudo_transient.Drag`; the point that
+        Adds resisting moments to the equations, see :class:`~sfetcas.solvers.pseudo_transient.Drag`; the point that
         is returned has none.
     """
 
@@ -188,27 +195,27 @@ class AtLoads:
     drag: Callable[[State, Point], Point] | None = None
 
     def loading(self, factor: float) -> Loading:
-        """The loads that are given."""
+        """The given loads, whatever the factor."""
         return self.loads
 
     def with_prescribed(self, state: State, loading: Loading) -> State:
-        """The state with prescribed rotations where the motions want them."""
+        """The state with prescribed rotations at the values of a loading."""
         return self.equations.holding(state, loading)
 
     def seen(self, state: State, point: Point) -> Point:
-        """Without the gaps of redundant closings that no unknown closes, and with drag."""
+        """The equations with drag and without the gaps of redundant rows, which no unknown closes."""
         point = met(self.equations, point)
         return point if self.drag is None else self.drag(state, point)
 
     def step(self, here: Balance) -> Array:
-        """Newton's step, along the tangent at first."""
+        """Newton's step (total,), dimensionless; the first one with the matrix of ``tangent`` if given."""
         point = here.point
         if self.tangent is None or here.count:
             return self._without_flat(newton_step(self.equations, point, self.weight))
         step = newton_step(self.equations, replace(point, entries=self.tangent), self.weight)
         turned = step[: self.equations.rotation_unknowns]
         resisted = tolerances.PROXIMAL * float(self.weight @ turned**2) <= 0.1 * abs(float(step @ point.residual))
-        # Of an unloaded mechanism of rigid members little but the proximal term resists: it has no stiffness yet.
+        # The tangent of an unloaded mechanism of rigid members has little but the proximal term: it is not used then.
         return self._without_flat(step if resisted else newton_step(self.equations, point, self.weight))
 
     def _without_flat(self, step: Array) -> Array:
@@ -218,32 +225,33 @@ class AtLoads:
         return step
 
     def suffices(self, here: Balance) -> bool:
-        """Nothing but rounding does."""
+        """False: the iteration goes on to rounding."""
         return False
 
     @property
     def complete(self) -> bool:
-        """Unless there is drag."""
+        """Whether there is no drag."""
         return self.drag is None
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How far :func:`correct` may go.
+    """Limits of :func:`correct`; it gives up with the first step beyond one.
 
     Attributes
     ----------
     iterations : int
+        Largest number of steps.
     most : float
-        A later step than the first may turn no node by more, rad.
+        Largest rotation of a node in any step but the first, rad.
     contraction, short : float
-        No step may be longer than the first of these times the one before, or than the second, rad.
+        A step longer than ``short``, rad, must not exceed ``contraction`` times the one before.
     turned : float
-        No node may turn by more than this in all steps together, rad.
+        Largest sum of the largest rotations of all steps, rad.
     near : float
-        A state with a residual of this is an equilibrium but for corrections: of them no shrinking is asked.
+        Relative residual up to which ``most``, ``contraction`` and ``short`` do not apply; at least ``CONVERGED``.
     returns : bool
-        Whether the first state is the answer where it is in balance and steps do not gain, or lose it.
+        Whether the first state is returned if it is in balance and the steps did not improve it or diverged.
     """
 
     iterations: int = 12
@@ -257,10 +265,10 @@ class Limits:
 
 @dataclass(frozen=True)
 class Corrected:
-    """Where :func:`correct` arrived.
+    """Result of :func:`correct`.
 
-    ``first`` and ``second`` are the largest rotations (rad) of the first two steps: how far the equations were
-    from linear.
+    ``point`` are the equations at the state, ``residual`` is relative to their scale.  ``first`` and ``second`` are
+    the largest rotations, rad, of the first two steps: their ratio shows how nonlinear the equations were.
     """
 
     state: State
@@ -275,9 +283,10 @@ class Corrected:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Balance(Iterate):
-    """An iterate of :func:`correct`, with the loads that act and what is out of balance beside what is added up.
+    """An iterate of :func:`correct`, with its loading, factor and relative residual.
 
-    ``plain`` are the equations as they are, and ``over`` says that there is nothing more to gain.
+    ``plain`` are the stationarity equations, ``point`` those that :meth:`System.seen` makes of them; ``over`` says that
+    further steps cannot improve it.
     """
 
     plain: Point
@@ -288,9 +297,18 @@ class Balance(Iterate):
 
 
 def correct(system: System, state: State, *, factor: float = 1.0, limits: Limits | None = None) -> Corrected:
-    """Newton's method from a near state down to rounding: as long as a step gains a factor of 4.
+    """Newton's method from a near state down to rounding: as long as a step reduces the residual to a fourth.
 
-    What rounding of the state keeps out of balance has converged as well.
+    A residual that rounding of the state explains counts as converged, too.  Multipliers of redundant rows follow the
+    rule of :mod:`~sfetcas.solvers.sharing`.
+
+    Parameters
+    ----------
+    system : System
+    state : State
+    factor : float
+        First value of the factor; constant unless the system has an unknown one.
+    limits : Limits, optional
     """
     return _Correction(system, limits or Limits())(state, factor)
 
@@ -305,7 +323,7 @@ class _Correction:
         self.refused = False
 
     def at(self, state: State, factor: float, length: float = np.inf, count: int = 0) -> Balance:
-        """An iterate at a state, which holds what is prescribed at the factor."""
+        """The iterate at a state whose prescribed rotations are those at the factor."""
         loading = self.system.loading(factor)
         plain = self.equations.at(state, loading)
         seen = self.system.seen(state, plain)
@@ -313,7 +331,7 @@ class _Correction:
         return Balance(state, seen, length, count, plain=plain, loading=loading, factor=factor, residual=residual)
 
     def arrived(self, here: Balance) -> bool:
-        # One step is always taken: under a tiny load even the whole answer is below rounding of the stiffness.
+        # One step is always taken: under a tiny load the residual of the unloaded state is below rounding already.
         if here.over or here.residual == 0.0 or not here.count:
             return here.over or here.residual == 0.0
         return self.system.suffices(here) or (
@@ -339,7 +357,7 @@ class _Correction:
         return there
 
     def _low(self, here: Balance) -> bool:
-        """Whether a step that gains nothing shows that nothing is left to gain."""
+        """Whether a step that does not reduce the residual shows that rounding is reached."""
         if here.residual <= tolerances.CONVERGED:
             return here.count > 0 or (self.limits.returns and balanced(self.equations, here.point))
         return here.count > 0 and rounded(self.equations, here.state, here.point)
@@ -352,7 +370,7 @@ class _Correction:
             here = begin
         good, complete = here.residual <= tolerance or self.system.suffices(here), self.system.complete
         if not good and complete and not self.refused and rounded(self.equations, here.state, here.point):
-            # Rounding may leave a little more where multipliers are shared.
+            # Changed multipliers of redundant rows may have a little more rounding.
             tolerance, good = min(tolerances.BALANCED, 4.0 * here.residual), True
         found, point, residual = here.state, here.plain, here.residual
         if good and complete:
@@ -377,10 +395,11 @@ def descend(
 ) -> State:
     """Downhill towards a minimum of the potential on the closings, from any state.
 
-    Newton steps with element matrices made positive, so that each points downhill, shortened until the
-    potential (with the gaps, weighted beyond the multipliers) falls by a third of what the step promises.
-    Forces turn no node by more than ``most`` in a step, so that they do not wind a beam up; a moment may roll
-    it up at once.  Stops where steps have become short: the state is meant for IPOPT or Newton's method.
+    Newton steps with element matrices made positive, so that each points downhill, shortened until an l1 merit
+    function (the potential, and the gaps with a weight above the multipliers) falls by a third of what the step
+    promises.  No step rotates a node by more than ``most``, rad, so that forces do not wind a beam up; with moments,
+    which may roll it up at once, the default does not apply.  Stops where steps have become short: the state is meant
+    for IPOPT or Newton's method.  ``weight`` (rotation unknowns,) is that of the proximal term.
     """
     n = equations.unknowns
     most = np.inf if np.any(loading.moment) and most == TURN else most

@@ -58,8 +58,13 @@ class OpenProblem:
     ----------
     prepared : Prepared
     factor : float
+        Load factor.
     parts : EquilibriumProblem
-        Unknowns and parameters of the model and how they make up the rotations.
+        The program of the model alone, with its unknowns and parameters.
+    extended : NLP, optional
+        The program with what was added; None before that.
+    added : tuple of (str, float, int)
+        Name, unit and number of rows of each constraint that was added.
     """
 
     prepared: Prepared
@@ -81,13 +86,19 @@ class OpenProblem:
     # -- expressions ----------------------------------------------------------------------------
 
     def position(self, node: str) -> ca.MX:
-        """Position of a node, (2,) or (3,) m."""
+        """Position of a node, (2,) or (3,) m; SceneError for an unknown name."""
         _known(node, self.model.nodes, "node")
         start = np.asarray(self.model.scene.nodes[node].position)[: self.model.element.axes]
         return ca.DM(start) + self.model.scales.length * self.parts.displacement(self.model.nodes.index(node))
 
     def rotation(self, node: str) -> ca.MX:
-        """Angle of a node since the undeformed scene (plane, rad) or its quaternion (4,)."""
+        """Rotation of a node since the undeformed scene: an angle in the plane, rad, a unit quaternion (4,) in space.
+
+        Raises
+        ------
+        SceneError
+            There is no such node, or it has no rotation of its own.
+        """
         number = self.model.rotations.node_turn[_known(node, self.model.nodes, "node")]
         if number is None:
             raise SceneError(f"node {node!r} has no rotation of its own")
@@ -102,15 +113,15 @@ class OpenProblem:
         return self.parts.strain(member, at) / self.model.scales.length
 
     def answer(self, name: str) -> ca.MX:
-        """An answer by its name, as everywhere.
+        """An answer by its name, SI.
 
-        ``nodes.tip.position``; ``nodes.tip.angle``, in space ``nodes.tip.quaternion``; and
-        ``members.beam.curvature at 0.5``, less that of the unloaded member.
+        ``nodes.tip.position``, m; ``nodes.tip.angle``, rad, in space ``nodes.tip.quaternion``; and
+        ``members.beam.curvature at 0.5``, 1/m, minus that of the unloaded member.
 
         Raises
         ------
         SceneError
-            Another name.
+            Any other name.
         """
         asked = answer_name(name, "answer")
         kind, turned = (asked.kind.table, asked.kind.key), "quaternion" if self.model.space else "angle"
@@ -130,17 +141,21 @@ class OpenProblem:
     # -- extensions -----------------------------------------------------------------------------
 
     def subject_to(self, *relations: ca.MX, name: str = "", unit: float = 1.0) -> OpenProblem:
-        """With relations that have to hold: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.
+        """The problem with further constraints: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.
 
         Parameters
         ----------
-        name : what they are called among the multipliers; what they are made of without
-        unit : their size, to make them dimensionless
+        relations : MX
+            In expressions of this problem, SI.
+        name : str
+            Name of their multipliers; by default the text of the relation.
+        unit : float
+            Magnitude by which they are divided, in their own unit.
 
         Raises
         ------
         SceneError
-            What is given is no relation, its bounds contradict each other, or it has a symbol of another problem.
+            An argument is no relation, its bounds contradict each other, or it has a symbol of another problem.
         """
         statement, found = Statement(), self
         for symbol in (self.nlp.x, self.nlp.p):
@@ -151,19 +166,22 @@ class OpenProblem:
         return found
 
     def minimise(self, energy: ca.MX) -> OpenProblem:
-        """The same as :meth:`with_energy`: the potential energy and what is added to it is least."""
+        """The problem with a term (N m) added to the objective, as :meth:`with_energy`."""
         return self.with_energy(energy)
 
     def with_row(
         self, name: str, row: ca.MX, lower: ArrayLike = 0.0, upper: ArrayLike | None = None, *, unit: float = 1.0
     ) -> OpenProblem:
-        """With rows ``lower <= row <= upper``; ``unit`` is the size of the row, to make it dimensionless."""
+        """The problem with constraints ``lower <= row <= upper``; equal to ``lower`` without ``upper``.
+
+        ``unit`` is the magnitude of the row in its own unit, by which the constraint is divided.
+        """
         scaled = None if upper is None else np.asarray(upper, dtype=float) / unit
         nlp = self.nlp.with_row(name, row / unit, np.asarray(lower, dtype=float) / unit, scaled)
         return replace(self, extended=nlp, added=(*self.added, (name, unit, ca.vec(row).numel())))
 
     def with_energy(self, energy: ca.MX) -> OpenProblem:
-        """With a term (N m) added to the potential energy."""
+        """The problem with a term (N m) added to the potential energy."""
         return replace(self, extended=self.nlp.with_term(energy / self.model.scales.moment))
 
     # -- solution -------------------------------------------------------------------------------
@@ -184,13 +202,13 @@ class OpenProblem:
 
 @dataclass(frozen=True, eq=False)
 class OpenAnswer:
-    """The answer of an extended program, read by name."""
+    """The solution of an extended program, read by name in SI units."""
 
     problem: OpenProblem
     result: NLPResult
 
     def value(self, expression: ca.MX) -> Array:
-        """Value of any expression of the problem."""
+        """Value of an expression of the problem, in the unit and (squeezed) shape of the expression."""
         nlp = self.problem.nlp
         return np.asarray(
             ca.Function("value", [nlp.x, nlp.p], [expression])(self.result.x, nlp.p_value).full()
@@ -204,7 +222,13 @@ class OpenAnswer:
         return position
 
     def multiplier(self, name: str) -> Array:
-        """Multiplier of an added row in SI units: the generalised force (N m over the row's unit) that keeps it."""
+        """Multiplier (rows,) of an added constraint: the generalised force that keeps it, N m over the row's unit.
+
+        Raises
+        ------
+        SceneError
+            No constraint of this name was added.
+        """
         position = len(self.problem.parts.nlp.rows)
         for row, unit, size in self.problem.added:
             if row == name:
@@ -214,7 +238,7 @@ class OpenAnswer:
 
     @property
     def state(self) -> State:
-        """The rotations, displacements and multipliers, dimensionless."""
+        """The state with the multipliers of the model's own rows, dimensionless."""
         loading = self.problem.model.loading(self.problem.factor)
         return self.problem.parts.state(self.result.x, self.result.lam, loading)
 

@@ -36,22 +36,22 @@ from .stability import Inertia, Stability, StabilityTest
 __all__ = ["BEYOND", "Prepared"]
 
 MOST_COUNTED = 600
-"""Up to this many unknowns the eigenvalues of a tangent, all of them, take less than a second."""
+"""Largest number of unknowns for which all eigenvalues of an unsymmetric tangent take less than a second."""
 
 STALLED = {"acceptable_tol": 1e-4, "acceptable_iter": 100}
-"""Where IPOPT gets no nearer, as in the valley of a spin that next to nothing resists, Newton's method goes on."""
+"""Options that stop IPOPT where it converges slowly, as along rotations with little resistance; Newton continues."""
 
 ITERATIONS = 250
-"""Of IPOPT at most: what needs more lies in such a valley too, or there is no equilibrium at all."""
+"""Largest number of iterations of IPOPT: with more it converges as slowly, or there is no equilibrium."""
 
 BEYOND = 1e4
-"""Multipliers above this many times the loads are those of a stretched member, which has none that is finite."""
+"""Ratio of multipliers to loads above which straight members would need an infinite force to hold the state."""
 
 PRESTRESSED = 1e-3
-"""Two states nearer than this, rad, are the same but for what a prestress bends."""
+"""Largest rotation, rad, between an equilibrium and the same one without prestress of redundant members."""
 
 MOST_SWITCHES, FALLEN = 8, 400
-"""Unstable equilibria that are left in a row before giving up, and iterations of falls that end nowhere."""
+"""Largest number of attempts to leave unstable equilibria, and of iterations spent on those that fail."""
 
 
 class Prepared:
@@ -80,18 +80,21 @@ class Prepared:
 
     @functools.cached_property
     def diagnosis(self) -> Diagnosis:
-        """What the undeformed structure is free to do, and what its joints hold twice."""
+        """Free motions and redundant constraints of the undeformed structure."""
         return diagnose(self.equations, self.motions)
 
     @functools.cached_property
     def motions(self) -> Array:
-        """What the undeformed structure is free to do, see :func:`~sfetcas.solvers.constraints.free_motions`."""
+        """Motions (unknowns, n) of the undeformed structure that strain nothing, dimensionless.
+
+        See :func:`~sfetcas.solvers.constraints.free_motions`.
+        """
         undeformed = self.equations.start(self.model.loading(0.0, 0.0))
         return free_motions(self.equations, self._test.weight, undeformed)
 
     @functools.cached_property
     def lacks_slack(self) -> bool:
-        """Whether straight members keep the closings from giving way, as :func:`~sfetcas.solvers.guess.lacks_slack`."""
+        """Whether straight members make closings redundant, see :func:`~sfetcas.solvers.guess.lacks_slack`."""
         return lacks_slack(self.equations)
 
     @property
@@ -115,12 +118,12 @@ class Prepared:
         return Ipopt(iterations=ITERATIONS, objective_scale=1.0 / scale, extra=STALLED).prepare(self._problem.nlp)
 
     def guess(self, loading: Loading, *, settle: bool = True) -> tuple[State, float]:
-        """A state to start from, downhill from the ``start`` places unless it is not to ``settle``, and its gap."""
+        """A start state and its largest gap, dimensionless, see :func:`~sfetcas.solvers.guess.first_guess`."""
         return first_guess(self.equations, loading, self._test.weight, settle=settle)
 
     @property
     def started(self) -> bool:
-        """Whether ``start`` places of nodes choose among equilibria."""
+        """Whether nodes have ``start`` places, which choose among equilibria."""
         return any(node.start is not None for node in self.model.scene.nodes.values())
 
     def correct(
@@ -133,7 +136,17 @@ class Prepared:
         drag: Drag | None = None,
         **limits: Any,
     ) -> Corrected:
-        """Newton's method from a near state, see :class:`~sfetcas.solvers.newton.AtLoads`, within ``Limits``."""
+        """Newton's method from a near state to the equilibrium under a loading.
+
+        Parameters
+        ----------
+        state : State
+        loading : Loading
+        tangent, flat, drag
+            Dimensionless, see :class:`~sfetcas.solvers.newton.AtLoads`.
+        **limits
+            Fields of :class:`~sfetcas.solvers.newton.Limits`.
+        """
         system = AtLoads(self.equations, loading, self._test.weight, tangent, flat, drag)
         return correct(system, state, limits=Limits(**limits))
 
@@ -146,26 +159,29 @@ class Prepared:
         return self._test if self.model.conservative else self._tangent
 
     def stability(self, found: Corrected) -> Stability:
-        """The stability test at a state; without a potential no energy tells stable from unstable."""
+        """The stability test at an equilibrium; "not defined" for loads without potential."""
         return self._tester.test(found.point)
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
-        """Numbers of negative and of vanishing eigenvalues, these only where it is ``doubtful``; paths ask here.
+        """Numbers of negative and of zero eigenvalues, in large models the latter only if ``doubtful``; for paths.
 
-        Without a potential of those of the tangent, see :class:`~sfetcas.solvers.divergence.TangentTest`.
+        For loads without potential those of the tangent, see :class:`~sfetcas.solvers.divergence.TangentTest`.
         """
         return self._test.inertia(point, doubtful=doubtful) if self.model.conservative else self._tangent.inertia(point)
 
     def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
-        """Eigenvalues around zero as :class:`~sfetcas.solvers.stability.StabilityTest`; real ones without potential."""
+        """Eigenvalues (n,) around zero, dimensionless, and shapes, see :meth:`StabilityTest.around_zero`.
+
+        For loads without potential their real parts, see :meth:`TangentTest.around_zero`.
+        """
         return self._tester.around_zero(point, sharp=sharp)
 
     def singular(self, point: Point, count: int) -> bool:
-        """Whether so many eigenvalues vanish where their real parts do: always where there is an energy."""
+        """Whether the ``count`` eigenvalues nearest to the imaginary axis are real: always with a potential."""
         return self.model.conservative or self._tangent.singular(point, count)
 
     def negative(self, found: Corrected) -> int:
-        """Number of negative eigenvalues at a state; none is counted where :attr:`switches_branch` is false."""
+        """Number of negative eigenvalues at an equilibrium; 0 if :attr:`switches_branch` is false."""
         if not self.switches_branch:
             return 0
         if self.model.conservative:
@@ -173,47 +189,47 @@ class Prepared:
         return self._tangent.inertia(found.point).negative
 
     def diverged(self, found: Corrected) -> int | None:
-        """Real eigenvalues of the tangent below zero, loads without potential; None where it is too large for them."""
+        """Number of negative real eigenvalues of the tangent, for loads without potential; None if not countable."""
         return self._tangent.below(found.point) if self.countable else None
 
     @property
     def countable(self) -> bool:
-        """Whether all eigenvalues of a tangent, without a potential, are found in less than a second."""
+        """Whether the model is small enough for all eigenvalues of an unsymmetric tangent."""
         return self.equations.unknowns <= MOST_COUNTED
 
     @property
     def switches_branch(self) -> bool:
-        """Whether unstable states can be left: there is an energy and, where its value is not known, not too much."""
+        """Whether unstable states can be left: a potential exists, and it is computed or the model is not large."""
         return self.model.minimisable or (self.model.conservative and self.countable)
 
     def spectrum(self, found: Corrected, count: int) -> tuple[Array, Array]:
-        """Eigenvalues and lowest shapes at a state, see :meth:`StabilityTest.spectrum`."""
+        """All eigenvalues, dimensionless, and lowest shapes at an equilibrium, see :meth:`StabilityTest.spectrum`."""
         return self._test.spectrum(found.point, count)
 
     @property
     def weight(self) -> Array:
-        """Weight of the rotation unknowns, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
+        """Weight (rotation unknowns,), dimensionless, see :class:`~sfetcas.solvers.stability.StabilityTest`."""
         return self._test.weight
 
     @property
     def softest(self) -> float:
-        """The size of eigenvalues in what the softest member does, see the same."""
+        """Ratio of :attr:`weight` to :attr:`Equations.mass`, see :attr:`StabilityTest.softest`."""
         return self._test.softest
 
     def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
-        """IPOPT from a state, then Newton's method to rounding; the equilibrium and IPOPT's iterations.
+        """IPOPT from a state, then Newton's method to rounding; the equilibrium and the number of IPOPT's iterations.
 
         Raises
         ------
         SolveError
-            No equilibrium: what IPOPT says of it.
+            Loads have no potential, or no equilibrium was found; the message says what IPOPT reported.
         """
         if not self.model.minimisable:
             mesh = counted(self.model.mesh.elements, "element", "elements")
             detail = f"Newton's method did not converge on {mesh}, and loads without potential cannot be minimised"
             raise SolveError(Status.FAILED, detail, state)
         if not self.equations.unknowns or len(self.model.row_names) > self.model.unknowns - self._norms:
-            # IPOPT takes no more equations than unknowns; redundant ones leave little to minimise, held scenes nothing.
+            # IPOPT accepts no more equations than unknowns: Newton's method for redundant rows, or if nothing can move.
             found = self.downhill(state, loading) or self.correct(state, loading, iterations=50)
             if not found.converged:
                 detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
@@ -233,15 +249,15 @@ class Prepared:
             raise SolveError(Status.FAILED, result.message, state)
         polished = self.correct(trial, loading)
         if not polished.residual <= tolerances.BALANCED and result.status not in (Status.INFEASIBLE, Status.UNBOUNDED):
-            # Quaternions leave a long valley by short steps only, rotations by long ones.
+            # Along a long flat valley steps in quaternions are short; increments of rotations allow long ones.
             polished = self.downhill(trial, loading) or polished
-        # What falls without end has no finite residual, which no comparison would find too large.
+        # A structure that falls without end has residual nan, for which every comparison is false: hence the "not".
         if not polished.converged and not polished.residual <= tolerances.BALANCED:
             status = result.status if result.status is not Status.SOLVED else Status.FAILED
             detail = f"IPOPT: {result.message}, {counted(result.iterations, 'iteration')}"
             if result.status is Status.SOLVED:
                 detail = f"IPOPT came to rest after {counted(result.iterations, 'iteration')}"
-            # What IPOPT notices of closings that cannot be, or only by members drawn straight, hangs on rounding.
+            # Whether IPOPT detects closings that are infeasible, or need stretched members, depends on rounding.
             told = contradiction(self.equations, state, loading)
             if told:
                 status, detail = Status.INFEASIBLE, told
@@ -253,10 +269,10 @@ class Prepared:
         return self._without_prestress(polished, loading), result.iterations
 
     def _without_prestress(self, found: Corrected, loading: Loading) -> Corrected:
-        """The same equilibrium with the multipliers of members that stretch alike where closings are redundant.
+        """The equilibrium with the multipliers of redundant rows by the rule of :mod:`~sfetcas.solvers.sharing`.
 
-        Of these IPOPT leaves what happens to come out, up to what buckles members: with such a prestress, which
-        nobody applied, what is stable would look unstable.
+        IPOPT leaves arbitrary values of these, large enough to buckle members: with such a prestress, which nobody
+        applied, a stable equilibrium would look unstable.
         """
         loose = loose_rows(self.equations, found.point)
         if not loose.size:
@@ -264,13 +280,13 @@ class Prepared:
         self.equations.redundant = True
         without = shared(self.equations, found.state, loading, loose)
         if self.multipliers(found) > BEYOND:
-            # Where only multipliers without bound hold it, it is in balance further down.
+            # A state that only unbounded multipliers hold is left for an equilibrium of lower energy.
             return self.downhill(without, loading) or found
         least = self.correct(without, loading)
         return least if least.converged and self.distance(least.state, found.state) < PRESTRESSED else found
 
     def multipliers(self, found: Corrected) -> float:
-        """The largest multiplier over the loads, or over the unit of force."""
+        """Largest multiplier over the largest load of factor 1, or over the unit of force if that is larger."""
         return float(np.abs(found.state.lam).max(initial=0.0)) / max(1.0, self._load_size)
 
     @functools.cached_property
@@ -279,7 +295,7 @@ class Prepared:
         return Globalised(Program(expressions), self.weight, Rules(escapes=0))
 
     def globalised(self, loading: Loading) -> tuple[Corrected | None, int]:
-        """The equilibrium by Newton's method from afar, stable or not, and its iterations; None where it fails."""
+        """The equilibrium by the globalised Newton method, stable or not, and its iterations; None if it fails."""
         method = self._globalised
         start = None
         if self.lacks_slack or self.started:
@@ -291,14 +307,14 @@ class Prepared:
         return (found if found.residual <= tolerances.BALANCED else None), outcome.iterations
 
     def downhill(self, state: State, loading: Loading) -> Corrected | None:
-        """The equilibrium below a state, or where its forces carry it without an energy; None where they do not rest.
+        """The equilibrium to which pseudo-transient continuation leads from a state; None if it does not converge.
 
-        Its tangent has no eigenvalue with a real part below zero.
+        No eigenvalue of its tangent has a negative real part.
         """
         try:
             there, steps = flow(self.equations, state, loading, self._tester.depth)
         except SolveError:
-            # Nothing rests where forces without bound act.
+            # The stability test failed on a stiffness without bound: there is no equilibrium near.
             return None
         self._spent += steps
         found = None if there is None else self.correct(there, loading)
@@ -310,7 +326,7 @@ class Prepared:
         Raises
         ------
         SolveError
-            None was found.
+            No stable or neutral equilibrium was found.
         """
         amplitude, lost = 0.2, 0
         for _ in range(MOST_SWITCHES):
@@ -319,8 +335,8 @@ class Prepared:
                 found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
             except SolveError:
                 lost += self._spent - begun
-                # The flow leads down from wherever it begins: where it finds no rest a longer step finds none, but
-                # the other side of the shape may lead elsewhere.
+                # The flow leads downhill from any start: if it finds no equilibrium, a longer step finds none either,
+                # but the other side of the mode may lead elsewhere.
                 if lost >= FALLEN or (not self.model.minimisable and amplitude < 0.0):
                     break
                 amplitude *= 1.7 if self.model.minimisable else -1.0
@@ -334,8 +350,8 @@ class Prepared:
         raise SolveError(Status.FAILED, "no stable equilibrium found along the unstable modes", state)
 
     def _fallen(self, state: State, loading: Loading) -> Corrected:
-        """The equilibrium below a state."""
-        # Where closings are redundant IPOPT lets multipliers hold what falls, and leads across to the other side.
+        """The equilibrium downhill from a state, by pseudo-transient continuation or minimisation."""
+        # With redundant rows IPOPT may stop at states that only large multipliers hold, or jump to the other side.
         flows = not self.model.minimisable or bool(self.equations.redundant)
         found = self.downhill(state, loading) if flows else None
         if found is not None:
@@ -345,7 +361,10 @@ class Prepared:
         raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
 
     def nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
-        """The state moved along the unstable mode to the side of lower energy, closings restored."""
+        """The state displaced along the unstable mode to the side of lower energy, with its gaps closed again.
+
+        ``amplitude`` is the largest rotation, rad; its sign chooses the side where energies are equal or not computed.
+        """
         equations = self.equations
         sides = []
         for sign in (1.0, -1.0):
@@ -361,7 +380,7 @@ class Prepared:
         (up, first), (down, second) = sides
         if not self.model.has_potential:
             return first
-        # Near where it becomes unstable what a load gives is nearly what the strain takes.
+        # Near a bifurcation the work of the load and the strain energy nearly cancel: strain gives the size as well.
         size = max(abs(up.potential), abs(down.potential), up.strain, down.strain)
         return second if up.potential - down.potential > tolerances.LEVEL * size else first
 
@@ -372,7 +391,7 @@ class Prepared:
         return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.moment))
 
     def distance(self, a: State, b: State) -> float:
-        """Largest angle between the rotations of two states, rad."""
+        """Largest angle between the rotations of two states, rad; plane angles count whole turns."""
         if not self.model.space:
             return float(np.abs(a.q - b.q).max(initial=0.0))
         turns = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(a.q), b.q))

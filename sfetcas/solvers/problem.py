@@ -1,6 +1,6 @@
 """The equilibrium of a model as a nonlinear program that a user can extend.
 
-Unknowns are the components of the quaternions (angles in the plane) of all rotations that are not held, and the
+Unknowns are the components of the quaternions (angles in the plane) of all rotations that are not fixed, and the
 displacements retained as unknowns; rows are the norms of the quaternions, the closings and the joints.  The terms are
 those of Newton's method, differentiated by components: each function once for its kind, mapped over all terms of the
 kind and scattered by constant matrices, so the effort of building does not grow with their number.
@@ -31,18 +31,30 @@ from ..mechanics.terms import curvatures_of, slopes_of
 __all__ = ["EquilibriumProblem"]
 
 CALLS = 12.0
-"""How often functions of terms are called until IPOPT has found an equilibrium."""
+"""Expected number of evaluations until IPOPT has found an equilibrium, by which ``auto`` compiles functions or not."""
 
 
 class EquilibriumProblem:
-    """The nonlinear program of a model, with the means to write terms by the names of the scene.
+    """The nonlinear program of a model, with expressions for further terms.
+
+    Parameters
+    ----------
+    model : Model
+    loading : Loading
+        Gives the parameters their values.
+    guess : State
+        Start of the iteration.
+    kernels : str
+        ``auto``, ``compiled`` or ``interpreted`` functions of terms.
 
     Attributes
     ----------
     nlp : NLP
-        The program of a loading; its objective is the potential energy over ``model.scales.moment``.
-    x, p : MX
-        Unknowns and parameters.
+        The program of the loading; its objective is the potential energy over ``model.scales.moment``.
+    x, p : MX (unknowns,) and (parameters,)
+        Unknowns and parameters (loads, prescribed motions, values near which angles count), dimensionless.
+    row_names : tuple of str
+        Names of all rows: norms, then closings and joints.
     """
 
     def __init__(self, model: Model, loading: Loading, guess: State, *, kernels: Kernels = "auto") -> None:
@@ -104,7 +116,7 @@ class EquilibriumProblem:
 
     @functools.cached_property
     def _spread(self) -> ca.DM:
-        """What takes the unknowns to the components of all rotations that are not held."""
+        """Matrix from the unknowns to the components of all rotations; zero rows for fixed ones."""
         unknown = self._tables.unknown[: self._tables.of_places]
         used = np.flatnonzero(unknown >= 0)
         shape = (self._tables.of_places, self._tables.unknowns)
@@ -112,12 +124,12 @@ class EquilibriumProblem:
 
     @functools.cached_property
     def _unit(self) -> list[int]:
-        """Rotations with a norm to hold."""
+        """Numbers of the rotations whose quaternions have a norm as constraint."""
         return np.flatnonzero(self.model.rotations.kind != RotationFreedom.FIXED).tolist() if self.model.space else []
 
     @functools.cached_property
     def _norm_parts(self) -> tuple[Index, Index]:
-        """Row and unknown of each component in the norms."""
+        """Rows and unknowns (entries,) of the components in the norms."""
         numbers = self._tables.number[self._unit]
         rows = np.broadcast_to(np.arange(len(numbers))[:, None], numbers.shape)
         return rows[numbers >= 0], numbers[numbers >= 0]
@@ -130,7 +142,7 @@ class EquilibriumProblem:
 
     @functools.cached_property
     def _slopes(self) -> list[tuple[ca.MX, ca.MX]]:
-        """Gradients of the energy and derivatives of the rows, group by group."""
+        """Gradients of the energy and derivatives of the rows for each group of terms."""
         found = []
         for number, group in enumerate(self.model.terms):
             slopes = (ca.MX(0, 1), ca.MX(0, 1))
@@ -195,17 +207,20 @@ class EquilibriumProblem:
     # -- expressions by place ---------------------------------------------------------------------
 
     def displacement(self, node: int) -> ca.MX:
-        """Displacement of a node, dimensionless."""
+        """Displacement (axes,) of a node by its number, dimensionless."""
         axes = self.model.element.axes
         moved = self.terms.displacements(self._q, self._y, self._given)
         return ca.densify(moved[node * axes : (node + 1) * axes])
 
     def rotation(self, number: int) -> ca.MX:
-        """Components of a rotation."""
+        """Components of a rotation by its number: a quaternion (4,), scalar first, or an angle, rad."""
         return self._q[:, number]
 
     def strain(self, member: str, at: float) -> ca.MX:
-        """Curvature minus that of the unloaded member, dimensionless, about the section's axes."""
+        """Curvature minus that of the unloaded member at a fraction of its length, dimensionless.
+
+        One number in the plane, (3,) about the section's axes in space.
+        """
         model, element = self.model, self.model.element
         cuts = model.mesh.cuts[member]
         e = int(np.clip(np.searchsorted(cuts, at, side="right") - 1, 0, len(cuts) - 2))
@@ -224,7 +239,7 @@ class EquilibriumProblem:
     # -- numbers --------------------------------------------------------------------------------
 
     def parameters(self, loading: Loading, near: State | None = None) -> Array:
-        """Values of the parameters for a loading; angles that count turns are counted near those of a state."""
+        """Values (parameters,) of the parameters for a loading; angles that count turns are those near a state's."""
         model, positions = self.model, self.model.positions
         held = np.where(
             (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
@@ -237,17 +252,20 @@ class EquilibriumProblem:
         return np.concatenate(parts)
 
     def parameters_by(self, given: Given, unwrapped: Array) -> ca.MX:
-        """The same as an expression of what is given; data are those of the model."""
+        """The parameters (parameters,) as an expression of loads and motions; data are those of the model.
+
+        ``unwrapped`` (angles,), rad, are the values near which angles count turns.
+        """
         still = np.zeros((self.model.element.components, len(self.model.rotations.kind)))
         held = (self.model.rotations.kind == RotationFreedom.FIXED).astype(float)
         if self.model.space:
-            # What no motion turns stands as it stood.
+            # Fixed rotations without a prescribed motion are identities.
             still[0] = held
         turned = self.terms.with_prescribed_rotations(ca.MX(ca.DM(still)), given)
         return ca.vertcat(given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(unwrapped)), *given.loads)
 
     def unknowns(self, state: State) -> Array:
-        """The unknowns of the program at a state."""
+        """The unknowns (unknowns,) of the program at a state, dimensionless."""
         x, tables = np.zeros(self._tables.unknowns), self._tables
         unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
         used = unknown >= 0
@@ -256,7 +274,23 @@ class EquilibriumProblem:
         return x
 
     def state(self, x: Array, lam: Array, loading: Loading, near: State | None = None) -> State:
-        """The state of a solution; quaternions are made exactly unit, turns counted near those of another state."""
+        """The state of a solution of the program.
+
+        Parameters
+        ----------
+        x : ndarray (unknowns,)
+        lam : ndarray (rows of the program,)
+            Multipliers.
+        loading : Loading
+            Gives the fixed rotations.
+        near : State, optional
+            Angles that count turns are counted near those of this state; by default near the guess.
+
+        Returns
+        -------
+        State
+            With exactly normalised quaternions; nan for a quaternion that is zero.
+        """
         model, tables = self.model, self._tables
         held = np.where(
             (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
@@ -264,7 +298,7 @@ class EquilibriumProblem:
         unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
         q = held + (weight * np.append(x, 0.0)[unknown]).reshape(held.shape)
         if model.space:
-            # A quaternion that is zero has no direction: what is not finite is no solution.
+            # A zero quaternion has no direction and becomes nan, which callers refuse.
             with np.errstate(divide="ignore", invalid="ignore"):
                 q = q / np.linalg.norm(q, axis=-1, keepdims=True)
         unwrapped = model.unwrapping.angles(q, self._guessed_unwrapped if near is None else near.unwrapped)
@@ -276,5 +310,5 @@ class EquilibriumProblem:
         return slice(len(self._unit), len(self.row_names))
 
     def multipliers(self, state: State) -> Array:
-        """Multipliers of all rows at a state, those of the norms zero."""
+        """Multipliers (rows of the program,) at a state, zero for the norms, dimensionless."""
         return np.concatenate([np.zeros(len(self._unit)), state.lam])

@@ -1,9 +1,9 @@
-"""The equilibrium of a model as functions of flat vectors: what Newton's method from afar and generated C are made of.
+"""The equilibrium of a model as functions of flat vectors, for the globalised Newton method and generated C.
 
-A *state* is one vector: rotations (quaternions or angles) of all nodes, displacements retained as unknowns,
-multipliers, and the values near which angles count turns.  What is *given* is another one: the loads, and whatever else
-of the data of the equations shall vary.  Every operation of the solver is a CasADi Function of these two, so that the
-same numbers come out of Python and of C.
+A *state* is one vector (states,): rotations (quaternions or angles), displacements retained as unknowns, multipliers,
+and the values near which angles count turns.  What is *given* is another vector (given,): loads, motions, and data of
+the equations that vary.  All of it is dimensionless.  Every operation of the solver is a CasADi Function of these two,
+so that Python and C compute the same numbers.
 """
 
 from __future__ import annotations
@@ -39,17 +39,21 @@ class Program:
     ----------
     expressions : Expressions
     varying : mapping of str to bool, optional
-        Which parts of :class:`~sfetcas.mechanics.expressions.Given` are not constant; without one the loads that the
+        Which parts of :class:`~sfetcas.mechanics.expressions.Given` are not constant; by default the loads that the
         model has.
     prefix : str
-        Of the names of all functions.
+        Prefix of the names of all functions.
 
     Attributes
     ----------
     states : int
-        Numbers of a state.
+        Length of a state.
     sizes : mapping of str to int
-        Of the parts that vary, in the order in which they stand in what is given.
+        Lengths of the parts that vary, in their order in what is given.
+    symbol : MX (given,)
+        What is given, as a symbol.
+    given : Given
+        All data and loads, as expressions of ``symbol``.
     """
 
     def __init__(
@@ -71,14 +75,14 @@ class Program:
 
     @staticmethod
     def _parts(given: Given) -> dict[str, ca.MX]:
-        """All parts by their names; those of groups of connections are numbered."""
+        """All parts of data and loads by name; data and loads of the i-th group are ``data_i`` and ``loads_i``."""
         parts: dict[str, ca.MX] = {"stiffness": given.stiffness, "tangent": given.tangent}
         parts |= {f"data_{i}": part for i, part in enumerate(given.data)}
         parts |= {name: getattr(given, name) for name in LOADS}
         return parts | {f"loads_{i}": part for i, part in enumerate(given.loads)}
 
     def given_by(self, flat: ca.MX) -> Given:
-        """What is given, for the vector of what varies."""
+        """All data and loads, with the parts that vary taken from a vector (given,)."""
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
         cut = dict(zip(self.sizes, ca.vertsplit(flat, bounds), strict=True)) if self.sizes else {}
         found: dict[str, Any] = {}
@@ -92,7 +96,7 @@ class Program:
         return Given(**{"data": (), "loads": ()} | found)
 
     def given_of(self, loading: Loading) -> Array:
-        """What is given under loads."""
+        """The vector (given,) of a loading, with the data of the model, dimensionless."""
         data = data_of(self.model)
         parts = [data[name] if name in data else self._load(name, loading) for name in self.sizes]
         return np.concatenate([np.zeros(0), *parts])
@@ -107,11 +111,11 @@ class Program:
     # -- states -----------------------------------------------------------------------------------
 
     def flat(self, state: State) -> Array:
-        """A state as one vector."""
+        """A state as one vector (states,)."""
         return np.concatenate([state.q.ravel(), state.y, state.lam, state.unwrapped])
 
     def state(self, flat: Array) -> State:
-        """The state of a vector."""
+        """The state of a vector (states,)."""
         q, y, lam, unwrapped = np.split(flat, self._bounds[1:-1])
         return State(q.reshape(-1, self.expressions.layout.components), y, lam, unwrapped)
 
@@ -131,11 +135,11 @@ class Program:
 
     @property
     def state_symbol(self) -> ca.MX:
-        """The state of which all expressions are made."""
+        """The symbol (states,) of the state in all expressions."""
         return self._symbols[0]
 
     def moved_expression(self, step: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Rotations, displacements and multipliers after a step of all unknowns and multipliers."""
+        """Rotations (components, rotations), displacements and multipliers after a step (total,)."""
         q, y, lam, _ = self.parts
         bounds = [0, self.equations.rotation_unknowns, self.equations.unknowns, self.expressions.total]
         _, shift, more = ca.vertsplit(step, bounds)
@@ -161,7 +165,7 @@ class Program:
 
     @functools.cached_property
     def strains(self) -> ca.MX:
-        """Elastic energy of each element, (1, elements)."""
+        """Elastic energy of each element, (1, elements), over ``model.scales.moment``."""
         expressions = self.expressions
         if not expressions.elements:
             return ca.MX(1, 0)
@@ -169,7 +173,7 @@ class Program:
 
     @property
     def strain(self) -> ca.MX:
-        """Elastic energy of all terms."""
+        """Elastic energy of all terms, over ``model.scales.moment``."""
         return self._energies[1]
 
     def _function(self, name: str, arguments: Mapping[str, ca.MX], results: Mapping[str, ca.MX]) -> ca.Function:
@@ -180,7 +184,10 @@ class Program:
     # -- counted turns ------------------------------------------------------------------------------
 
     def counted(self, q: ca.MX, unwrapped: ca.MX) -> ca.MX:
-        """The angles that count turns, of all that look the same those nearest to ``unwrapped``."""
+        """The angles (angles,) that count turns, rad: of those that differ by whole turns the nearest to ``unwrapped``.
+
+        ``q`` are rotations (components, rotations).
+        """
         unwrapping = self.model.unwrapping
         if not unwrapping.count:
             return unwrapped
@@ -194,7 +201,7 @@ class Program:
         ).T
 
     def _unwrapped(self, q: ca.MX, unwrapped: ca.MX, phi: ca.MX, there: ca.MX) -> ca.MX:
-        """The angles after rotations have turned by vectors about the fixed axes."""
+        """The angles (angles,), rad, after rotation by vectors ``phi`` (3, rotations) about the fixed axes."""
         unwrapping = self.model.unwrapping
         if not unwrapping.count:
             return unwrapped
@@ -208,7 +215,7 @@ class Program:
         return self.counted(there, self.counted(q, unwrapped) + gained)
 
     def _prescribed(self) -> ca.MX:
-        """Angles that motions prescribe, where rotations turn about one axis each, (unwrapped,)."""
+        """Angles (angles,), rad, that the prescribed rotation vectors give, each about one axis."""
         unwrapping, n = self.model.unwrapping, self.expressions.layout
         turn = ca.horzcat(ca.reshape(self.given.turn, 3, n.rotations), ca.DM.zeros(3))
         sides = np.where(unwrapping.sides == GROUND, n.rotations, unwrapping.sides)
@@ -217,7 +224,7 @@ class Program:
         return ca.sign(about) * ca.sqrt(ca.sum1(apart**2)).T
 
     def _prescribed_unwrapped(self, unwrapped: ca.MX) -> ca.MX:
-        """Values near which angles count, those at their values that motions prescribe."""
+        """Values (angles,), rad, near which angles count turns: the prescribed ones where motions fix them."""
         unwrapping = self.model.unwrapping
         fixed = np.append(self.model.rotations.kind == RotationFreedom.FIXED, True)[unwrapping.sides].all(axis=1)
         known, prescribed = [unwrapped[i] for i in range(unwrapping.count)], self._prescribed()
@@ -231,7 +238,7 @@ class Program:
 
     @functools.cached_property
     def begin(self) -> ca.Function:
-        """(given) -> the undeformed state with held rotations at their prescribed values."""
+        """(given) -> the undeformed state with fixed rotations at their prescribed values."""
         n = self.expressions.layout
         q = ca.DM.zeros(n.components, n.rotations)
         if self.model.space:
@@ -243,17 +250,17 @@ class Program:
 
     @functools.cached_property
     def prescribed_expression(self) -> ca.MX:
-        """The state with held rotations moved to their prescribed values."""
+        """The state (states,) with fixed rotations at their prescribed values, quaternions normalised."""
         q, y, lam, unwrapped = self.parts
         unwrapped = self._prescribed_unwrapped(unwrapped) if self.expressions.layout.unwrapped else unwrapped
         if self.model.space:
-            # A start may come from anywhere.
+            # A start of a user may have quaternions that are not normalised.
             q = q / ca.repmat(ca.sqrt(ca.sum1(q**2)), 4, 1)
         return ca.vertcat(ca.vec(self.expressions.with_prescribed_rotations(ca.MX(q), self.given)), y, lam, unwrapped)
 
     @property
     def moving(self) -> ca.MX:
-        """Derivative of the state by a step of all unknowns and multipliers, (states, total)."""
+        """Derivative (states, total) of the state by a step of all unknowns and multipliers, at step zero."""
         step = ca.MX.sym("step", self.expressions.total)
         there, y, lam = self.moved_expression(step)
         moved = ca.vertcat(ca.vec(there), y, lam, self.parts[3])
@@ -261,13 +268,13 @@ class Program:
 
     @functools.cached_property
     def hold(self) -> ca.Function:
-        """(state, given) -> the state with held rotations moved to their prescribed values."""
+        """(state, given) -> the state with fixed rotations at their prescribed values."""
         state, there = self._symbols[0], self.prescribed_expression
         return self._function("hold", {"state": state, "given": self.symbol}, {"held": there})
 
     @functools.cached_property
     def move(self) -> ca.Function:
-        """(state, step, share) -> the state after a share of a step of all unknowns and multipliers."""
+        """(state, step, share) -> the state after ``share`` times a step (total,) of all unknowns and multipliers."""
         state, (q, _, _, unwrapped) = self._symbols
         step, share = ca.MX.sym("step", self.expressions.total), ca.MX.sym("share")
         there, y, lam = self.moved_expression(share * step)
@@ -277,12 +284,12 @@ class Program:
 
     @functools.cached_property
     def stationarity(self) -> Stationarity:
-        """The equations at :attr:`parts`."""
+        """The stationarity equations at :attr:`parts`, with the entries of the Newton matrix."""
         return self._stationarity(entries=True)
 
     @functools.cached_property
     def forces(self) -> Stationarity:
-        """The same without entries of the matrix: what derivatives are taken of."""
+        """The stationarity equations at :attr:`parts` without entries of the matrix, to be differentiated."""
         return self._stationarity(entries=False)
 
     def _stationarity(self, *, entries: bool) -> Stationarity:
@@ -290,13 +297,16 @@ class Program:
         return Stationarity(self.expressions, q, y, lam, self.given, unwrapped, entries=entries)
 
     def _matrix(self, entries: list[ca.MX]) -> ca.MX:
-        """The matrix with its whole diagonal, which regularisation and shifts are put on."""
+        """The Newton matrix (total, total) with its whole diagonal, for regularisation and shifts."""
         tables = self.expressions.tables
         return summed((self.expressions.total,) * 2, tables.whole, ca.vertcat(*entries, ca.MX(1), ca.MX(0)))
 
     @functools.cached_property
     def potential(self) -> ca.MX:
-        """Potential energy, zero of the undeformed, unloaded scene; without that of what has none."""
+        """Potential energy over ``model.scales.moment``, zero for the undeformed, unloaded scene.
+
+        Loads without potential do not count.
+        """
         return self._energies[0] - ca.dot(self.given.force, self._places)
 
     @functools.cached_property
@@ -305,10 +315,10 @@ class Program:
 
     @functools.cached_property
     def at(self) -> ca.Function:
-        """(state, given) -> residual, its size relative to what is added up, potential, gaps, entries of the matrix."""
+        """(state, given) -> residual (total,), relative residual, potential, sum of gaps, entries of the matrix."""
         state, _ = self._symbols
         residual = ca.densify(self.stationarity.residual)
-        # A maximum may lose what is not a number, a sum does not.
+        # The maximum may ignore nan; adding zero times the sum keeps it.
         shares = residual / ca.fmax(self.scale, LEAST_SCALE)
         size = ca.norm_inf(shares) + 0.0 * ca.sum1(residual) if self.expressions.total else ca.MX(0)
         results = {
@@ -322,7 +332,7 @@ class Program:
 
     @functools.cached_property
     def merit(self) -> ca.Function:
-        """(state, given) -> potential and sum of the gaps."""
+        """(state, given) -> potential and sum of the absolute gaps, the parts of a merit function."""
         state, _ = self._symbols
         results = {"potential": self.potential, "gaps": self._sum_of_gaps(self._gaps)}
         return self._function("merit", {"state": state, "given": self.symbol}, results)
@@ -332,13 +342,13 @@ class Program:
 
     @property
     def slice_of_loads(self) -> slice:
-        """Where loads and motions stand in what is given: after all data."""
+        """Positions of loads and motions in what is given: after all data."""
         data = sum(size for name, size in self.sizes.items() if is_data(name))
         return slice(data, self.symbol.shape[0])
 
     @property
     def slice_of_moments(self) -> slice:
-        """Where moments stand in what is given; empty where there are none."""
+        """Positions of moments in what is given; empty if there are none."""
         couples = [f"loads_{i}" for i, group in enumerate(self.model.connections) if group.kind.is_couple]
         bounds = np.cumsum([0, *self.sizes.values()]).tolist()
         found = [i for i, name in enumerate(self.sizes) if name in couples]
@@ -346,7 +356,7 @@ class Program:
 
     @functools.cached_property
     def convex(self) -> ca.Function:
-        """(state, given) -> entries of the matrix with the elements' share made positive."""
+        """(state, given) -> entries of the matrix with positive semidefinite matrices of the elements."""
         expressions, model = self.expressions, self.model
         state, entries = self._symbols[0], list(self.stationarity.entries)
         if expressions.elements:
@@ -357,14 +367,14 @@ class Program:
 
     @functools.cached_property
     def sparsity(self) -> ca.Sparsity:
-        """Pattern of the matrix."""
+        """Pattern of the Newton matrix, (total, total)."""
         row, column, _, _ = self.expressions.tables.whole
         cells = np.unique(column * self.expressions.total + row)
         return pattern(self.expressions.total, cells % self.expressions.total, cells // self.expressions.total)
 
     @functools.cached_property
     def left(self) -> ca.Function:
-        """(entries, x, b) -> b - matrix x: what is left of a linear system."""
+        """(entries, x, b) -> b - matrix x, the residual (total,) of a linear system."""
         n = self.expressions.total
         entries, x, b = ca.MX.sym("entries", self.sparsity.nnz()), ca.MX.sym("x", n), ca.MX.sym("b", n)
         rest = b - ca.mtimes(ca.MX(self.sparsity, entries), x)
@@ -372,14 +382,14 @@ class Program:
 
     @functools.cached_property
     def linear(self) -> ca.Function:
-        """(entries, b) -> the solution of the linear system, which need not be symmetric."""
+        """(entries, b) -> the solution (total,) of the linear system, which need not be symmetric."""
         entries, b = ca.MX.sym("entries", self.sparsity.nnz()), ca.MX.sym("b", self.expressions.total)
         x = ca.solve(ca.MX(self.sparsity, entries), b, "qr", {"eps": 1e-300})
         return self._function("linear", {"entries": entries, "b": b}, {"x": ca.densify(x)})
 
     @functools.cached_property
     def scale(self) -> ca.MX:
-        """What rounding of each residual is judged by, as in :class:`~sfetcas.mechanics.equations.Point`."""
+        """Scale (total,) of each residual for its rounding, see :class:`~sfetcas.mechanics.equations.Point`."""
         expressions, model, equations = self.expressions, self.model, self.equations
         found = self.stationarity
         _, (_, _, lam, _) = self._symbols
@@ -387,7 +397,7 @@ class Program:
         for number, (sides, values) in enumerate(found.shares):
             sizes = ca.fabs(values)
             if number == 0 and expressions.elements:
-                # What forces do along an element, beside the moments on its nodes.
+                # The magnitude of internal forces along an element, beside the moments on its nodes.
                 pull = ca.reshape(ca.fabs(found.pull), expressions.axes * expressions.points, expressions.elements)
                 weights = ca.DM(np.repeat(model.beams.weight, expressions.axes, axis=1).T)
                 sizes += ca.repmat(ca.sum1(pull * weights), sides.shape[1], 1)
@@ -417,11 +427,11 @@ class Program:
 
 
 def data_of(model: Model) -> dict[str, Array]:
-    """The data of a model by their names, flat."""
+    """The data of a model by name, each as a vector, dimensionless; those of the i-th group are ``data_i``."""
     found = {"stiffness": model.beams.stiffness.ravel(), "tangent": model.beams.tangent.ravel()}
     return found | {f"data_{i}": group.data.ravel() for i, group in enumerate(model.connections)}
 
 
 def is_data(name: str) -> bool:
-    """Whether a part of what is given is data, and no load."""
+    """Whether the name of a part of what is given is that of data, not of loads or motions."""
     return name in ("stiffness", "tangent") or name.startswith("data_")

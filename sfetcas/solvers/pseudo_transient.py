@@ -1,13 +1,12 @@
-"""Pseudo-transient continuation: downhill along the gradient flow of the energy, in steps or towards a state.
+"""Pseudo-transient continuation: downhill along the gradient flow of the energy.
 
-:func:`flow` goes downhill where there is an energy whose value is not at hand: under even pressure, and under moments
-about hinges.
-Gradient flow ``M dx/dt = -F(x)`` leads from beside an unstable equilibrium to a stable one, whatever lies between.
-Its implicit steps ``(K + s M) dx = -F`` need the equations and their derivative only; with ``s`` beyond the lowest
-eigenvalue below zero every step points to where the energy falls, and where there is none they are Newton's.
+:func:`flow` goes downhill where there is an energy whose value is not computed: under even pressure, and under moments
+about hinges.  Gradient flow ``M dx/dt = -F(x)`` leads from beside an unstable equilibrium to a stable one.  Implicit
+steps ``(K + s M) dx = -F`` of it need the equations and their derivative only; with ``s`` above minus the lowest
+eigenvalue each is a descent direction, and with ``s = 0``, where no eigenvalue is negative, it is Newton's.
 
 With :class:`Drag` a step minimises the energy plus half of ``drag * M`` times the square of the rotations since the
-state before, so that a structure which falls goes down the way that drag lets it, whatever stops it there.
+state before: the implicit Euler step of an overdamped motion, which obstacles may stop.
 """
 
 from __future__ import annotations
@@ -26,37 +25,42 @@ from .newton import Iterate, moving, newton, newton_step, turned_by
 __all__ = ["Drag", "flow"]
 
 LONGEST = 0.3
-"""No node turns by more than this in a step, rad: the flow is not to jump over what lies in its way."""
+"""Largest rotation of a node in a step, rad, so that the flow does not jump over equilibria in its way."""
 
 ARRIVED = 1e-5
-"""Newton's steps shorter than this, rad, have arrived."""
+"""Length of a step, rad, below which the flow has come to rest."""
 
 MOST = 200
 """Steps at most: leaving a nearly neutral state takes some ten, the way from one shape to another some thirty."""
 
 SHIFT_GROWTH, LEAST_SHIFT = 4.0, 1e-9
-"""Growth of ``s`` until a step is short enough, and the least that it begins with, in units of force.
+"""Growth of ``s`` until a step is short enough, and its least value above zero, dimensionless.
 
-A spin of a member between balls is resisted by 1e-7 of its bending: a firmer beginning would creep along it.
+The rotation of a member about its axis between ball joints is resisted by 1e-7 of its bending stiffness: with a larger
+first value the flow would creep along it.
 """
 
 LASTING = 5
-"""The lowest eigenvalue is looked for after so many steps, and where they have arrived.
+"""Number of steps after which the lowest eigenvalue is computed again; also done where the flow comes to rest.
 
-On the way it only keeps the flow from running back, and to find it costs ten times as much as a step.
+On the way it only keeps the flow from running back, and it costs ten times as much as a step.
 """
 
 
 def flow(
     equations: Equations, state: State, loading: Loading, depth: Callable[[Point, float], float]
 ) -> tuple[State | None, int]:
-    """Where the flow leads from a state, None where it does not come to rest, and its steps.
+    """The state to which the flow leads, None if it does not come to rest, and the number of steps.
 
     Parameters
     ----------
+    equations : Equations
+    state : State
+        Start of the flow.
+    loading : Loading
     depth : callable
-        At a point of the equations, and with what it was before: how far eigenvalues are below zero, or a number
-        that is not much larger; zero where none is.
+        (point, last value) -> minus the lowest eigenvalue by :attr:`Equations.mass`, or a bound not much larger; zero
+        if no eigenvalue is negative.
     """
     diagonal = equations.diagonal[: equations.rotation_unknowns]
     deep, last, age = 0.0, LEAST_SHIFT, 0
@@ -88,14 +92,14 @@ def flow(
 
 @dataclass(frozen=True)
 class Drag:
-    """Couples that resist rotations since a state.
+    """Moments that resist rotations since a state.
 
     Attributes
     ----------
     equations : Equations
     since : State
     size : float
-        Couple by rotation and by the weight of :attr:`Equations.mass`, in units of the model.
+        Ratio of the moment on a rotation unknown to its rotation times :attr:`Equations.mass`, dimensionless.
     """
 
     equations: Equations
@@ -103,7 +107,7 @@ class Drag:
     size: float
 
     def __call__(self, state: State, point: Point) -> Point:
-        """The point of the equations with drag."""
+        """The equations at a state with the moments of drag, their scale and their stiffness added."""
         equations, n = self.equations, self.equations.rotation_unknowns
         couples = self.size * equations.mass * turned_between(equations, state, self.since)
         residual, entries, scale = point.residual.copy(), point.entries.copy(), point.scale.copy()

@@ -1,6 +1,7 @@
-"""Combinations of closings that no unknown changes, to first order: what joints hold twice, and stretched members.
+"""Redundant rows: combinations of constraints that no unknown changes to first order.
 
-Their multipliers are not determined; :mod:`~sfetcas.solvers.sharing` says which are given.
+They arise from redundant joints, and from straight members between fixed points.  Their multipliers are not determined;
+:mod:`~sfetcas.solvers.sharing` says which ones are given.
 """
 
 from __future__ import annotations
@@ -30,36 +31,37 @@ __all__ = [
 
 
 def loose_rows(equations: Equations, point: Point, slack: float | None = None) -> Array:
-    """Combinations of rows that vanish to first order at this state: orthonormal columns, (rows, n).
+    """Combinations of rows whose derivative by the unknowns vanishes at this state: orthonormal columns, (rows, n).
 
-    Their singular values are below the share ``slack`` of the largest, without one 1e-6.
+    Left singular vectors of the Jacobian with singular values below ``slack`` (by default :data:`SLACK`) times the
+    largest.
     """
     slack = SLACK if slack is None else slack
     if not equations.rows:
         return np.zeros((0, 0))
-    # A row that no rotation changes is loose too, also where it is the only one.
-    # Without beams rows are of the size of the units of the model.
+    # A usual size of rows, so that a row without derivative is found also if it is the only one.
+    # Without beams rows are of the size of one.
     usual = float((equations.model.beams.weight**2).sum()) or 1.0
     find = _smallest if equations.rows > MANY else _all_singular
     squares, left, largest = find(equations, point)
     small = left[:, squares < ROUGHLY * max(largest, usual)]
     if not small.size:
         return small
-    # Squares are known to rounding of the largest, and sizes to the root of that: what is small is looked at itself.
+    # Squares are accurate to rounding of the largest, singular values to its root only: small ones are computed again.
     changes, count = changed_by(equations, point, small), small.shape[1]
     _, sizes, right = np.linalg.svd(np.pad(changes, ((0, max(0, count - len(changes))), (0, 0))), full_matrices=False)
     return np.asarray(small @ right[sizes < slack * np.sqrt(max(largest, usual))].T)
 
 
 def independent(equations: Equations, point: Point, among: Array) -> Array:
-    """Of a space of combinations of rows, orthonormal columns (rows, n), what has no part in loose ones: (rows, m)."""
+    """Of the span of combinations of rows, orthonormal columns (rows, n), those orthogonal to loose ones, (rows, m)."""
     inside = among.T @ loose_rows(equations, point)
     across = np.linalg.qr(inside, mode="complete")[0][:, inside.shape[1] :]
     return np.asarray(among @ across)
 
 
 def changed_by(equations: Equations, point: Point, ways: Array) -> Array:
-    """Change of the unknowns' equations with combinations of rows, columns (rows, k): (unknowns, k)."""
+    """The transposed Jacobian of the rows times combinations, columns (rows, k): (unknowns, k), dimensionless."""
     n = equations.unknowns
     chosen = (equations.row >= n) & (equations.column < n)
     row, column, entries = equations.row[chosen] - n, equations.column[chosen], point.entries[chosen]
@@ -68,7 +70,7 @@ def changed_by(equations: Equations, point: Point, ways: Array) -> Array:
 
 
 def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, float]:
-    """Squares of all singular values of the rows, their left vectors and the largest square."""
+    """Squares (rows,) of all singular values of the Jacobian, left vectors (rows, rows) and the largest square."""
     n = equations.unknowns
     chosen = (equations.row >= n) & (equations.column < n)
     rows = np.zeros((equations.rows, n))
@@ -78,7 +80,10 @@ def _all_singular(equations: Equations, point: Point) -> tuple[Array, Array, flo
 
 
 def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
-    """The same for the smallest ones only, by inverse iteration with the sparse matrix of the rows."""
+    """As :func:`_all_singular` for the smallest singular values only, by inverse iteration with the sparse Jacobian.
+
+    The largest sum of squares of a row stands for the largest square.
+    """
     n = equations.unknowns
     entries = equations.of_rows(point.entries)
     largest = float(np.bincount(equations.row, weights=entries**2, minlength=equations.total)[n:].max())
@@ -98,38 +103,38 @@ def _smallest(equations: Equations, point: Point) -> tuple[Array, Array, float]:
 
 
 ROUGHLY = 1e-4
-"""Share of the largest square below which singular values are looked at closely."""
+"""Share of the largest square below which the singular value is computed again, without squares."""
 
 MANY = 300
-"""From this many rows on only the loose ones are looked for."""
+"""Number of rows above which only the smallest singular values are computed."""
 
 INVERSE = 3
-"""Inverse iterations: what is loose stands out by twelve digits."""
+"""Inverse iterations; few suffice as the squares of loose rows are smaller by twelve digits."""
 
 TINY_SHARE = 1e-15
-"""Share of the largest square that keeps the matrix of loose rows regular."""
+"""Dual regularisation of the matrix of redundant rows, share of the largest square."""
 
 
 def rows_in(loose: Array) -> list[int]:
-    """The rows that take part in combinations, columns of :func:`loose_rows`, whichever span their space."""
+    """Numbers of the rows with a part in the space of combinations (rows, n), of :func:`loose_rows`."""
     return np.flatnonzero(np.linalg.norm(loose, axis=1) > TAKES_PART).tolist() if loose.size else []
 
 
 TAKES_PART = 0.1
-"""Length of a row's part in all loose combinations, of 1: a row takes part in none of them by rounding, 1e-8."""
+"""Norm of a row's entries in the loose combinations (at most 1) from which it is named; rounding leaves 1e-8."""
 
 
 def named_in(equations: Equations, loose: Array) -> str:
-    """Their names."""
+    """Names of the rows with a part in combinations (rows, n), for messages."""
     return ", ".join(dict.fromkeys(equations.row_names[row] for row in rows_in(loose)))
 
 
 def stretched(equations: Equations, point: Point, loose: Array | None = None) -> str:
-    """What is said of members that no finite force holds straight; empty where rows do not vanish.
+    """Message naming members that no finite force holds straight; empty if rows are independent.
 
-    ``loose`` are combinations of rows that are known to.  Else those that nearly vanish are asked whether their
-    multipliers have no end: to close what is left of the closings by rows of the size s takes a step (left / s) that
-    changes s itself by as much, beside s only where the rows vanish at the closed state.
+    ``loose`` (rows, n) are the combinations known to be redundant.  Without them nearly redundant ones are taken whose
+    multipliers would grow without bound: closing a gap ``g`` by a row of singular value ``s`` takes a step ``g / s``,
+    which changes ``s`` by about as much; beside ``s`` this is much only if the row vanishes at the closed state.
     """
     if loose is None:
         nearly = loose_rows(equations, point, NEARLY)
@@ -142,17 +147,17 @@ def stretched(equations: Equations, point: Point, loose: Array | None = None) ->
 FULLY = "fully stretched between held points, where an inextensible member takes any force: "
 
 NEARLY = 1e-3
-"""Share of the largest singular value of the closings below which members may be on their way to being stretched."""
+"""Singular values of nearly redundant rows, share of the largest: members may be about to become straight."""
 
 GROWING = 0.01
-"""Share by which closing them would change rows that nearly vanish, from which on it makes them vanish."""
+"""Ratio of a gap to the square of the row's singular value from which closing it makes the row vanish."""
 
 SLACK = 1e-6
-"""Singular values of the closings below this share of the largest: no slack to first order."""
+"""Singular values of redundant rows, share of the largest."""
 
 
 def redundant(equations: Equations, point: Point) -> bool:
-    """Whether rows depend on each other, as far as known: asked at the first state, and at each equilibrium."""
+    """Whether rows were redundant at the first state or at any equilibrium so far; kept in ``equations.redundant``."""
     if equations.redundant is None:
         equations.redundant = bool(loose_rows(equations, point).size)
     return equations.redundant
@@ -161,9 +166,12 @@ def redundant(equations: Equations, point: Point) -> bool:
 def with_sharing(
     equations: Equations, state: State, loading: Loading, point: Point, tolerance: float, *, reactions: bool = False
 ) -> tuple[State, Point]:
-    """An equilibrium with redundant multipliers as :func:`~sfetcas.solvers.sharing.shared`, as far as it stays one."""
+    """An equilibrium with the multipliers of redundant rows by :func:`~sfetcas.solvers.sharing.shared`, and its point.
+
+    Unchanged if the relative residual would exceed ``tolerance``.  ``reactions`` is passed on.
+    """
     loose = loose_rows(equations, point)
-    # The first state asked may have been a bent one, where no closing is redundant.
+    # The first state may have been a bent one, where no row is redundant.
     equations.redundant = equations.redundant or bool(loose.size)
     if not loose.size:
         return state, point
@@ -173,15 +181,15 @@ def with_sharing(
 
 
 def met(equations: Equations, point: Point) -> Point:
-    """The point without the gaps of redundant closings that no unknown closes, where they are as good as closed.
+    """The point without the gaps along redundant combinations of rows, which no unknown closes, if they are tiny.
 
-    Places in a scene have so many digits: the third of three parallel links fits to these, and moves with the others.
+    Such gaps come from the digits of positions in a scene: the third of three parallel links fits to rounding only.
     """
     if not redundant(equations, point):
         return point
     loose = loose_rows(equations, point)
     left = loose.T @ point.residual[equations.unknowns :]
-    # What turning by less closes is a member nearly straight, and its gap has to be closed.
+    # A gap that a smaller rotation closes is that of a nearly straight member, and has to be closed.
     stays = np.abs(left) > TURNS_FIRST * np.linalg.norm(changed_by(equations, point, loose), axis=0)
     gaps = loose[:, stays] @ left[stays]
     if not 0.0 < np.linalg.norm(gaps) <= tolerances.CLOSED:
@@ -192,4 +200,4 @@ def met(equations: Equations, point: Point) -> Point:
 
 
 TURNS_FIRST = 1e-3
-"""Turning, rad, by which gaps are closed: what takes more, to first order, no unknown closes."""
+"""Rotation, rad, that would close a gap to first order; a gap that takes more is one that no unknown closes."""

@@ -1,4 +1,4 @@
-"""When a state is in balance: what is out of balance beside what acts, and what rounding explains of it."""
+"""Criteria of convergence: relative residual, balance beside the loads, and what rounding explains."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ __all__ = ["LEAST_SCALE", "balanced", "relative_residual", "rounded"]
 
 
 def relative_residual(equations: Equations, point: Point) -> float:
-    """Largest out-of-balance moment or force over what is added up at its node, or largest gap."""
+    """Largest residual over its scale, dimensionless: see :class:`~sfetcas.mechanics.equations.Point`."""
     return float((np.abs(point.residual) / np.maximum(point.scale, LEAST_SCALE)).max(initial=0.0))
 
 
 LEAST_SCALE = 1e-14
-"""Of the units of the model: where nothing acts and nothing is stiff, less than this is nothing."""
+"""Least scale of a residual, dimensionless: it keeps the ratio finite where nothing acts and nothing is stiff."""
 
 
 def balanced(equations: Equations, point: Point) -> bool:
-    """Whether what is out of balance is little beside all that acts, too, and not only beside what is stiff."""
+    """Whether the residual is small beside the largest forces that act, not only beside stiffness."""
     n = equations.unknowns
     acting = (point.scale - equations.noise)[:n].max(initial=0.0)
     return float(np.abs(point.residual[:n]).max(initial=0.0)) <= tolerances.BALANCED * acting
 
 
 EPSILON = 1e-15
-"""Rounding of unknowns over the largest of their kind, or one."""
+"""Rounding of an unknown, over the largest of its kind or 1."""
 
 
 def rounded(equations: Equations, state: State, point: Point) -> bool:
-    """Whether rounding of the unknowns explains what is out of balance, and balance beside all that acts is good.
+    """Whether rounding of the unknowns explains the whole residual, and that is small beside all that acts.
 
-    A residual that does not fall may as well be what no unknown balances, however small it is: that explains nothing.
+    A small residual that does not fall may also be a force that no unknown balances: rounding does not explain it.
     """
     if not relative_residual(equations, point) <= tolerances.BALANCED or not balanced(equations, point):
         return False

@@ -1,11 +1,10 @@
-"""How members share forces that the equations leave open, the one rule of all analyses.
+"""Multipliers of redundant rows: how members share forces that equilibrium leaves open, one rule for all analyses.
 
 Where closings depend on each other to first order, as along straight members between more supports than balance
-needs, multipliers are not determined: without stretch any set of axial forces that balances will do, and critical loads
-depend on which.  Chosen are those of flexible members that stretch alike: with one stiffness ``EA`` everywhere the
-energy of stretch is least where the integral of the square of the axial force along them is, whatever ``EA``, and so
-it is in the limit of members that do not stretch.  What this leaves open, within rigid bodies or across what turns
-about held axes, stretches nothing: there the reactions of supports are the least, and then the multipliers.
+needs, multipliers are not determined: in inextensible members any axial forces in balance will do, and critical loads
+depend on which.  The rule takes the limit of flexible members with one axial stiffness ``EA``: the integral of the
+squared axial force along them is least, whatever ``EA``.  What this leaves open, within rigid bodies or across
+rotations about fixed axes, stretches nothing: of these the reactions of supports are least, and then the multipliers.
 """
 
 from __future__ import annotations
@@ -22,19 +21,19 @@ from ..mechanics.loading import Loading
 __all__ = ["SHARED", "SMALLEST", "shared", "stretches"]
 
 FELT = 1e-6
-"""A combination of redundant rows that changes axial forces or reactions by less than this share changes none."""
+"""Singular value, dimensionless, up to which a redundant combination counts as changing no axial force or reaction."""
 
 SHARED = (
     "reactions are not unique: forces along straight members are not determined without stretch and shared as among "
     "members that stretch alike (equal EA); what is stable, and critical loads, depend on it"
 )
-"""The note of every analysis in which redundant rows change axial forces."""
+"""Note of every analysis in which redundant rows change axial forces."""
 
 SMALLEST = "reactions are not unique, the smallest are given"
-"""What is said where redundant rows change none."""
+"""Note of analyses in which redundant rows change no axial force."""
 
 MOST_LOOSE = 60
-"""Up to so many redundant rows reactions are made least; beyond, the multipliers only."""
+"""Largest number of redundant combinations for which reactions are made least; with more only the multipliers are."""
 
 
 def shared(equations: Equations, state: State, loading: Loading, loose: Array, *, reactions: bool = False) -> State:
@@ -42,11 +41,12 @@ def shared(equations: Equations, state: State, loading: Loading, loose: Array, *
 
     Parameters
     ----------
+    equations, state, loading
     loose : ndarray (rows, n)
-        Combinations of rows that vanish here, orthonormal, of :func:`~sfetcas.solvers.redundancy.loose_rows`.
+        Redundant combinations of rows, orthonormal, of :func:`~sfetcas.solvers.redundancy.loose_rows`.
     reactions : bool
-        Whether reactions are wanted: what changes them alone, and nothing that acts along a member, is left at the
-        least multipliers without.
+        Whether to make reactions least also where redundant combinations change no axial force of any member;
+        otherwise the multipliers are least there.
     """
     state = replace(state, lam=state.lam - loose @ (loose.T @ state.lam))
     for rigid in (False, True):
@@ -62,13 +62,13 @@ def shared(equations: Equations, state: State, loading: Loading, loose: Array, *
 
 
 def stretches(equations: Equations, state: State, loading: Loading, loose: Array) -> bool:
-    """Whether redundant rows change axial forces of flexible members, and with them critical loads."""
+    """Whether redundant combinations (rows, n) change axial forces of flexible members, and so critical loads."""
     own, gains = _axial(equations, state, loading, loose, False)
     return bool(_least_squares(gains, own)[1].shape[1] < loose.shape[1])
 
 
 def _with_least_reactions(equations: Equations, state: State, loading: Loading, loose: Array) -> State:
-    """The state with reactions whose sum of squares is least; moments count over the unit of length."""
+    """The state with the least sum of squares of reactions, moments over the unit of length of the model."""
     model = equations.model
     supported = [name for name, node in model.scene.nodes.items() if node.support != "free"]
     units = np.concatenate([np.full(3, model.scales.force), np.full(3, model.scales.moment)])
@@ -85,7 +85,10 @@ def _with_least_reactions(equations: Equations, state: State, loading: Loading, 
 
 
 def _axial(equations: Equations, state: State, loading: Loading, loose: Array, rigid: bool) -> tuple[Array, Array]:
-    """Axial forces times the roots of the lengths they act on, (places,), and their change with loose combinations."""
+    """Axial forces times the root of the lengths they act on, (points,), and their change (points, n) with ``loose``.
+
+    Of the ``rigid`` members or of all others, at their integration points, dimensionless.
+    """
     model = equations.model
     acting, nothing = equations.effective(state, loading), loading.scaled(0.0)
     kinds = [(model.scene.members[part.member].type == "rigid") == rigid for part in model.segments.parts]
@@ -101,9 +104,9 @@ def _axial(equations: Equations, state: State, loading: Loading, loose: Array, r
 
 
 def _least_squares(gains: Array, own: Array) -> tuple[Array, Array]:
-    """What combinations take to make ``own`` least, and an orthonormal basis of those that change nothing, (n, m).
+    """Least squares solution (n,) of ``gains x = own``, and an orthonormal null space (n, m) of ``gains``.
 
-    Columns are of length one and forces dimensionless: what gains less than :data:`FELT` says nothing but rounding.
+    Singular values up to :data:`FELT` are rounding: combinations are of length one and forces dimensionless.
     """
     orthonormal, upper = np.linalg.qr(gains)
     left, sizes, right = np.linalg.svd(upper, full_matrices=True)

@@ -1,13 +1,13 @@
-"""Which of the shapes that fit equally well, and which way along it: a rule of the scene, never rounding.
+"""Signs of eigenvectors, and vectors of equal eigenvalues, by a rule that depends on the scene and not on rounding.
 
-An eigenvector has no sign, and of eigenvalues that are the same no single vector either.  What is taken is what of the
-space of shapes comes nearest to fields that the scene names: rotations about the ``b3`` of the sections at the first
-ends of members (about z in the plane), which die away along each member from its first node, and count less the later
-a member's name stands in the alphabet.  No symmetry of a structure keeps such a field.  Where next to nothing of the
-shapes is in it, fields that die away more slowly are asked, then those about ``b2`` and ``b1``.  Of shapes in which
-nothing turns the displacements of nodes along the same directions are asked.
+An eigenvector has no sign, and equal eigenvalues have no single vectors.  Chosen is the projection, onto the space of
+eigenvectors (*shapes*), of reference fields that the scene defines: rotations about the ``b3`` of the sections at the
+first ends of members (about z in the plane), which decay exponentially along each member from its first node, and are
+smaller the later a member's name stands in the alphabet.  No symmetry of a structure keeps such a field.  If its
+projection nearly vanishes, fields of other decay follow, then those about ``b2`` and ``b1``; for shapes in which
+nothing rotates, displacements of nodes along the same directions.
 
-Neither the order of a scene file, nor axes or units, nor rounding change what is taken.
+Neither the order of a scene file, nor axes or units, nor rounding change what is chosen.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from ..mechanics.rotations import RotationFreedom
 __all__ = ["Sides", "alike"]
 
 DECAYS = (2.0, 0.7, 4.0)
-"""How fast fields die away along a member, one after the other."""
+"""Decay rates of the reference fields, over the length of the member, in the order of their use."""
 
 WITHOUT_ELEMENTS = 1e-9
-"""Share of members without elements, which have no part in integrals: they count where there is no other."""
+"""Weight beside others of members without elements in the mean at a node: they count if there is no other."""
 
 LEAST = 1e-3
-"""Share of a field that shapes have at least: symmetry leaves none of it, and rounding 1e-10."""
+"""Least projection of a field, relative to its norm, for it to decide; symmetry leaves 0, rounding 1e-10."""
 
 FADING = 0.125
-"""Share of a field beside the one before it where all are one."""
+"""Ratio of successive fields in their sum :attr:`Sides.seed`."""
 
 
 class Sides:
@@ -44,7 +44,7 @@ class Sides:
     ----------
     equations : Equations
     travels : ndarray, optional
-        Numbers of the displacements that stand after the rotation unknowns in shapes, without it all of them.
+        Numbers of the displacement unknowns that follow the rotation unknowns in shapes; by default all of them.
     """
 
     def __init__(self, equations: Equations, travels: Index | None = None) -> None:
@@ -53,7 +53,7 @@ class Sides:
 
     @functools.cached_property
     def fields(self) -> tuple[Array, ...]:
-        """The fields that are asked one after the other, (rotation unknowns,)."""
+        """The reference fields of rotations in the order of their use, each (rotation unknowns,), rad."""
         equations, model = self._equations, self._equations.model
         lines = model.scene.center_lines
         about = (
@@ -69,8 +69,8 @@ class Sides:
                     along = model.along(name) if name in model.members else np.linspace(0.0, 1.0, len(ends))
                     frame = quaternion.matrix(lines[name].quaternions(np.array([0.0])))[0]
                     way = frame[:, axis] if model.space else np.array([0.0, 0.0, 1.0])
-                    # At the node of several members the mean by what of each has its share in an integral: of a field
-                    # that jumps there, too, all meshes then have the same integrals.
+                    # At a node of several members the mean, weighted by the length that the node stands for in each:
+                    # integrals are then the same on all meshes, also of a field that jumps there.
                     share = (
                         np.gradient(along) * lines[name].length * (1.0 if name in model.members else WITHOUT_ELEMENTS)
                     )
@@ -89,7 +89,10 @@ class Sides:
 
     @functools.cached_property
     def displacing(self) -> tuple[Array, ...]:
-        """The same of displacements, (unknowns,): nodes move along the sections of the first member at each."""
+        """The reference fields of displacements, each (unknowns,), dimensionless, zero for rotations.
+
+        Nodes move along the section axes of that member at each whose name comes first in the alphabet.
+        """
         equations, model = self._equations, self._equations.model
         axes, lines = model.element.axes, model.scene.center_lines
         found = []
@@ -105,19 +108,19 @@ class Sides:
         return tuple(found)
 
     def taken(self, shapes: Array, metric: Array) -> Array:
-        """The shape (rotation unknowns and more,) of a space of shapes (., n) that the rule takes.
+        """The shape (entries,) that the rule chooses from the span of several.
 
         Parameters
         ----------
-        shapes : ndarray
-            Columns, orthonormal with the metric or otherwise.
-        metric : ndarray
+        shapes : ndarray (entries, n)
+            Columns of rotation unknowns, possibly followed by displacements; orthonormal in the metric.
+        metric : ndarray (entries,)
             Weight of each entry.
         """
         return np.asarray(shapes @ self._share(shapes, metric))
 
     def ordered(self, shapes: Array, metric: Array) -> Array:
-        """The whole space (., n) by shapes that the rule takes one after the other, each across those before."""
+        """A basis (entries, n) of the span of shapes: each is chosen from the part orthogonal to those before."""
         found = []
         while shapes.shape[1]:
             share = self._share(shapes, metric)
@@ -126,12 +129,12 @@ class Sides:
         return np.column_stack(found)
 
     def in_groups(self, values: Array, shapes: Array, metric: Array, unit: float = 1.0) -> Array:
-        """Shapes of rising eigenvalues, those of the same one as :meth:`ordered` takes them.
+        """Shapes (entries, n) of rising eigenvalues (n,), those of equal ones as :meth:`ordered`.
 
         Parameters
         ----------
         unit : float
-            Size below which differences of eigenvalues do not count by themselves.
+            Eigenvalues of smaller size are compared with this instead of themselves.
         """
         begin, found = 0, shapes.copy()
         while begin < len(values):
@@ -142,7 +145,7 @@ class Sides:
         return found
 
     def _share(self, shapes: Array, metric: Array) -> Array:
-        """What the rule takes of each shape, of length one."""
+        """Coefficients (n,) of the chosen shape in the given ones, of length one."""
         rotation_unknowns = self._equations.rotation_unknowns
         travels = shapes[rotation_unknowns:]
         largest = float(np.linalg.norm(travels, axis=0).max(initial=0.0))
@@ -151,7 +154,7 @@ class Sides:
             weighted = metric[:rotation_unknowns] * field
             parts = weighted @ shapes[:rotation_unknowns]
             if np.linalg.norm(parts) > LEAST * size * np.sqrt(float(weighted @ field)):
-                # A complex shape is turned until its part in the field is real.
+                # The phase of complex shapes is chosen such that their part in the field is real.
                 return np.asarray(parts.conj() / np.linalg.norm(parts))
         for field in self.displacing if len(travels) else ():
             parts = field[self._travels] @ travels
@@ -162,13 +165,13 @@ class Sides:
 
     @functools.cached_property
     def seed(self) -> Array:
-        """All fields in one, (rotation unknowns,): what inverse iteration makes of it lies to the side of the rule.
+        """Weighted sum of all fields, (rotation unknowns,), as a start of inverse iteration, which keeps its side.
 
-        Each counts far less than the one before it, and far more than rounding.
+        Each field counts far less than the one before it, and far more than rounding.
         """
         return np.asarray(sum(FADING**i * field for i, field in enumerate(self.fields)))
 
 
 def alike(values: Array) -> int:
-    """How many of rising eigenvalues, in those of the softest member or of themselves, are the lowest one."""
+    """Number of the rising eigenvalues (n,), dimensionless, that equal the lowest one to :data:`tolerances.ALIKE`."""
     return int((values - values[0] <= tolerances.ALIKE * max(1.0, abs(float(values[0])))).sum())

@@ -1,16 +1,16 @@
 """Stability of an equilibrium: inertia of the energy on the closings, smallest eigenvalue, unstable mode.
 
-With ``H`` the second derivative of the potential by rotations, ``A`` the derivative of the closings and ``M`` a
-diagonal weight, the eigenvalues of ``H x = mu M x`` on the null space of ``A`` decide: all above zero is a strict
-minimum, one below zero is a way out.  They are counted through Sylvester's law of inertia: the negative
-eigenvalues of ``H - sigma M`` less those of the Schur complement ``A (H - sigma M)^-1 A^T``.
+With ``H`` the second derivative of the Lagrangian by rotations, ``A`` the Jacobian of the closings and ``M`` a diagonal
+weight, the eigenvalues ``mu`` of ``H x = mu M x`` on the null space of ``A`` decide: all above zero is a strict minimum
+of the potential, along the eigenvector of one below zero the potential falls.  They are counted through Sylvester's law
+of inertia: the negative eigenvalues of ``H - sigma M`` less those of the Schur complement
+``A (H - sigma M)^-1 A^T``.
 
-The weight of a rotation is its length times the smallest stiffness of all members over the square of its
-member's length: the eigenvalues are pure numbers, of the size of one for what the softest member does.
+The weight of a rotation is the length of member at it times the smallest ratio of stiffness to squared length of all
+members: the eigenvalues are pure numbers, of the size of one for modes of the softest member.
 
-Under pressure, which follows and has a potential all the same, as even pressure on a closed ring, the Newton matrix is
-symmetric but for what the mesh leaves; its symmetric part is taken, whose eigenvalues are those of the energy to the
-second order of the rest.
+Under pressure that has a potential, as even pressure on a closed ring, the Newton matrix is symmetric but for errors of
+the mesh; its symmetric part is taken, whose eigenvalues are those of the energy to second order in these errors.
 """
 
 from __future__ import annotations
@@ -32,10 +32,13 @@ from .sides import Sides, alike
 __all__ = ["ENTRIES_BLUR", "LIGHT", "Inertia", "Stability", "StabilityTest"]
 
 ENTRIES_BLUR = 2e-15
-"""The same, relative to the largest entry of the weighted matrix."""
+"""Eigenvalues that rounding of the matrix leaves, share of its largest weighted entry; added to ``NEUTRAL``."""
 
 GRADED = 1e-5
-"""Limits above this come of members that are very short or stiff beside others: rounding is told mode by mode then."""
+"""Limit of zero eigenvalues, dimensionless, above which rounding is estimated for each mode by itself.
+
+Larger limits come from members that are very short or stiff beside others.
+"""
 
 DENSE = 120
 """Up to this many unknowns all eigenvalues by LAPACK are cheaper than factorisations (measured)."""
@@ -43,7 +46,7 @@ DENSE = 120
 
 @dataclass(frozen=True)
 class Inertia:
-    """Numbers of eigenvalues below zero, and of those that cannot be told from zero."""
+    """Numbers of negative eigenvalues, and of those that are zero to rounding."""
 
     negative: int
     zero: int
@@ -51,22 +54,22 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Stability:
-    """Outcome of the test.
+    """Result of the test.
 
     Attributes
     ----------
     stable : bool, "neutral", or "not defined" for loads without potential
     negative : int
-        Eigenvalues below zero: independent ways out.
+        Number of negative eigenvalues: independent directions in which the potential falls.
     smallest : float
-        Rayleigh quotient of the unstable mode by the integral of its square, dimensionless.
-    shape : ndarray
-        Unstable mode: the rotation unknowns of the smallest eigenvalue, largest size 1, to the side that
-        :mod:`~sfetcas.solvers.sides` takes.
-    travel : ndarray
-        The displacements retained as unknowns in it.
+        Smallest eigenvalue by :attr:`Equations.mass`, dimensionless; inf if nothing can move, nan if not computed.
+    shape : ndarray (rotation unknowns,)
+        Eigenvector of the smallest eigenvalue (the unstable mode), largest entry 1 rad, with the sign that
+        :mod:`~sfetcas.solvers.sides` chooses.
+    travel : ndarray (displacement unknowns,)
+        The displacements in it, dimensionless.
     limit : float
-        Below this, on the scale of the module's docstring, its eigenvalue cannot be told from zero.
+        Size up to which its eigenvalue ``mu`` of the module's docstring counts as zero.
     """
 
     stable: bool | str
@@ -78,7 +81,7 @@ class Stability:
 
     @property
     def hidden(self) -> bool:
-        """Whether rounding of what is stiff, and no flat energy, makes it neutral."""
+        """Whether it is called neutral because of rounding of stiff members, not because of a flat energy."""
         return self.stable == "neutral" and self.limit > GRADED
 
 
@@ -87,7 +90,7 @@ class StabilityTest:
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
-        # Displacements that springs and bodies act upon count as rotations do; all others follow from the closings.
+        # Displacements that springs and bodies act upon are unknowns as rotations are; others follow from the closings.
         self._chosen = np.concatenate([np.arange(equations.rotation_unknowns), equations.worked_displacements])
         self._n = n = len(self._chosen)
         place = np.full(equations.total, -1, dtype=np.intp)
@@ -110,7 +113,7 @@ class StabilityTest:
 
     @functools.cached_property
     def _weights(self) -> Array:
-        """The weight of all that counts: displacements have next to none."""
+        """Weight (n,) of rotation unknowns and, very small, of the displacements that springs and bodies act upon."""
         count = len(self.equations.worked_displacements)
         return np.concatenate([self.weight, np.full(count, LIGHT * self.softest)])
 
@@ -120,7 +123,10 @@ class StabilityTest:
 
     @functools.cached_property
     def softest(self) -> float:
-        """The smallest stiffness of all members over the square of their lengths, in the units of the model."""
+        """Smallest ratio of stiffness (bending, torsion) to squared length of all members, dimensionless.
+
+        It is the ratio of :attr:`weight` to :attr:`Equations.mass`.
+        """
         model = self.equations.model
         x, softest = np.linspace(0.0, 1.0, 5), np.inf
         for name, member in model.scene.members.items():
@@ -134,7 +140,7 @@ class StabilityTest:
         return softest / model.scales.moment * model.scales.length
 
     def _rows(self, point: Point) -> Array:
-        """The independent closings' derivative by the rotations, displacements eliminated, weighted: (rows, n)."""
+        """Weighted Jacobian (rows, n) of the independent closings, displacements without stiffness eliminated."""
         equations = self.equations
         rows = np.zeros((equations.rows, self._n))
         rows[equations.row[self._in_a] - equations.unknowns, self._a_column] = point.entries[self._in_a]
@@ -145,7 +151,7 @@ class StabilityTest:
         return np.asarray(point.entries[self._in_h] / (root[self._h_row] * root[self._h_column]))
 
     def test(self, point: Point) -> Stability:
-        """Inertia, smallest eigenvalue and unstable mode at an equilibrium."""
+        """Inertia, smallest eigenvalue and its mode at an equilibrium."""
         equations, point = self.equations, self.equations.symmetric(point)
         rotation_unknowns, nothing = equations.rotation_unknowns, np.zeros(equations.displacement_unknowns)
         if self._n == 0:
@@ -171,11 +177,11 @@ class StabilityTest:
 
     @functools.cached_property
     def sides(self) -> Sides:
-        """Which shape of equal eigenvalues, and which sign of it."""
+        """The rule for signs of eigenvectors and for vectors of equal eigenvalues."""
         return Sides(self.equations, self.equations.worked_displacements)
 
     def _all(self, point: Point, entries: Array, limit: float) -> tuple[Array, Array | float] | None:
-        """All eigenvalues and what of them cannot be told from zero; None where factors count them instead."""
+        """All eigenvalues (n,) and the limits up to which they count as zero; None if they are counted by factors."""
         if self._is_graded(limit):
             values, _, limits = self._mode_by_mode(point, entries)
             return values, limits
@@ -184,7 +190,7 @@ class StabilityTest:
         return None
 
     def negative(self, point: Point) -> int:
-        """Number of negative eigenvalues alone: a fraction of the cost of :meth:`test`."""
+        """Number of negative eigenvalues alone, at a fraction of the cost of :meth:`test`."""
         if self._n == 0:
             return 0
         point = self.equations.symmetric(point)
@@ -196,9 +202,9 @@ class StabilityTest:
         return int((known[0] < -known[1]).sum())
 
     def depth(self, point: Point, near: float = 0.0) -> float:
-        """How far eigenvalues are below zero, by ``equations.mass``; zero where none is.
+        """Minus the lowest eigenvalue by :attr:`Equations.mass`, dimensionless; zero if none is negative.
 
-        Many unknowns: a bound of that, by the signs of pivots alone, found soon where it is ``near`` that given.
+        In large models a bound of it by the signs of pivots alone; the search begins at ``near``, an earlier value.
         """
         if self._n == 0:
             return 0.0
@@ -218,14 +224,14 @@ class StabilityTest:
 
     @staticmethod
     def _limit(entries: Array) -> float:
-        """Largest eigenvalue that cannot be told from zero, whatever its mode."""
+        """Size of eigenvalues up to which they count as zero, whatever their mode."""
         return tolerances.NEUTRAL + ENTRIES_BLUR * float(np.abs(entries).max())
 
     def _is_graded(self, limit: float) -> bool:
         return limit > GRADED and self._n <= FULL
 
     def _most_doubtful(self, point: Point, entries: Array) -> tuple[Array, Array, int, float]:
-        """Eigenvalues from that which is lowest beside its own limit, its vector, how many are below, that limit."""
+        """Eigenvalues from the lowest one over its own limit on, its vector, the number of negative ones, its limit."""
         values, vectors, limits = self._mode_by_mode(point, entries)
         if not len(values):
             return values, vectors, 0, tolerances.NEUTRAL
@@ -233,10 +239,10 @@ class StabilityTest:
         return values[lowest:], vectors[:, [lowest]], int((values < -limits).sum()), float(limits[lowest])
 
     def _mode_by_mode(self, point: Point, entries: Array) -> tuple[Array, Array, Array]:
-        """All eigenvalues, rising, their vectors as columns, and the limit below which each is rounding.
+        """All eigenvalues (n,), rising, their vectors as columns, and the limits (n,) up to which they are rounding.
 
-        Entries are as exact as their own size, not as the largest one: a mode that does not bend what is stiff is
-        blurred by what stiff entries leave of its own energy.  With all diagonals made alike the matrix keeps that.
+        Rounding of an entry is relative to that entry, not to the largest one, so that modes which do not bend stiff
+        members have small limits.  With its diagonal scaled to ones the matrix keeps this accuracy.
         """
         size = np.abs(entries)
         scale = 1.0 / np.sqrt(size[self._diagonal] + 1.0)
@@ -267,13 +273,16 @@ class StabilityTest:
         return self._n <= (DENSE_WITH_TRAVEL if len(self.equations.worked_displacements) else DENSE)
 
     def spectrum(self, point: Point, count: int) -> tuple[Array, Array]:
-        """All eigenvalues, zero where they are neutral, and the lowest shapes (count or fewer, rotation unknowns)."""
+        """All eigenvalues (n,), dimensionless, 0 for neutral ones, and the lowest modes.
+
+        Modes are rows (count or fewer, rotation unknowns), largest entry 1 rad.
+        """
         point = self.equations.symmetric(point)
         entries, rows = self._weighted(point), self._rows(point)
         projected, basis = self._projected(entries, rows)
         values, vectors = np.linalg.eigh(projected)
         rotation_unknowns, root = self.equations.rotation_unknowns, np.sqrt(self._weights)[:, None]
-        # Of what has the eigenvalue of the last one the rule takes the shape, too.
+        # All modes that share the eigenvalue of the last one are needed to choose it by the rule of sides.
         most = min(count, len(values))
         most += alike(values[most - 1 :]) - 1 if most else 0
         shapes = self.sides.in_groups(values[:most], basis @ vectors[:, :most] / root, self._weights)
@@ -282,7 +291,7 @@ class StabilityTest:
         return np.where(np.abs(values) <= limit, 0.0, values), shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
-        """Numbers of negative and of vanishing eigenvalues alone; many unknowns: of these only where it is doubtful."""
+        """Numbers of negative and of zero eigenvalues alone; in large models the latter only if ``doubtful``."""
         if self._n == 0:
             return Inertia(0, 0)
         point = self.equations.symmetric(point)
@@ -301,10 +310,19 @@ class StabilityTest:
         return Inertia(below, int((values <= limits).sum()) - below)
 
     def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
-        """Eigenvalues around zero, rising, with the number of those before them and their shapes as columns.
+        """Eigenvalues around zero, dimensionless, with the number of smaller ones and their modes.
 
-        Few unknowns: all eigenvalues.  Many: the few nearest to zero, ``sharp`` for their shapes, with -1 for a number
-        that is not counted; or each to a millionth of itself or to rounding, and those before them counted.
+        Returns
+        -------
+        int
+            Number of eigenvalues below the first listed; -1 if not counted.
+        ndarray (n,)
+            Eigenvalues, rising: in small models all, in large ones the :data:`NEAREST` to zero.
+        ndarray (rotation unknowns, n)
+            Modes as columns, rad.
+
+        In large models ``sharp`` iterates until the modes are accurate, and does not count; otherwise eigenvalues are
+        accurate to a millionth of themselves or to rounding, and smaller ones are counted.
         """
         point = self.equations.symmetric(point)
         entries, turning = self._weighted(point), self.equations.rotation_unknowns
@@ -316,13 +334,13 @@ class StabilityTest:
         values, vectors = self._inverse_iterated(point, entries, sharp=sharp)
         size, before = float(np.abs(values).max()), -1
         if not sharp:
-            # Beside what is neutral a count by factors is worthless, and none but those found are nearer to zero.
+            # A count by factors is unreliable beside a neutral mode: below all listed, or well away from zero.
             apart = size >= CLEAR_OF_ZERO and values[0] > -CLEAR_OF_ZERO
             before = self._below(point, entries, -CLEAR_OF_ZERO if apart else float(values[0] - 1e-6 * size))
         return before, values, (vectors / root)[:turning]
 
     def _projected(self, entries: Array, rows: Array) -> tuple[Array, Array]:
-        """The full matrix on the null space of the rows, and a basis of that."""
+        """The dense matrix on the null space of the rows, and an orthonormal basis of that space as columns."""
         h = np.zeros((self._n, self._n))
         h[self._h_row, self._h_column] = entries
         if not len(rows):
@@ -353,9 +371,9 @@ class StabilityTest:
         return self.equations.rows > MANY_ROWS or bool(len(self.equations.worked_displacements))
 
     def _counted_apart(self, point: Point, entries: Array, limit: float) -> Inertia | None:
-        """The inertia by counts well away from zero, and by eigenvalues what lies between; None where these differ.
+        """The inertia by counts away from zero, and by eigenvalues between these; None if the two disagree.
 
-        At zero itself a neutral direction takes all digits from the factors of the bordered matrix.
+        At zero itself a neutral direction leaves no digits in the factors of the bordered matrix.
         """
         low, high = (
             self._from_factors(point, shift, (BORDER_REGULARISATION,)) for shift in (-CLEAR_OF_ZERO, CLEAR_OF_ZERO)
@@ -386,20 +404,20 @@ class StabilityTest:
         return self._ldl.neig(matrix) - int((values < 0.0).sum())
 
     def _below_bordered(self, point: Point, shift: float) -> int:
-        """The same from the whole Newton matrix, with closings and displacements very slightly soft.
+        """As :meth:`_below` from the whole Newton matrix with a slight primal and dual regularisation.
 
-        Each row of the closings adds a negative eigenvalue.  The softness moves an eigenvalue by its share of the
-        stiffness; rounding by its inverse: both stay below a millionth.
+        Each row of the closings adds a negative eigenvalue.  The regularisation changes an eigenvalue by its share of
+        the stiffness, rounding by the inverse of it: both stay below a millionth.
         """
-        # Without pivots the factors break down where displacements hang between two slides, or between many rigid
-        # members: then they solve nothing.  What is too large for full matrices is counted with more softness.
+        # Without pivoting the factors break down for displacements between two slides, or between many rigid members.
+        # Models too large for dense matrices are then counted with more regularisation.
         found = self._from_factors(
             point, shift, (BORDER_REGULARISATION,) if self._n <= FULL else BORDER_REGULARISATIONS
         )
         return self._below_dense(point, shift) if found is None else found
 
     def _from_factors(self, point: Point, shift: float, regularisations: tuple[float, ...]) -> int | None:
-        """The same with the first of several softnesses whose factors solve anything; None where none does."""
+        """As :meth:`_below_bordered` with the first regularisation whose factors are accurate; None if none is."""
         equations = self.equations
         entries, diagonal = point.entries.copy(), equations.diagonal
         entries[diagonal[self._chosen]] -= shift * self._weights
@@ -440,13 +458,13 @@ class StabilityTest:
 
     @functools.cached_property
     def _times(self) -> Product:
-        """The weighted matrix times a block of vectors."""
+        """The product of the weighted matrix with a block of vectors (n, k)."""
         return Product(self._pattern)
 
     def _subspace(self, point: Point, entries: Array, shift: float) -> tuple[Array, Array]:
-        """Smallest eigenvalues above the shift by inverse iteration of a small subspace.
+        """Smallest eigenvalues (k,) above the shift and their vectors (n, k), by inverse iteration of a subspace.
 
-        The Newton matrix, shifted, keeps the vectors on the closings; it is as sparse as that of a solve.
+        The shifted Newton matrix keeps the vectors on the closings; it is as sparse as that of a solve.
         """
         equations, n = self.equations, self._n
         root = np.sqrt(self._weights)[:, None]
@@ -475,7 +493,7 @@ class StabilityTest:
         return SparseSolver(equations.total, equations.row, equations.column, equations.rows)
 
     def _solved(self, point: Point, shift: float, loads: Array) -> Array:
-        """Solution of the shifted Newton matrix, whose redundant rows a negative diagonal keeps from being singular."""
+        """Solution (total, k) with the shifted Newton matrix, with dual regularisation for redundant rows."""
         equations = self.equations
         for dual in (1e-14, 1e-12, 1e-10):
             shifted = point.entries.copy()
@@ -489,7 +507,7 @@ class StabilityTest:
         raise SolveError(Status.FAILED, "the tangent stays singular however it is shifted")
 
     def _inverse_iterated(self, point: Point, entries: Array, *, sharp: bool) -> tuple[Array, Array]:
-        """The eigenvalues nearest to zero, half of a block, and their vectors."""
+        """The :data:`NEAREST` eigenvalues to zero, rising, and their vectors as columns, by inverse iteration."""
         equations, n = self.equations, self._n
         root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
         block = np.random.default_rng(0).standard_normal((n, width))
@@ -513,44 +531,44 @@ class StabilityTest:
 
 
 DEEPER = 4.0
-"""Factor by which a bound of the lowest eigenvalue grows until none is below it."""
+"""Factor by which the bound of :meth:`StabilityTest.depth` grows until no eigenvalue is below it."""
 
 LOWEST = 1e30
-"""No eigenvalue is sought below minus this."""
+"""Size of negative eigenvalues, dimensionless, at which the search for a bound ends."""
 
 SHIFT = 1.3e-4
-"""Eigenvalues around zero are looked for from here: at zero itself a neutral direction would drown all others."""
+"""Minus the shift of inverse iteration around zero, dimensionless: at zero neutral directions would hide all others."""
 
 CLEAR_OF_ZERO = 1e-4
-"""This far from zero eigenvalues are counted by factors where displacements take part: these blur a hundredth of it."""
+"""Distance from zero at which factors of the bordered matrix count eigenvalues; their error is a hundredth of it."""
 
 NEAREST = 4
-"""Eigenvalues that are looked at around zero where there are many: in space two may vanish at once."""
+"""Number of eigenvalues computed around zero in large models: in space two may vanish at once."""
 
 DENSE_WITH_TRAVEL = 500
-"""The same where displacements take part."""
+"""Value of :data:`DENSE` for models in which displacement unknowns have stiffness."""
 
 MANY_ROWS = 150
-"""From this many closings on their dense complement costs more than the bordered matrix (measured)."""
+"""Number of closings above which their dense Schur complement costs more than the bordered matrix (measured)."""
 
 LIGHT = 1e-3
-"""Weight of a displacement over the length scale beside that of a rotation along the length."""
+"""Mass of a displacement unknown, dimensionless, beside that of rotations, the length of member over the scale."""
 
 BORDER_REGULARISATION = 1e-9
 """Regularisation of the bordered matrix: dual of closings, primal of displacements, beside the rest."""
 
 BORDER_REGULARISATIONS = (BORDER_REGULARISATION, 10.0 * BORDER_REGULARISATION, 100.0 * BORDER_REGULARISATION)
-"""The same one after the other, where full matrices would take long."""
+"""Regularisations that are tried one after the other in models too large for dense matrices."""
 
 FULL = 600
-"""Up to this many unknowns full matrices take less than a second."""
+"""Largest number of unknowns for which dense matrices take less than a second."""
 
 BROKEN = 1e-2
-"""Relative residual of a solve beyond which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
+"""Residual of a solve for ones from which the factors of the bordered matrix are worthless; rounding leaves 1e-6."""
 
 
 def _left_null_space(equations: Equations) -> Array:
-    """Combinations of the rows in which no displacement appears, (rows, combinations)."""
+    """Orthonormal combinations (rows, n) of the rows in which no displacement without stiffness appears."""
     w = np.zeros((equations.rows, equations.displacement_unknowns))
     w[: len(equations.model.positions.rows)] = equations.model.positions.W.full()
     w = np.delete(w, equations.worked_displacements - equations.rotation_unknowns, axis=1)

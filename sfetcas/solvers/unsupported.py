@@ -1,10 +1,10 @@
-"""Free motions along which loads do work without end: there is no equilibrium, and none is looked for.
+"""Free motions along which loads do work without end: there is no equilibrium, and none is searched.
 
-Two kinds can be known for sure before anything is solved.  A *travel* is a straight motion of displacements alone
-that strains nothing however far it goes, while the loads pull it on.  A *round* is the motion of a mechanism of
-mobility one that comes back to where it began: it is followed once around, unloaded, and the loads drive it on all
-the way, as a moment does with a crank that can turn round.  Weight cannot: what it gives on one half it takes on the
-other.  Where dead forces bend flexible members on the way the round says nothing, and the equilibrium is looked for.
+Two kinds can be recognised before anything is solved.  A *travel* is a straight motion of displacements alone that
+strains nothing however far it goes, while the loads do work on it.  A *round* is the motion of a mechanism of mobility
+one that comes back to its start: it is followed once around, unloaded, and the loads drive it all the way, as a moment
+does with a crank that can turn round.  Weight cannot: the work of one half is taken back on the other.  Where dead
+forces bend flexible members on the way the round decides nothing, and an equilibrium is searched.
 """
 
 from __future__ import annotations
@@ -26,25 +26,27 @@ from .prepared import Prepared
 __all__ = ["refuse_unsupported"]
 
 STEP = 0.1
-"""Of the fastest rotation from state to state of a round, rad."""
+"""Largest rotation from one state of a round to the next, rad."""
 
 ROUNDS = 400
-"""States of a round at most: six turns of the fastest link."""
+"""Largest number of states of a round: six turns of the fastest link."""
 
 CORRECTIONS, RESISTED = 12, 1e-3
-"""Newton steps to a state of a round at most; what keeps their matrix regular, beside stiffness and closings."""
+"""Largest number of Newton steps to a state of a round; their primal regularisation, share of the weight."""
 
 FAR = (1.0, 1e6)
-"""Travels, in lengths of the scene, over which nothing may be strained."""
+"""Amplitudes, in lengths of the scene, at which a straight motion must strain nothing to count as a travel."""
 
 
 def refuse_unsupported(prepared: Prepared, factor: float) -> None:
-    """Refuse a motion that is free and that the loads drive on without end.
+    """Refuse a scene with a free motion that the loads at a factor drive without end.
+
+    Scenes with contacts, stops or prescribed motions are not examined.
 
     Raises
     ------
     SceneError
-        Names the motion.
+        There is one; the message describes the motion.
     """
     model = prepared.model
     stopped = model.scene.contacts or any(spring.stop is not None for spring in model.scene.springs.values())
@@ -60,7 +62,7 @@ def refuse_unsupported(prepared: Prepared, factor: float) -> None:
 
 
 def _known(prepared: Prepared, loading: Loading) -> bool:
-    """Whether a round tells of the loads: they drive it, and bend nothing on the way that could hold them."""
+    """Whether an unloaded round decides: couples or followers drive it, and no dead force bends flexible members."""
     drive = loading.of(lambda kind: kind.is_couple or kind.follows)
     flexible = any(member.type != "rigid" for member in prepared.model.scene.members.values())
     dead = loading.force.any() or loading.pull.any() or loading.of(lambda kind: not kind.is_couple and not kind.follows)
@@ -68,13 +70,13 @@ def _known(prepared: Prepared, loading: Loading) -> bool:
 
 
 def _pull(prepared: Prepared, state: State, loading: Loading) -> Array:
-    """What drives the unknowns at a state without reactions, (unknowns,)."""
+    """Generalised forces (unknowns,) on the unknowns at a state with zero multipliers, dimensionless."""
     point = prepared.equations.at(replace(state, lam=np.zeros_like(state.lam)), loading)
     return -point.residual[: prepared.equations.unknowns]
 
 
 def _acting(loading: Loading) -> float:
-    """Largest load: what is next to nothing beside it is what rounding of directions leaves."""
+    """Largest load, dimensionless: beside it forces that are rounding of directions are tiny."""
     parts = (loading.force, loading.pull, *loading.loads)
     return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
@@ -85,7 +87,7 @@ def _moved(prepared: Prepared, state: State, motion: Array) -> State:
 
 
 def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) -> Array | None:
-    """The motion of displacements alone that the loads drive furthest, where nothing ever holds it."""
+    """The straight motion (unknowns,) on which the loads do most work, if nothing ever stops it; else None."""
     equations = prepared.equations
     unloaded, turning = prepared.model.loading(0.0, 0.0), equations.rotation_unknowns
     _, sizes, right = np.linalg.svd(np.linalg.qr(motions[:turning], mode="r"))
@@ -107,7 +109,7 @@ def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) 
 
 
 def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) -> Array | None:
-    """The motion of a mechanism that comes back to where it began, where the loads drive it all the way."""
+    """The first direction (unknowns,) of a mechanism's motion round to its start if loads drive it all the way."""
     equations, unloaded = prepared.equations, prepared.model.loading(0.0, 0.0)
     first = _of_unit_speed(equations.rotation_unknowns, motion)
     if first is None:
@@ -126,11 +128,11 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
             return None
         before, state = state, _unstrained(prepared, _moved(prepared, state, STEP * speed), unloaded)
         went = _apart(prepared, state, before)
-        # What resists draws back, and where the motion turns sharply a step leads elsewhere.
+        # A motion with resistance is drawn back; after a sharp bend of the motion a step leads elsewhere.
         if not 0.5 * STEP < went < 0.5:
             return None
         free = free_motions(equations, prepared.weight, state)
-        # Where all links lie in one line there are two motions: on along the one that led there.
+        # With all links in one line there are two motions: that which continues the last one is taken.
         onward = _of_unit_speed(equations.rotation_unknowns, free @ np.linalg.lstsq(free, speed, rcond=None)[0])
         point = equations.at(state, unloaded)
         gap = np.abs(point.residual[equations.unknowns :]).max(initial=0.0)
@@ -145,10 +147,10 @@ def _round(prepared: Prepared, loading: Loading, start: State, motion: Array) ->
 
 
 def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
-    """The state without strain and gaps next to one, across what is free, by Newton steps without reactions."""
+    """The state without strain and gaps nearest to one, by Newton steps that leave the free motion alone."""
     equations = prepared.equations
     n, weight = equations.unknowns, prepared.weight
-    # Soft beside all stiffness: it leaves along what is free only what is there, which is next to nothing.
+    # Small beside all stiffness: along the free motion there is next to no force, so that nothing moves along it.
     primal = RESISTED * np.concatenate([weight, np.full(n - len(weight), float(weight.mean()))])
 
     def at(state: State) -> Point:
@@ -161,7 +163,7 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
         return step
 
     def after(here: Iterate, step: Array) -> Iterate:
-        # Displacements are to arrive as rotations are.
+        # Displacements have to converge as well as rotations.
         return replace(moving(equations, at)(here, step), length=float(np.abs(step).max(initial=0.0)))
 
     begin = Iterate(state, at(state))
@@ -169,12 +171,12 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
 
 
 def _of_unit_speed(rotation_unknowns: int, motion: Array) -> Array | None:
-    """The motion with a fastest rotation of one; None of one that turns nothing."""
+    """The motion (unknowns,) scaled to a largest rotation of 1; None if it rotates nothing."""
     fastest = float(np.abs(motion[:rotation_unknowns]).max(initial=0.0))
     return motion / fastest if fastest > tolerances.NEGLIGIBLE * np.abs(motion).max(initial=0.0) else None
 
 
 def _apart(prepared: Prepared, a: State, b: State) -> float:
-    """Largest difference of two states, whole turns left out, rad or lengths of the scene."""
+    """Largest difference of two states, without whole turns, rad or lengths of the scene."""
     turned = prepared.distance(a, b) if prepared.model.space else np.abs(np.exp(1j * a.q) - np.exp(1j * b.q))
     return float(max(np.max(turned, initial=0.0), np.abs(a.y - b.y).max(initial=0.0)))
