@@ -141,6 +141,8 @@ ORDER = [
     "equilibria.meshing",
     "equilibria.ways",
     "equilibria.refinement",
+    "equilibria.further",
+    "equilibria.contact_steps",
     "equilibria.statics",
     "equilibria.stops",
     "dynamics",
@@ -289,7 +291,7 @@ PICTURES = (
 HEAVY = {"scipy", "tqdm"}
 """Packages that take long to import and that few runs need: they may be imported where they are used."""
 
-DISPATCHERS = ("analyses", "outputs", "cli")
+DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics")
 """What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
 chose."""
 
