@@ -169,7 +169,7 @@ class SymbolicTerms:
         """As :meth:`gaps`, from the arguments that :meth:`every` gives."""
         closed, rows = self.open_gaps(y, given), []
         for number, (group, own) in enumerate(zip(self.model.terms, arguments, strict=True)):
-            if not len(group.data) or not (group.rows or number == 0):
+            if not len(group.data) or not (group.rows if number else self.model.positions.rows):
                 continue
             found = ca.vec(self.many(rows_of(group.kind), len(group.data))(*own))
             if number == 0:

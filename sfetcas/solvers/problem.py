@@ -170,6 +170,8 @@ class EquilibriumProblem:
 
     def _jacobian(self) -> ca.MX:
         tables, w = self._tables, self.model.positions.W
+        if not self.row_names:
+            return ca.MX(0, tables.unknowns)
         closed = tables.closed
         chords = ca.vec(self._slopes[0][1])
         values = [picked(chords, closed.entry) * ca.DM(closed.value)]
