@@ -282,7 +282,7 @@ class Equations:
         return np.asarray(positions.Z @ delta + positions.W @ state.y + positions.BZ @ loading.shift)
 
     def retained_places(self, state: State, loading: Loading) -> Array:
-        """Displacements (places, axes), dimensionless, of kept places (unknown or prescribed); undefined for others."""
+        """Displacements (places, axes), dimensionless, of retained places, unknown or prescribed; else undefined."""
         positions = self.model.positions
         moved = positions.Y @ state.y + positions.B @ loading.shift
         return np.asarray(moved.reshape(len(self.model.segments.places), self.model.element.axes))

@@ -152,7 +152,7 @@ class SymbolicTerms:
         return moved + times(self.reaching, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
 
     def retained_places(self, y: ca.MX, given: Given) -> ca.MX:
-        """Displacements of kept places (unknown or prescribed), (places * axes,); undefined for others."""
+        """Displacements of retained places (unknown or prescribed), (places * axes,); undefined for others."""
         positions = self.model.positions
         return added((positions.Y, y), (positions.B, given.shift))
 

@@ -44,7 +44,7 @@ class Positions:
     rows, unknowns : tuple of str
         Names of the closing equations and of the displacement unknowns.
     retained : ndarray (places, axes)
-        For each component of a kept place its index in ``y``; -1 where it is prescribed or the place is not kept.
+        For each component of a retained place its index in ``y``; -1 where it is prescribed or has none.
     """
 
     E: SparseMap

@@ -64,12 +64,15 @@ AROUND = 20
 """Steps more for each that driven motions ask for at least: a snap that a radian brings takes so many to find."""
 
 MOST_WITHOUT_POTENTIAL = 6000
-"""The same where there is no other way: a follower of 1e4 EI/L^2 swings a cantilever through 4,000 steps."""
+"""Steps tried before giving up where loads cannot be minimised, so that there is no other way to the answer.
+
+A follower of 1e4 EI/L^2 swings a cantilever through 4,000 steps.
+"""
 
 
 @dataclass(frozen=True)
 class Followed:
-    """Where following arrived.
+    """Result of :func:`follow`.
 
     Attributes
     ----------
@@ -109,11 +112,13 @@ def follow(
     allowed: Callable[[State, Loading, State, Loading], bool] | None = None,
     refuse: Callable[[State, Loading], None] | None = None,
 ) -> Followed:
-    """Follow from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
+    """Natural-parameter continuation from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
-    With ``switch_branch=False`` a state that becomes unstable is followed on, as far as Newton's method carries.  A
-    step that is not ``allowed`` from one state and loading to the next is too long, and where short ones are not either
-    the way ends.  ``refuse`` is shown each state, and raises where there is no sense in going on.
+    Steps are corrected by Newton's method and shortened where its corrections are long or do not shrink; the inertia is
+    counted at each point.  With ``switch_branch=False`` a state that becomes unstable is followed on, as far as
+    Newton's method carries.  A step that is not ``allowed`` from one state and loading to the next is too long, and
+    where short ones are not either the way ends.  ``refuse`` is shown each state, and raises where there is no sense in
+    going on.
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))

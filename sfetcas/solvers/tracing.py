@@ -82,10 +82,11 @@ class Traced:
         In their order, limit and bifurcation points among them.
     events : list of Event
     end : str
-        Why it ends: ``range``, ``points``, ``closed`` (the last point is the first one again), ``lost``, or ``bent``
-        beyond what small members are for.
+        Why it ends: ``range`` (the factor leaves it), ``points`` (as many as asked for), ``closed`` (the last point is
+        the first one again), ``lost`` (no further point was found), or ``bent`` (a small member beyond linear
+        elasticity).
     told : str
-        Of ``bent``, which member and how far.
+        Where it ends ``bent``: a sentence that names the member and its deformation.
     """
 
     points: list[Standing]
@@ -126,7 +127,7 @@ def trace(
 
 
 def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
-    """The same where folds of the factor at which no eigenvalue changes its sign are bifurcations.
+    """A stretch in which folds of the factor at which no eigenvalue changes its sign are bifurcations.
 
     Another curve crosses there, of which this one is the branch to both sides.  The eigenvalue only touches zero, so
     its sign may be seen to change and change back beside the fold.
@@ -152,7 +153,7 @@ def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
 
 
 def without(traced: Traced, known: Sequence[Standing]) -> Traced:
-    """The same without the bifurcations at points that are known already."""
+    """A stretch without the bifurcations at points that are known already, as those of the curve it branches off."""
 
     def is_known(event: Event) -> bool:
         return event.kind == "bifurcation" and any(_meets(event.standing, other) for other in known)
@@ -188,7 +189,7 @@ def _apart(curve: Curve, a: Standing, b: Standing) -> float:
 
 
 def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: float, more: int) -> Traced:
-    """The same within one piece, with steps that change the factor by a stride at most."""
+    """Follow a curve within one piece of the histories, in steps that change the factor by a stride at most."""
     points: list[Standing] = [start]
     events: list[Event] = []
     now, before, length = start, None, FIRST
@@ -296,10 +297,17 @@ def _growth(curve: Curve, now: Standing, there: Standing) -> float:
 def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int = 1) -> Standing | None:
     """The first point on the branch that crosses at a bifurcation, looking away from it.
 
-    The branch is looked for across the shape with the number at growing distances: there the shape's share is given
-    and the factor is found, while on the curve that was followed there is no such point.  Where other shapes vanish
-    with it these are held at first: if all is in balance then, each combination leads to a branch like this one, and
-    it goes along none of the others.
+    The branch is looked for across one of the singular shapes, with the ``number``, at growing distances: there the
+    share of the shape is given and the factor is unknown, while the curve that was followed has no such point.  Where
+    other eigenvalues vanish as well, no step goes along their shapes at first: if all is in balance then, each
+    combination of them leads to a branch like this one, and it goes along none of the others.
+
+    Parameters
+    ----------
+    shapes : ndarray (rotation unknowns, multiplicity)
+        As of :func:`~sfetcas.solvers.critical.shapes_at`.
+    side : int
+        1 or -1: in which direction along the shape.
     """
     here = event.standing
     across = _full_shape(curve, here, shapes[:, number - 1])
