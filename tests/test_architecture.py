@@ -111,7 +111,7 @@ ORDER = [
     "solvers.problem",
     "solvers.globalised",
     "solvers.prepared",
-    "solvers.unsupported",
+    "solvers.unrestrained",
     "solvers.deflation",
     "solvers.arclength",
     "solvers.critical",
@@ -437,6 +437,26 @@ def test_imports_stand_at_the_top(name):
     assert scipy <= inside
     if name not in DISPATCHERS:
         assert {str(package).split(".")[0] for node in inside for package in packages(node)} <= HEAVY
+
+
+def run_at_import(node):
+    """What runs when a module is imported: all but the bodies of functions."""
+    yield node
+    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+        named = [] if isinstance(node, ast.Lambda) else node.decorator_list
+        parts = [*named, *node.args.defaults, *(each for each in node.args.kw_defaults if each is not None)]
+    else:
+        parts = ast.iter_child_nodes(node)
+    for part in parts:
+        yield from run_at_import(part)
+
+
+@each
+def test_tolerances_are_read_when_they_are_asked(name):
+    # What is read at import does not follow a test that moves a tolerance.
+    for node in run_at_import(tree(name)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            assert node.value.id != "tolerances", f"tolerances.{node.attr} is read at import in line {node.lineno}"
 
 
 @each

@@ -257,7 +257,7 @@ class ContactRun:
                     detail = f"node {node} is held {-gap:.3g} m inside contacts.{contact}"
                     raise SolveError(Status.INFEASIBLE, detail)
 
-    def refuse_unsupported(self, pilot: Prepared) -> None:
+    def refuse_unrestrained(self, pilot: Prepared) -> None:
         """Refuse a scene that neither supports nor plane obstacles hold in some direction.
 
         Raises

@@ -20,6 +20,7 @@ from ..mathematics.linear import SparseMap
 from ..mathematics.spectra import largest
 from ..solvers.arclength import Curve, Standing
 from ..solvers.beginning import begin_path
+from ..solvers.newton import largest_rotation
 from ..solvers.prepared import Prepared
 
 __all__ = ["buckling_factors"]
@@ -67,7 +68,7 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
 
     inverse, _ = largest(apply, equations.total, BOTH_SIDES * count)
     sizes = np.abs(inverse)
-    turned = float(np.abs(start.tangent.z[: equations.rotation_unknowns]).max(initial=0.0)) / abs(start.tangent.factor)
+    turned = largest_rotation(equations, start.tangent.z) / abs(start.tangent.factor)
     told = sizes > FAR * max(turned, sizes.max(initial=0.0))
     real = inverse[(np.abs(inverse.imag) <= IMAGINARY * sizes) & told].real
     factors = 1.0 / real
@@ -78,7 +79,7 @@ def _change(curve: Curve, start: Standing) -> SparseMap:
     """Derivative of the Newton matrix by the factor along the path."""
     equations = curve.equations
     rate, loads = start.tangent.z / start.tangent.factor, curve.rate(start.factor)
-    turned = float(np.abs(rate[: equations.rotation_unknowns]).max(initial=0.0))
+    turned = largest_rotation(equations, rate)
     h = 1.0 / max(turned / TURN, float(np.abs(rate).max(initial=0.0)), TINY)
 
     def entries(w: float) -> Array:

@@ -107,7 +107,7 @@ class ContactSteps:
             return unstable
         if refused is not None:
             raise refused
-        self.run.refuse_unsupported(self.meshes.prepared(self.meshes.pilot_mesh))
+        self.run.refuse_unrestrained(self.meshes.prepared(self.meshes.pilot_mesh))
         detail = "no state in contact was found on the way of the loads from zero, on cushions, nor by obstacles coming"
         raise SolveError(Status.FAILED, f"{detail} back: {', '.join(self.run.named(failure))}")
 

@@ -18,7 +18,7 @@ from ..errors import SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.mesh import Mesh
 from ..solvers.prepared import Prepared
-from ..solvers.unsupported import refuse_unsupported
+from ..solvers.unrestrained import refuse_unrestrained
 from .meshing import EquilibriumResult, Meshing
 from .refinement import Refinement
 from .settings import Settings
@@ -98,7 +98,7 @@ class LoadSteps:
         steps: list[Equilibrium] = []
         last: tuple[float, EquilibriumResult] | None = None
         for factor in self.scene.analysis.steps:
-            refuse_unsupported(pilot, factor)
+            refuse_unrestrained(pilot, factor)
             try:
                 if contact is not None:
                     steps.append(contact.answer(pilot, factor))

@@ -22,6 +22,7 @@ from ..mechanics.mesh import Mesh, Touch
 from ..mechanics.model import Model
 from ..solvers.arclength import Tangent
 from ..solvers.critical import root
+from ..solvers.newton import largest_rotation
 from ..solvers.tracing import FAR
 from .contact_curve import ContactCurve, Stood
 
@@ -190,7 +191,7 @@ class Tracer:
 
     def _longest(self, now: Stood) -> float:
         curve = self.curve.plain(now.held.prepared)
-        turning = float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
+        turning = largest_rotation(curve.equations, now.tangent.z)
         stride = (self.span[1] - self.span[0]) / SHARE
         return min(LONGEST / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
@@ -235,7 +236,7 @@ class Tracer:
         if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST):
             return False
         expected = self.curve.expected(now, length, before)[0]
-        turned = length * float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
+        turned = length * largest_rotation(curve.equations, now.tangent.z)
         return curve.prepared.distance(expected, there.standing.state) <= FAR * turned + EVENT * FAR
 
     def wrong(self, now: Stood, there: Stood) -> tuple[Touch, ...] | None:

@@ -43,8 +43,11 @@ LARGE_PRIMAL_FACTOR = 1e3
 DOUBT = 30.0
 """Response to a random load of size one above which an eigenvalue may vanish; an eigenvalue of 1e-7 gives 1e5."""
 
-LIMITS = Limits(iterations=10, short=0.01, turned=TURN, near=tolerances.BALANCED, returns=False)
-"""Limits of corrections: beside a bifurcation the first ones wander along its mode, and short ones need not shrink."""
+ITERATIONS = 10
+"""Largest number of Newton steps of a correction."""
+
+SHORT = 0.01
+"""Corrections shorter than this, rad, need not shrink: beside a bifurcation the first ones wander along its mode."""
 
 FIXED_STEP = 1e-3
 """Change of prescribed rotations, rad, in differences of the equations by the factor: of fourth order, so 1e-13."""
@@ -306,7 +309,8 @@ class Curve:
         system = _Across(
             self, across, primal_factor if across.neutral is None else max(primal_factor, LARGE_PRIMAL_FACTOR), sharp
         )
-        found = correct(system, state, factor=factor, limits=LIMITS)
+        limits = Limits(iterations=ITERATIONS, short=SHORT, turned=TURN, near=tolerances.BALANCED, returns=False)
+        found = correct(system, state, factor=factor, limits=limits)
         if not found.converged:
             return None
         loading = self.loading(found.factor)

@@ -16,7 +16,7 @@ from .prepared import Prepared
 from .redundancy import loose_rows, named_in, stretched
 from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
-from .unsupported import refuse_unsupported
+from .unrestrained import refuse_unrestrained
 
 __all__ = ["begin_path", "check_slack"]
 
@@ -68,7 +68,7 @@ def _first_state(prepared: Prepared, beside: float) -> tuple[State, float, tuple
     model, equations = prepared.model, prepared.equations
     unloaded = model.loading(0.0, 0.0)
     state = equations.start(unloaded)
-    refuse_unsupported(prepared, beside)
+    refuse_unrestrained(prepared, beside)
     moved = np.any(model.loading(beside).shift - model.loading(0.0).shift)
     if moved and prepared.lacks_slack:
         note = f"straight members have no slack: the path starts at factor {beside:g}, where they have bent"

@@ -19,9 +19,9 @@ from ..description.records import enumerated
 from ..description.supports import along, upwards
 from ..mathematics.arrays import Array, first_of_largest
 from ..mathematics.linear import SparseMap, blurred
-from ..mechanics.equations import Equations, Point, State
+from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
-from .newton import Iterate, moving, newton
+from .newton import Iterate, Moving, newton
 from .redundancy import loose_rows, rows_in
 
 __all__ = ["Diagnosis", "contradiction", "diagnose", "free_motions", "in_words", "moves_nodes"]
@@ -252,10 +252,7 @@ def contradiction(equations: Equations, state: State, loading: Loading) -> str:
 
 def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[State, Array, float]:
     """A state near one with the least norm of gaps, by Levenberg-Marquardt; gaps (rows,); their largest gradient."""
-    n, soft = equations.unknowns, 1e-2
-
-    def at(state: State) -> Point:
-        return equations.at(state, loading)
+    n, soft, moving = equations.unknowns, 1e-2, Moving(equations, loading)
 
     def step(here: Iterate) -> Array:
         primal, gaps = np.full(n, soft), here.point.residual[n:]
@@ -266,13 +263,13 @@ def _nearest(equations: Equations, state: State, loading: Loading) -> tuple[Stat
 
     def after(here: Iterate, step: Array) -> Iterate:
         nonlocal soft
-        there = moving(equations, at)(here, step)
+        there = moving(here, step)
         nearer = np.linalg.norm(there.point.residual[n:]) < np.linalg.norm(here.point.residual[n:])
         soft *= 0.3 if nearer else 10.0
         return there if nearer else here
 
-    state = equations.holding(state, loading)
-    here, _ = newton(Iterate(state, at(state)), step, after, lambda here: False, DAMPED)
+    begin = moving.at(equations.holding(state, loading))
+    here, _ = newton(begin, step, after, lambda here: False, DAMPED)
     chosen = (equations.row >= n) & (equations.column < n)
     slope, gaps = np.zeros(n), here.point.residual[n:]
     np.add.at(slope, equations.column[chosen], here.point.entries[chosen] * gaps[equations.row[chosen] - n])

@@ -15,10 +15,10 @@ from dataclasses import replace
 
 from .. import tolerances
 from ..mathematics.arrays import Array
-from ..mechanics.equations import Equations, Point, State
+from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
-from .newton import Corrected, Iterate, newton, newton_step, turned_by
+from .newton import Corrected, Iterate, Moving, largest_rotation, newton, newton_step
 from .prepared import Prepared
 
 __all__ = ["deflated", "nearest"]
@@ -39,15 +39,13 @@ ITERATIONS = 40
 def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence[State]) -> Corrected | None:
     """An equilibrium by Newton's method from a state, kept away from the known states; None without convergence."""
     equations = prepared.equations
-
-    def at(state: State) -> Point:
-        return equations.at(state, loading)
+    moving = Moving(equations, loading)
 
     def step(here: Iterate) -> Array:
         return newton_step(equations, here.point, prepared.weight)
 
     def after(here: Iterate, step: Array) -> Iterate:
-        length = turned_by(equations, step)
+        length = largest_rotation(equations, step)
         if length < UNDEFLATED:
             return replace(here, length=length)
         # The step of the deflated equations points along the plain one, forwards or backwards.
@@ -55,10 +53,10 @@ def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence
         left = 1.0 - sum(_slope(equations, here.state, other, turned) for other in known)
         stretch = min(1.0 / max(abs(left), 1e-12), LONGEST / length)
         state = equations.moved(here.state, (stretch if left > 0.0 else -stretch) * step)
-        return Iterate(state, at(state))
+        return moving.at(state)
 
-    begin = equations.holding(state, loading)
-    near, arrived = newton(Iterate(begin, at(begin)), step, after, lambda here: here.length < UNDEFLATED, ITERATIONS)
+    begin = moving.at(equations.holding(state, loading))
+    near, arrived = newton(begin, step, after, lambda here: here.length < UNDEFLATED, ITERATIONS)
     found = prepared.correct(near.state, loading) if arrived else None
     return found if found is not None and found.converged else None
 

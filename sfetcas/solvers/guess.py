@@ -9,11 +9,11 @@ import numpy as np
 from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
-from ..mechanics.equations import Equations, Point, State
+from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
-from .newton import TURN, Iterate, descend, moving, newton
+from .newton import TURN, Iterate, Moving, descend, newton
 from .redundancy import loose_rows
 
 __all__ = ["first_guess", "lacks_slack", "lead", "restore"]
@@ -61,9 +61,6 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     primal = np.concatenate([0.1 * weight, np.full(n - equations.rotation_unknowns, 1e-6)])
     metric = equations.regularised(equations.elastic_entries(), primal, tolerances.DUAL)
 
-    def at(state: State) -> Point:
-        return equations.at(state, loading)
-
     def gap(here: Iterate) -> float:
         return float(np.abs(here.point.residual[n:]).max())
 
@@ -73,8 +70,8 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
         step[n:] = 0.0
         return step
 
-    begin, after = Iterate(state, at(state)), moving(equations, at, LONGEST)
-    here, _ = newton(begin, step, after, lambda here: gap(here) < tolerances.CLOSED, CLOSING)
+    after = Moving(equations, loading, LONGEST)
+    here, _ = newton(after.at(state), step, after, lambda here: gap(here) < tolerances.CLOSED, CLOSING)
     return here.state, gap(here)
 
 
@@ -89,9 +86,6 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
     chosen = np.flatnonzero(np.isfinite(targets))
     begun = equations.node_jacobian(state, unloaded, chosen)[0]
 
-    def at(state: State) -> Point:
-        return equations.at(state, unloaded, convex=True)
-
     def step(here: Iterate) -> Array:
         nodal, jacobian = equations.node_jacobian(here.state, unloaded, chosen)
         wanted = begun + min(1.0, (here.count + 1) / LEADING) * (targets[chosen] - begun) - nodal
@@ -102,8 +96,8 @@ def lead(equations: Equations, state: State, loading: Loading, weight: Array, ta
         pull = np.linalg.solve(border.T @ base[:, 1:] + np.eye(len(chosen)) / SPRING, wanted - border.T @ base[:, 0])
         return np.asarray(base[:, 0] + base[:, 1:] @ pull)
 
-    begin, after = Iterate(state, at(state)), moving(equations, at, LONGEST)
-    state = newton(begin, step, after, lambda here: False, LEADING + SETTLING)[0].state
+    after = Moving(equations, unloaded, LONGEST, convex=True)
+    state = newton(after.at(state), step, after, lambda here: False, LEADING + SETTLING)[0].state
     return state, float(np.abs(targets[chosen] - equations.node_jacobian(state, unloaded, chosen)[0]).max())
 
 

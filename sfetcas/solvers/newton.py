@@ -27,13 +27,13 @@ __all__ = [
     "Corrected",
     "Iterate",
     "Limits",
+    "Moving",
     "System",
     "correct",
     "descend",
-    "moving",
+    "largest_rotation",
     "newton",
     "newton_step",
-    "turned_by",
 ]
 
 TURN = 1.2
@@ -101,24 +101,38 @@ def newton(
     return here, arrived(here)
 
 
-def moving(
-    equations: Equations, at: Callable[[State], Point], longest: float = np.inf
-) -> Callable[[Iterate, Array], Iterate]:
-    """The function ``after`` of :func:`newton` that shortens a step (total,) to rotations of at most ``longest``, rad.
+@dataclass(frozen=True)
+class Moving:
+    """The usual ``after`` of :func:`newton`: shortens steps, moves the state and evaluates the equations there.
 
-    ``at`` evaluates the equations at a state.
+    Attributes
+    ----------
+    equations : Equations
+    loading : Loading
+    longest : float
+        Largest rotation of a node in a step, rad.
+    convex : bool
+        As of :meth:`Equations.at`.
     """
 
-    def after(here: Iterate, step: Array) -> Iterate:
-        length = turned_by(equations, step)
-        state = equations.moved(here.state, step * min(1.0, longest / max(length, TINY)))
-        return Iterate(state, at(state), length, here.count + 1)
+    equations: Equations
+    loading: Loading
+    longest: float = np.inf
+    convex: bool = False
 
-    return after
+    def at(self, state: State) -> Iterate:
+        """The first iterate, at a state."""
+        return Iterate(state, self.equations.at(state, self.loading, convex=self.convex))
+
+    def __call__(self, here: Iterate, step: Array) -> Iterate:
+        """The iterate after a step (total,)."""
+        length = largest_rotation(self.equations, step)
+        state = self.equations.moved(here.state, step * min(1.0, self.longest / max(length, TINY)))
+        return replace(self.at(state), length=length, count=here.count + 1)
 
 
-def turned_by(equations: Equations, step: Array) -> float:
-    """Largest rotation, rad, in a step (unknowns or more,)."""
+def largest_rotation(equations: Equations, step: Array) -> float:
+    """Largest rotation of a step or rate (unknowns or more,), rad or rad by what it is a rate of."""
     return float(np.abs(step[: equations.rotation_unknowns]).max(initial=0.0))
 
 
@@ -331,15 +345,16 @@ class _Correction:
         return Balance(state, seen, length, count, plain=plain, loading=loading, factor=factor, residual=residual)
 
     def arrived(self, here: Balance) -> bool:
+        if here.over or here.residual == 0.0:
+            return True
         # One step is always taken: under a tiny load the residual of the unloaded state is below rounding already.
-        if here.over or here.residual == 0.0 or not here.count:
-            return here.over or here.residual == 0.0
-        return self.system.suffices(here) or (
-            here.residual <= tolerances.EXACT and balanced(self.equations, here.point)
-        )
+        if not here.count:
+            return False
+        exact = here.residual <= tolerances.EXACT and balanced(self.equations, here.point)
+        return exact or self.system.suffices(here)
 
     def after(self, here: Balance, step: Array) -> Balance | None:
-        limits, length = self.limits, turned_by(self.equations, step)
+        limits, length = self.limits, largest_rotation(self.equations, step)
         self.lengths.append(length)
         grows = length > limits.most or length > max(limits.contraction * here.length, limits.short)
         if sum(self.lengths) > limits.turned or (here.count and here.residual > self.tolerance and grows):
@@ -408,7 +423,7 @@ def descend(
         return equations.at(state, loading, convex=True)
 
     def after(here: _Downhill, step: Array) -> _Downhill:
-        point, length = here.point, turned_by(equations, step)
+        point, length = here.point, largest_rotation(equations, step)
         # Slope of the potential alone: the residual without the multipliers' share.
         lam = here.state.lam
         penalty = 2.0 * float(np.abs(lam + step[n:]).max(initial=0.0))

@@ -20,7 +20,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
-from .newton import Iterate, moving, newton, newton_step, turned_by
+from .newton import Iterate, Moving, largest_rotation, newton, newton_step
 
 __all__ = ["Drag", "flow"]
 
@@ -65,28 +65,26 @@ def flow(
     diagonal = equations.diagonal[: equations.rotation_unknowns]
     deep, last, age = 0.0, LEAST_SHIFT, 0
 
-    def at(state: State) -> Point:
-        return equations.at(state, loading)
-
     def step(here: Iterate) -> Array:
         nonlocal deep, last, age
         if not ARRIVED < here.length < np.inf or age == LASTING:
             deep, age = depth(here.point, deep), 0
         age += 1
-        shift, length = 2.0 * deep, np.inf
-        while length > LONGEST:
+        shift = 2.0 * deep
+        while True:
             entries = here.point.entries.copy()
             entries[diagonal] += shift * equations.mass
             step = newton_step(equations, replace(here.point, entries=entries), equations.mass)
-            length = turned_by(equations, step)
-            used, shift = shift, max(SHIFT_GROWTH * shift, last / SHIFT_GROWTH**2, LEAST_SHIFT)
-        last = used
-        return step
+            if not LONGEST < largest_rotation(equations, step) < np.inf:
+                last = shift
+                return step
+            shift = max(SHIFT_GROWTH * shift, last / SHIFT_GROWTH**2, LEAST_SHIFT)
 
     def arrived(here: Iterate) -> bool:
         return deep == 0.0 and here.length < ARRIVED and (age == 1 or depth(here.point, deep) == 0.0)
 
-    here, rests = newton(Iterate(state, at(state)), step, moving(equations, at), arrived, MOST)
+    after = Moving(equations, loading)
+    here, rests = newton(after.at(state), step, after, arrived, MOST)
     return here.state if rests else None, here.count
 
 

@@ -16,6 +16,7 @@ from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
 from .critical import LARGEST_PRIMAL_FACTOR, Event, events_between
+from .newton import largest_rotation
 from .residuals import relative_residual
 
 __all__ = ["FAR", "Traced", "passes", "switched", "trace", "without"]
@@ -236,7 +237,7 @@ def _to_start(curve: Curve, start: Standing, now: Standing, there: Standing) -> 
 
 
 def _longest(curve: Curve, now: Standing, stride: float) -> float:
-    turning = float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
+    turning = largest_rotation(curve.equations, now.tangent.z)
     return min(STRIDE / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
 
@@ -261,7 +262,7 @@ def _step(
 def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, length: float) -> bool:
     if curve.inner(now.tangent, there.tangent) < np.cos(SHARPEST * TURNING):
         return False
-    turned = length * float(np.abs(now.tangent.z[: curve.equations.rotation_unknowns]).max(initial=0.0))
+    turned = length * largest_rotation(curve.equations, now.tangent.z)
     if curve.prepared.distance(expected, there.state) > FAR * turned + SHORTEST:
         return False
     folded = now.tangent.factor * there.tangent.factor < 0.0

@@ -17,13 +17,13 @@ from .. import tolerances
 from ..description.supports import free_to_move
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from ..mechanics.equations import Point, State
+from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from .constraints import free_motions, in_words
-from .newton import Iterate, moving, newton
+from .newton import Iterate, Moving, newton
 from .prepared import Prepared
 
-__all__ = ["refuse_unsupported"]
+__all__ = ["refuse_unrestrained"]
 
 STEP = 0.1
 """Largest rotation from one state of a round to the next, rad."""
@@ -38,7 +38,7 @@ FAR = (1.0, 1e6)
 """Amplitudes, in lengths of the scene, at which a straight motion must strain nothing to count as a travel."""
 
 
-def refuse_unsupported(prepared: Prepared, factor: float) -> None:
+def refuse_unrestrained(prepared: Prepared, factor: float) -> None:
     """Refuse a scene with a free motion that the loads at a factor drive without end.
 
     Scenes with contacts, stops or prescribed motions are not examined.
@@ -150,11 +150,9 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
     """The state without strain and gaps nearest to one, by Newton steps that leave the free motion alone."""
     equations = prepared.equations
     n, weight = equations.unknowns, prepared.weight
+    moving = Moving(equations, unloaded)
     # Small beside all stiffness: along the free motion there is next to no force, so that nothing moves along it.
     primal = RESISTED * np.concatenate([weight, np.full(n - len(weight), float(weight.mean()))])
-
-    def at(state: State) -> Point:
-        return equations.at(state, unloaded)
 
     def step(here: Iterate) -> Array:
         equations.solver.factor(equations.regularised(here.point.entries, primal, tolerances.DUAL))
@@ -164,10 +162,9 @@ def _unstrained(prepared: Prepared, state: State, unloaded: Loading) -> State:
 
     def after(here: Iterate, step: Array) -> Iterate:
         # Displacements have to converge as well as rotations.
-        return replace(moving(equations, at)(here, step), length=float(np.abs(step).max(initial=0.0)))
+        return replace(moving(here, step), length=float(np.abs(step).max(initial=0.0)))
 
-    begin = Iterate(state, at(state))
-    return newton(begin, step, after, lambda here: here.length < tolerances.CLOSED, CORRECTIONS)[0].state
+    return newton(moving.at(state), step, after, lambda here: here.length < tolerances.CLOSED, CORRECTIONS)[0].state
 
 
 def _of_unit_speed(rotation_unknowns: int, motion: Array) -> Array | None:
