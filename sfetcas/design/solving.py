@@ -21,6 +21,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..parametric.equilibrium import asked_mesh
+from ..solvers.continuation import advanced
 from .assembled import REQUIRED, Assembled, Pair, places_asked
 from .bounds import refuse_contradictions
 from .certifying import Certified, certified
@@ -105,6 +106,17 @@ class Solved:
     mesh: Mesh
     equations: CaseEquations
     numbers: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Along:
+    """A solution on the way from the guess: its share of the way, unknowns, constants and multipliers."""
+
+    share: float
+    x: Array
+    p: Array
+    lam: Array | None = None
+    result: NLPResult | None = None
 
 
 class Solving:
@@ -249,22 +261,22 @@ class Solving:
         method = replace(self._solver, iterations=SHORT, extra={**self._solver.extra, **WARM}).prepare(nlp)
         first = np.array(rows(nlp.guess, nlp.p_value)).ravel()
         missed = np.clip(first, nlp.lower, nlp.upper) - first
-        share, step, x, lam, p = 0.0, FIRST, nlp.guess, None, nlp.p_value
-        while step > LEAST:
-            there = min(1.0, share + step)
-            rest = (1.0 - there) * missed
-            result = method(p=p, guess=x, lam=lam, lower=nlp.lower - rest, upper=nlp.upper - rest)
+
+        def trial(here: _Along, step: float) -> tuple[_Along | None, float]:
+            share = min(1.0, here.share + step)
+            rest = (1.0 - share) * missed
+            result = method(p=here.p, guess=here.x, lam=here.lam, lower=nlp.lower - rest, upper=nlp.upper - rest)
             self.iterations += result.iterations
-            if result.status is not Status.SOLVED or program.turned(x, result.x) > TURN:
-                step *= 0.5
-                continue
-            share, x, lam, step = there, result.x, result.lam, 1.5 * step
-            if share == 1.0:
-                return result
-            if program.turned(nlp.guess, x) > FAR:
-                x = program.recentred(x)
-                p = program.pieces.constants()
-        return None
+            if result.status is not Status.SOLVED or program.turned(here.x, result.x) > TURN:
+                return None, 0.5 * step
+            x, p = result.x, here.p
+            if share < 1.0 and program.turned(nlp.guess, x) > FAR:
+                x, p = program.recentred(x), program.pieces.constants()
+            return _Along(share, x, p, result.lam, result), 1.5 * step
+
+        begin = _Along(0.0, nlp.guess, nlp.p_value)
+        there, arrived = advanced(begin, FIRST, trial, lambda here: here.share == 1.0, shortest=LEAST)
+        return there.result if arrived else None
 
     def _refuse(self, program: Assembled, result: NLPResult, missed: Array) -> None:
         """Say what could not be met.

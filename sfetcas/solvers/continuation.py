@@ -1,4 +1,4 @@
-"""Following an equilibrium while loads and motions grow together from zero.
+"""Continuation: the loop of all step by step ways, and the way of an equilibrium as loads and motions grow.
 
 Nobody has to prescribe load steps; this is a check, and it costs a few Newton iterations.  The library asks
 which of several equilibria the growing loads lead to: the state is followed from the undeformed scene in as
@@ -8,8 +8,10 @@ stable it is left along its unstable mode.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from ..mechanics.model import Model
 from .newton import Corrected
 from .prepared import Prepared
 
-__all__ = ["JUMPED", "NARROW", "Followed", "between", "follow", "near_factor"]
+__all__ = ["JUMPED", "NARROW", "Followed", "advanced", "between", "follow", "near_factor"]
 
 STEP_ROTATION = 0.4
 """A step is too long when its corrections turn a node by more than this, rad."""
@@ -103,6 +105,45 @@ JUMPED = "left an unstable equilibrium there along its unstable mode"
 """What became of it."""
 
 
+Point = TypeVar("Point")
+
+
+def advanced(
+    point: Point,
+    length: float,
+    trial: Callable[[Point, float], tuple[Point | None, float]],
+    arrived: Callable[[Point], bool],
+    *,
+    shortest: float = 0.0,
+    tries: int | None = None,
+) -> tuple[Point, bool]:
+    """The loop of all continuations: the last point reached, and whether that one has arrived.
+
+    Parameters
+    ----------
+    point
+        The first point of the way or curve.
+    length : float
+        Length of the first trial step, in any measure.
+    trial : callable
+        (point, length) -> the next point, or None if the step is refused, and the length of the next trial.
+    arrived : callable
+        Point -> whether the way ends there.
+    shortest : float
+        Steps that are not longer than this end the way; a trial gives it up with the length 0.
+    tries : int, optional
+        Largest number of trial steps.
+    """
+    for _ in itertools.count() if tries is None else range(tries):
+        if arrived(point):
+            return point, True
+        if not length > shortest:
+            return point, False
+        there, length = trial(point, length)
+        point = point if there is None else there
+    return point, arrived(point)
+
+
 def follow(
     prepared: Prepared,
     way: Callable[[float], Loading],
@@ -125,79 +166,101 @@ def follow(
     turn = max(float(np.linalg.norm(whole.turn, axis=1).max(initial=0.0)), whole.driven)
     driven = min(max(turn, float(np.abs(whole.shift).max(initial=0.0)) / TRAVEL, 1.0), FARTHEST)
     longest = 1.0 / max(turn if prepared.model.space else 0.0, driven)
-    done, step = 0.0, 0.5
-    left: list[float] = []
-    crept = 0
-    now = prepared.correct(state, way(0.0))
-
-    def free(there: State, at: float) -> bool:
-        return allowed is None or allowed(now.state, way(done), there, way(at))
-
     tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
-    for _ in range(tries):
-        if done >= 1.0:
-            return Followed(now.state, True, tuple(left))
-        step = min(step, longest)
-        trial = min(1.0, done + step)
-        there = prepared.correct(
-            now.state, way(trial), most=STEP_ROTATION, contraction=CONTRACTION, tangent=now.point.entries
+    following = _Following(prepared, way, longest, switch_branch, allowed, refuse)
+    begin = _On(prepared.correct(state, way(0.0)), 0.0)
+    here, reached = advanced(begin, 0.5, following.trial, lambda here: here.done >= 1.0, tries=tries)
+    return Followed(here.found.state, reached, tuple(following.left))
+
+
+@dataclass(frozen=True, eq=False)
+class _On:
+    """An equilibrium on a way of loads, and the part of the way that is done there."""
+
+    found: Corrected
+    done: float
+
+
+@dataclass(eq=False)
+class _Following:
+    """The steps of :func:`follow`, with its arguments.
+
+    ``longest`` is that of a step, a part of the way; ``left`` and ``crept`` are the places at which an unstable
+    equilibrium was left, and how often without moving.
+    """
+
+    prepared: Prepared
+    way: Callable[[float], Loading]
+    longest: float
+    switch_branch: bool
+    allowed: Callable[[State, Loading, State, Loading], bool] | None
+    refuse: Callable[[State, Loading], None] | None
+    left: list[float] = field(default_factory=list)
+    crept: int = 0
+
+    def trial(self, here: _On, step: float) -> tuple[_On | None, float]:
+        """The next point, None if the step is refused, and the length of the next step, parts of the way."""
+        step = min(step, self.longest)
+        trial = min(1.0, here.done + step)
+        there = self.prepared.correct(
+            here.found.state,
+            self.way(trial),
+            most=STEP_ROTATION,
+            contraction=CONTRACTION,
+            tangent=here.found.point.entries,
         )
-        far = there.first > HALF_TURN and (prepared.model.unwrapping.count > 0 or there.second > LINEAR)
+        far = there.first > HALF_TURN and (self.prepared.model.unwrapping.count > 0 or there.second > LINEAR)
         good = there.converged and not far
-        if good and not free(there.state, trial):
-            if step <= BLOCKED:
-                break
-            step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
-            continue
-        unstable = _unstable(prepared, there) if good and switch_branch else 0
+        if good and not self._free(here, there, trial):
+            return None, 0.0 if step <= BLOCKED else step * (0.5 if there.first < 2.0 * STEP_ROTATION else 0.25)
+        unstable = self._negative(there) if good and self.switch_branch else 0
         if not good or unstable is None:
-            if done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far:
-                # No step moves the state any more, and something is out of balance, in a short step as in a long one.
-                break
-            if step > max(SHORTEST * done, LEAST_STEP):
-                step *= 0.1 if done == 0.0 else 0.5 if there.iterations > 2 else 0.25
-                continue
-            # What is no equilibrium has no unstable mode, whatever a first step balances to rounding.
-            if not switch_branch or not now.converged:
-                break
-            trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
-            snapped = _switched(prepared, now, way(trial))
-            if snapped is None or not free(snapped.state, trial):
-                break
-            crept += prepared.distance(snapped.state, now.state) < CREPT
-            if crept > CREEPS:
-                break
-            now = snapped
-            left.append(done)
-            done, step = trial, 0.1
-            continue
+            # No step may move the state any more, and something be out of balance, in a short step as in a long one.
+            stuck = here.done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far
+            if not stuck and step > max(SHORTEST * here.done, LEAST_STEP):
+                return None, step * (0.1 if here.done == 0.0 else 0.5 if there.iterations > 2 else 0.25)
+            return (None, 0.0) if stuck else self._snapped(here)
+        following = step * (4.0 if there.second < 0.05 else 2.0)
         if unstable > 0:
-            if trial - done > NARROW * done:
-                step = 0.5 * (trial - done)
-                continue
-            switched = _switched(prepared, there, way(trial))
-            if switched is None or not free(switched.state, trial):
-                break
-            there = switched
-            left.append(trial)
-            step = 0.1
-        now, done = there, trial
-        if refuse is not None:
-            refuse(now.state, way(done))
-        step *= 4.0 if there.second < 0.05 else 2.0
-    return Followed(now.state, done >= 1.0, tuple(left))
+            if trial - here.done > NARROW * here.done:
+                return None, 0.5 * (trial - here.done)
+            switched = self._switched(there, self.way(trial))
+            if switched is None or not self._free(here, switched, trial):
+                return None, 0.0
+            there, following = switched, 0.1 * (4.0 if switched.second < 0.05 else 2.0)
+            self.left.append(trial)
+        if self.refuse is not None:
+            self.refuse(there.state, self.way(trial))
+        return _On(there, trial), following
 
+    def _snapped(self, here: _On) -> tuple[_On | None, float]:
+        """The stable state shortly beyond one that ends its branch, and the length of the next step."""
+        # What is no equilibrium has no unstable mode, whatever a first step balances to rounding.
+        if not self.switch_branch or not here.found.converged:
+            return None, 0.0
+        beyond = min(1.0, here.done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
+        snapped = self._switched(here.found, self.way(beyond))
+        if snapped is None or not self._free(here, snapped, beyond):
+            return None, 0.0
+        self.crept += self.prepared.distance(snapped.state, here.found.state) < CREPT
+        if self.crept > CREEPS:
+            return None, 0.0
+        self.left.append(here.done)
+        return _On(snapped, beyond), 0.1
 
-def _unstable(prepared: Prepared, found: Corrected) -> int | None:
-    """Negative eigenvalues; None where forces without bound meet closings that no unknown changes, by rounding."""
-    try:
-        return prepared.negative(found)
-    except SolveError:
-        return None
+    def _free(self, here: _On, there: Corrected, at: float) -> bool:
+        """Whether the step from one state to another is allowed."""
+        return self.allowed is None or self.allowed(here.found.state, self.way(here.done), there.state, self.way(at))
 
+    def _negative(self, found: Corrected) -> int | None:
+        """Negative eigenvalues; None where forces without bound meet closings that no unknown changes, by rounding."""
+        try:
+            return self.prepared.negative(found)
+        except SolveError:
+            return None
 
-def _switched(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:
-    try:
-        return prepared.switch_branch(found.state, prepared.stability(found), loading)[0]
-    except SolveError:
-        return None
+    def _switched(self, found: Corrected, loading: Loading) -> Corrected | None:
+        try:
+            return self.prepared.switch_branch(found.state, self.prepared.stability(found), loading)[0]
+        except SolveError:
+            return None

@@ -8,13 +8,14 @@ then it may have jumped over a fold or to another branch.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import State
 from .arclength import PASSING, Curve, Standing, Tangent
+from .continuation import advanced
 from .critical import LARGEST_PRIMAL_FACTOR, Event, events_between
 from .newton import largest_rotation
 from .residuals import relative_residual
@@ -118,7 +119,8 @@ def trace(
             along = replace(now.tangent, z=np.zeros_like(now.tangent.z))
             now = here.standing(now.state, now.factor, along, arc=now.arc, iterations=now.iterations)
         stride = (span[1] - span[0]) / SHARE
-        part = _piece(here, now, ahead[0], stride, count - len(traced.points) + len(traced.events))
+        more = count - len(traced.points) + len(traced.events)
+        part = _Piece(here, ahead[0], stride, more, here.searched + max(SEARCHED, more), [now]).traced()
         # A path that touches the end of its range may be singular there, and rounding puts that beyond.
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
@@ -189,35 +191,59 @@ def _apart(curve: Curve, a: Standing, b: Standing) -> float:
     return curve.prepared.distance(a.state, b.state) + abs(a.factor - b.factor) / curve.unit
 
 
-def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: float, more: int) -> Traced:
-    """Follow a curve within one piece of the histories, in steps that change the factor by a stride at most."""
-    points: list[Standing] = [start]
-    events: list[Event] = []
-    now, before, length = start, None, FIRST
-    budget = curve.searched + max(SEARCHED, more)
-    for _ in range(more):
-        if curve.searched > budget:
-            return Traced(points, events, "lost")
-        length = min(length, _longest(curve, now, stride))
-        step = _step(curve, now, before, length, span)
-        if step is None:
-            return Traced(points, events, "lost")
-        there, used, left = step
-        told = curve.too_large(there.state, there.loading)
-        if told:
-            return Traced(points, events, "bent", told)
-        closed = not left and len(points) >= LOOP and _closes(curve, start, now, there)
-        ends = _to_start(curve, start, now, there) if closed else [there]
-        for end in ends:
+@dataclass(eq=False)
+class _Piece:
+    """A stretch of a curve within one piece of the histories, in steps that change the factor by a stride at most.
+
+    ``more`` is the number of steps that are still to be taken, ``budget`` the number of points that searches may take.
+    """
+
+    curve: Curve
+    span: tuple[float, float]
+    stride: float
+    more: int
+    budget: int
+    points: list[Standing]
+    events: list[Event] = field(default_factory=list)
+    before: Standing | None = None
+    end: str = ""
+    told: str = ""
+
+    def traced(self) -> Traced:
+        """The stretch from its first point on."""
+        _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended, shortest=SHORTEST)
+        return Traced(self.points, self.events, self.end if arrived else "lost", self.told)
+
+    @property
+    def ended(self) -> bool:
+        """Whether no further step is to be taken, and why not."""
+        if not self.end and self.more <= 0:
+            self.end = "points"
+        elif not self.end and self.curve.searched > self.budget:
+            self.end = "lost"
+        return bool(self.end)
+
+    def trial(self, now: Standing, length: float) -> tuple[Standing | None, float]:
+        """The next point, None if the step is refused, and the length of the next step."""
+        curve, length = self.curve, min(length, _longest(self.curve, now, self.stride))
+        there, left = _ahead(curve, now, self.before, length, self.span)
+        if there is None:
+            return None, 0.5 * length
+        self.told = curve.too_large(there.state, there.loading)
+        if self.told:
+            self.end = "bent"
+            return there, 0.0
+        start = self.points[0]
+        closed = not left and len(self.points) >= LOOP and _closes(curve, start, now, there)
+        for end in _to_start(curve, start, now, there) if closed else [there]:
+            last = self.points[-1]
             # A point that is met by chance may be the limit point itself.
-            met = [event for event in events_between(curve, points[-1], end) if event.standing is not points[-1]]
-            events += met
-            points += [event.standing for event in met if event.standing is not end] + [end]
-        if left or closed:
-            return Traced(points, events, "range" if left else "closed")
-        length = used * _growth(curve, now, there)
-        before, now = now, there
-    return Traced(points, events, "points")
+            met = [event for event in events_between(curve, last, end) if event.standing is not last]
+            self.events += met
+            self.points += [event.standing for event in met if event.standing is not end] + [end]
+        self.end = "range" if left else "closed" if closed else ""
+        self.before, self.more = now, self.more - 1
+        return there, 0.0 if self.end else length * _growth(curve, now, there)
 
 
 def _closes(curve: Curve, start: Standing, now: Standing, there: Standing) -> bool:
@@ -241,22 +267,16 @@ def _longest(curve: Curve, now: Standing, stride: float) -> float:
     return min(STRIDE / max(turning, TINY), stride / max(abs(now.tangent.factor), TINY))
 
 
-def _step(
+def _ahead(
     curve: Curve, now: Standing, before: Standing | None, length: float, span: tuple[float, float]
-) -> tuple[Standing, float, bool] | None:
-    """The next point, the length that led to it and whether it is the end of the span."""
-    bend = None if before is None else curve.bend(before, now)
-    while length > SHORTEST:
-        guess = curve.predicted(now, length, bend)
-        there = curve.corrected(*guess, now.tangent, now.arc + length, sharp=False)
-        if there is not None and _same_curve(curve, now, there, guess[0], length):
-            if span[0] <= there.factor <= span[1]:
-                return there, length, False
-            end = _at_end(curve, now, there, span)
-            if end is not None:
-                return end, length, True
-        length *= 0.5
-    return None
+) -> tuple[Standing | None, bool]:
+    """The point at a length ahead, None if it is not found on the same curve; and whether it is the end of the span."""
+    expected, factor = curve.predicted(now, length, None if before is None else curve.bend(before, now))
+    there = curve.corrected(expected, factor, now.tangent, now.arc + length, sharp=False)
+    if there is None or not _same_curve(curve, now, there, expected, length):
+        return None, False
+    inside = span[0] <= there.factor <= span[1]
+    return (there, False) if inside else (_at_end(curve, now, there, span), True)
 
 
 def _same_curve(curve: Curve, now: Standing, there: Standing, expected: State, length: float) -> bool:
