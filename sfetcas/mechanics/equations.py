@@ -217,8 +217,11 @@ class Equations:
     def _gathered(self, parts: list[Array]) -> Array:
         """What the terms give on their sides, added up on the unknowns."""
         given = np.concatenate([part.ravel() for part in parts])[self._used]
-        found = np.bincount(self._onto, weights=given * self._share, minlength=self.total)
-        return found.astype(float, copy=False)
+        return self._added(given * self._share)
+
+    def _added(self, given: Array) -> Array:
+        """Numbers on the used sides added up on the unknowns; without any the sum is of whole numbers."""
+        return np.bincount(self._onto, weights=given, minlength=self.total).astype(float, copy=False)
 
     # -- evaluation -----------------------------------------------------------------------------
 
@@ -320,10 +323,12 @@ class Equations:
             sums = positions.W.T.absolute @ np.abs(lam) + positions.Y.T.absolute @ np.abs(force)
             # A node at which next to nothing acts is judged by a millionth of what acts elsewhere.
             scale[displacement] += sums + UNLOADED * sums.max(initial=0.0) + 1e-12
-        gap = self._gaps(self._chords(found[0][2]), state, loading)
-        residual[self.unknowns :] = np.concatenate([gap, *(part[2].ravel() for part in found[1:])])
-        # A component along which nothing acts is judged by what acts across it.
-        scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
+        if self.rows:
+            gap = self._gaps(self._chords(found[0][2]), state, loading)
+            residual[self.unknowns :] = np.concatenate([gap, *(part[2].ravel() for part in found[1:])])
+        if len(self._retained):
+            # A component along which nothing acts is judged by what acts across it.
+            scale[self._retained] = scale[self._retained].max(axis=1, keepdims=True)
         values = [group.entries(part, convex=convex) for group, part in zip(self._terms, found, strict=True)]
         rotation_jacobian = found[0][5].reshape(*self.tables.sides[0].shape, self.model.element.axes).copy()
         return Point(potential, stored, residual, scale, self._matrix(values), rotation_jacobian)
@@ -338,12 +343,10 @@ class Equations:
 
     def _gathered_sizes(self, gradients: list[Array], pull: Array) -> Array:
         """What a node adds up: moments of its terms, and within elements the forces times the length they act on."""
-        carried = (np.abs(pull).sum(axis=2) * self.model.beams.weight).sum(axis=1)
-        sizes = [np.abs(part) for part in gradients]
-        sizes[0] += carried[:, None]
-        given = np.concatenate([part.ravel() for part in sizes])[self._used]
-        found = np.bincount(self._onto, weights=given * self._absolute_share, minlength=self.total)
-        return found.astype(float, copy=False)
+        sizes = np.abs(np.concatenate([part.ravel() for part in gradients]))
+        carried = np.einsum("epa,ep->e", np.abs(pull), self.model.beams.weight)
+        sizes[: gradients[0].size].reshape(gradients[0].shape)[...] += carried[:, None]
+        return self._added(sizes[self._used] * self._absolute_share)
 
     def slope(self, state: State, point: Point, rate: Loading) -> Array:
         """Derivative of the residual, (unknowns + rows,), along a rate of nodal loads and prescribed displacements."""

@@ -192,7 +192,10 @@ class Term(Components, abc.ABC):
 
     def forth(self, q: Side, v: Side) -> Side:
         """The rotated vector, ``R(q) v``."""
-        return self.back([-q[0]] if not self.space else [q[0], -q[1], -q[2], -q[3]], v)
+        if self.space:
+            return turned(q, v)
+        c, s = ca.cos(q[0]), ca.sin(q[0])
+        return [c * v[0] - s * v[1], s * v[0] + c * v[1]]
 
     def relative(self, a: Side, b: Side) -> Side:
         """Rotation of side b relative to side a, in undeformed axes: ``conj(a) b``, in the plane the difference."""
@@ -210,7 +213,7 @@ class Term(Components, abc.ABC):
         symbols = whole.sx_in()
         found = whole.call(symbols)
         names = whole.name_in()
-        return ca.Function(f"forces_{name_of(self)}", symbols, [found[2], found[3]], names, ["rows", "gradient"])
+        return _shared(f"forces_{name_of(self)}", symbols, [found[2], found[3]], names, ["rows", "gradient"])
 
     def slopes(self) -> ca.Function:
         """The function :func:`slopes_of` of this kind."""
@@ -329,6 +332,11 @@ def _symbols(kind: Term) -> tuple[list[ca.SX], tuple[list[Side], list[Side]]]:
     return arguments, ([ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)])
 
 
+def _shared(name: str, arguments: list[ca.SX], results: list[ca.SX], given: list[str], told: list[str]) -> ca.Function:
+    """A function that evaluates each common subexpression once: derivatives repeat sines and cosines many times."""
+    return ca.Function(name, arguments, results, given, told, {"cse": True})
+
+
 def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
     """Arguments, energy, rows and generalised forces of a kind."""
     arguments, sides = _symbols(kind)
@@ -390,7 +398,7 @@ def _rotation_gradient(kind: Term) -> ca.Function:
         ca.densify(ca.mtimes(ca.jacobian(rows, x), basis)),
     ]
     names = ["energy", "stored", "rows", "gradient", "stiffness", "rotation_jacobian"]
-    return ca.Function(f"rotation_gradient_{name_of(kind)}", arguments, results, [*ARGUMENTS], names)
+    return _shared(f"rotation_gradient_{name_of(kind)}", arguments, results, [*ARGUMENTS], names)
 
 
 def _halves(forces: ca.SX, rotations: int, space: bool) -> ca.SX:
@@ -422,7 +430,7 @@ def _slopes(kind: Term) -> ca.Function:
     arguments, energy, rows, _ = _said(kind)
     x = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1]))
     results = [ca.densify(ca.gradient(energy, x)), ca.densify(ca.jacobian(rows, x))]
-    return ca.Function(f"slopes_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
+    return _shared(f"slopes_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
 
 
 @functools.cache
@@ -436,7 +444,7 @@ def _curvatures(kind: Term) -> ca.Function:
     x, weight = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1])), ca.SX.sym("weight")
     hessian = ca.densify(ca.hessian(weight * energy + ca.dot(arguments[4], rows), x)[0])
     given = [*ARGUMENTS, "weight"]
-    return ca.Function(f"curvatures_{name_of(kind)}", [*arguments, weight], [hessian], given, ["hessian"])
+    return _shared(f"curvatures_{name_of(kind)}", [*arguments, weight], [hessian], given, ["hessian"])
 
 
 @functools.cache
@@ -445,7 +453,7 @@ def energies_of(kind: Term) -> ca.Function:
     arguments, energy, _, _ = _said(kind)
     stored = ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape))
     results, names = [energy + _work(kind, arguments), stored], ["energy", "stored"]
-    return ca.Function(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names, {"cse": True})
+    return _shared(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names)
 
 
 @functools.cache
