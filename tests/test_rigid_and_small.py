@@ -16,6 +16,7 @@ import sfetcas
 from sfetcas.cli import main
 from sfetcas.description.matrices import read_matrix
 from sfetcas.equilibria.statics import solve_model
+from sfetcas.equilibria.ways import Ways
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics.fields import Fields
 
@@ -376,6 +377,20 @@ def test_a_small_member_that_bends_far_is_told(dimension, force, told):
     table["motions"] = {"m": {"node": "A", "rotation": 2.0 if dimension == "plane" else [0, 0, 2.0]}}
     table["loads"]["f"]["value"] = [0.0, 0.01]
     assert sfetcas.solve(made(table)).last.notes == ()
+
+
+def test_loads_that_cannot_be_followed_are_followed_once(monkeypatch):
+    """Of a small member it is asked first where growing loads lead; the answer without them does not ask again."""
+    asked = []
+    monkeypatch.setattr(Ways, "_grown", lambda *_: asked.append("grown"))
+    table = {
+        "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+        "nodes": {"A": {"position": [0, 0, 0], "support": "clamped"}, "B": {"position": [1, 0, 0]}},
+        "members": {"arm": {"nodes": ["A", "B"], "section": "s", "type": "small"}},
+        "loads": {"p": {"type": "force", "node": "B", "value": [0, 0.01, 0]}},
+    }
+    assert sfetcas.solve(made(table)).last.way == ("minimum",)
+    assert asked == ["grown"]
 
 
 @pytest.mark.parametrize("obstacle", [False, True])

@@ -161,7 +161,8 @@ class Ways:
         alone, failure = self._direct(pilot, loading)
         if not grows:
             return self._accepted(pilot, alone, failure, loading)
-        grown = grown or self._grown(pilot, factor, last)
+        if not self.meshes.has_superelements:
+            grown = self._grown(pilot, factor, last)
         if grown is not None:
             return self._beside(grown, alone)
         zero = self._unloaded(pilot)
