@@ -11,7 +11,7 @@ from sfetcas import tolerances
 from sfetcas.description.scene import Scene
 from sfetcas.description.supports import upwards
 from sfetcas.parametric.equilibrium import equilibrium_solver
-from sfetcas.solvers import redundancy, residuals
+from sfetcas.solvers import guess, redundancy, residuals
 from sfetcas.solvers.divergence import TangentTest
 from sfetcas.solvers.prepared import Prepared
 
@@ -200,3 +200,11 @@ def test_links_that_fit_fall_together(shift):
     assert phi == pytest.approx(2.0 * np.sin(phi), abs=1e-6)
     assert step.certificate.stable is True
     assert any("jumped" in note for note in step.notes)
+
+
+def test_of_shapes_whose_gaps_differ_by_rounding_that_of_less_energy_begins():
+    """Also where the gaps lie to both sides of a number with six digits, and beside one whose gap is not closed."""
+    state = object()
+    gap = 5e-7
+    sides = [(gap * (1.0 - 1e-12), 2.0, state), (gap * (1.0 + 1e-12), 1.0, state), (1.0, 0.0, state)]
+    assert guess._least(sides, guess.SAME_GAP)[1] == 1.0

@@ -30,6 +30,9 @@ SPRING = 300.0
 SHORT_STEP = 0.3
 """Largest rotation of a node, rad, in a step downhill from a ``start`` of a user, so as not to leave its basin."""
 
+NEAR_TARGET, SAME_GAP = 0.05, 1e-6
+"""Distances from targets, and gaps, dimensionless, within which of two shapes that of less energy begins."""
+
 BOW = 0.2
 """Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
 
@@ -131,13 +134,13 @@ def _placed(equations: Equations, state: State, loading: Loading, weight: Array,
         for curl in _curls(equations, turns):
             bent = replace(state, q=_turned_by(equations, state, curl))
             placed, gap = lead(equations, bent, loading, weight, targets)
-            sides.append((round(gap, 1), equations.at(placed, loading.unloaded()).strain, placed))
-        return _least(sides)
+            sides.append((gap, equations.at(placed, loading.unloaded()).strain, placed))
+        return _least(sides, NEAR_TARGET)
 
     best = tried((0.5, -0.5))
     # With both ends fixed, curls would change the twist that motions prescribe.
-    if best[0] > 0.0 and equations.rows <= equations.displacement_unknowns:
-        best = _least([best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0))])
+    if best[0] > NEAR_TARGET and equations.rows <= equations.displacement_unknowns:
+        best = _least([best, tried((2.0, -2.0, 4.0, -4.0, 6.0, -6.0))], NEAR_TARGET)
     return replace(best[2], lam=np.zeros(equations.rows))
 
 
@@ -230,15 +233,19 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
         for sign in (1.0, -1.0):
             bent = replace(state, q=_turned_by(equations, state, sign * vectors))
             closed, gap = restore(equations, bent, loading, weight)
-            sides.append((round(gap, 6), equations.at(closed, loading).potential, bent))
-    return _least(sides)[2]
+            sides.append((gap, equations.at(closed, loading).potential, bent))
+    return _least(sides, SAME_GAP)[2]
 
 
-def _least(sides: list[tuple[float, float, State]]) -> tuple[float, float, State]:
-    """The entry of least gap, then energy; of those that differ by rounding only, as mirror images do, the first."""
-    least = min(side[:2] for side in sides)
-    margin = 1e-9 * max(1.0, abs(least[1]))
-    return next(side for side in sides if side[0] == least[0] and side[1] <= least[1] + margin)
+def _least(sides: list[tuple[float, float, State]], near: float) -> tuple[float, float, State]:
+    """The entry of least energy among those whose gap is within ``near`` of the least; of equal ones the first.
+
+    Mirror images differ by rounding only.
+    """
+    least = min(gap for gap, _, _ in sides)
+    closed = [side for side in sides if side[0] <= least + near]
+    lowest = min(energy for _, energy, _ in closed)
+    return next(side for side in closed if side[1] <= lowest + 1e-9 * max(1.0, abs(lowest)))
 
 
 def _tent(equations: Equations) -> Array:
