@@ -6,20 +6,20 @@ What comes first has the free choice of place.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .. import tolerances
+from ..description.contacts import Contact
 from ..description.loads import Load, Motion
 from ..description.obstacles import obstacle
 from ..description.sections import evaluate
 from ..description.springs import Spring
-from ..description.structure import SLIDING, Node, unit
+from ..description.structure import SLIDING, Member, Node, unit
 from ..description.supports import turned_about
-from ..equilibria.solution import Configuration
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from .limits import across, sketch_obstacle, sketch_slots, sketch_stops, turned_party
@@ -56,39 +56,18 @@ TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
 def sketch_all(sketch: Sketch) -> None:
     """Sketch everything but the centre lines; what comes first has the free choice of place."""
     sketch_holds(sketch)
-    scene, largest = sketch.scene, _largest_force(sketch)
-    for name, motion in scene.motions.items():
-        _sketch_motion(sketch, name, motion)
-    for name, load in scene.loads.items():
-        _sketch_load(sketch, name, load, largest)
-    for name, node in scene.nodes.items():
-        if node.support != "free":
-            _sketch_reaction(sketch, name, largest)
-    for name in scene.contacts:
-        _sketch_pushes(sketch, name, largest)
+    _sketch_tables(sketch, LOADS)
 
 
 def sketch_holds(sketch: Sketch) -> None:
     """Add symbols of obstacles, supports, joints and springs to a sketch."""
-    scene = sketch.scene
-    for name, contact in scene.contacts.items():
-        sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
-    for name, node in scene.nodes.items():
-        _sketch_support(sketch, name, node)
-        if node.joint != "rigid":
-            sketch.dot(sketch.at(name), f"joint-{name}")
-        if node.joint == "universal":
-            first, *others = (member for member, found in scene.members.items() if name in found.nodes)
-            _sketch_cross(sketch, f"joint-{name}", sketch.at(name), name, (first, others[0]))
-    _sketch_releases(sketch)
-    sketch_slots(sketch)
-    for name, spring in scene.springs.items():
-        (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
-        sketch_stops(sketch, name, spring)
+    _sketch_tables(sketch, HOLDS)
 
 
-def _factor(step: Configuration, history: str | None) -> float:
-    return step.factor if history is None else step.model.scene.histories[history].factor(step.factor)
+def _sketch_tables(sketch: Sketch, glyphs: Iterable[tuple[str, Glyph]]) -> None:
+    for table, glyph in glyphs:
+        for name, record in getattr(sketch.scene, table).items():
+            glyph(sketch, name, record)
 
 
 def _circle(radius: float, centre: tuple[float, float]) -> Array:
@@ -137,6 +116,20 @@ class _Symbol:
 def _symbol(sketch: Sketch, node: str, down: Array) -> _Symbol:
     """Where the symbol of a node's support is drawn."""
     return _Symbol(sketch, f"support-{node}", sketch.at(node), down)
+
+
+def _sketch_contact(sketch: Sketch, name: str, contact: Contact) -> None:
+    sketch_obstacle(sketch, name, obstacle(contact, sketch.step.model.space))
+
+
+def _sketch_node(sketch: Sketch, name: str, node: Node) -> None:
+    """The support of a node, and its joint."""
+    _sketch_support(sketch, name, node)
+    if node.joint != "rigid":
+        sketch.dot(sketch.at(name), f"joint-{name}")
+    if node.joint == "universal":
+        first, *others = (member for member, found in sketch.scene.members.items() if name in found.nodes)
+        _sketch_cross(sketch, f"joint-{name}", sketch.at(name), name, (first, others[0]))
 
 
 def _sketch_support(sketch: Sketch, name: str, node: Node) -> None:
@@ -205,18 +198,17 @@ def _sketch_slider(sketch: Sketch, name: str, node: Node, direction: tuple[float
         symbol.ground(1.4)
 
 
-def _sketch_releases(sketch: Sketch) -> None:
-    """A small circle in the member, just beside the node."""
-    for name, line in zip(sketch.course.members, sketch.course.last, strict=True):
-        for end, points in zip((0, 1), (line, line[::-1]), strict=True):
-            member = sketch.scene.members[name]
-            if member.release[-end] not in ("rigid", *SLIDING):
-                beside = np.linalg.norm(points - points[0], axis=1) > 0.02 * sketch.size
-                place = points[int(np.argmax(beside))]
-                sketch.dot(place, f"joint-{name}")
-                if member.release[-end] == "universal":
-                    node = member.nodes[-end]
-                    _sketch_cross(sketch, f"joint-{name}", place, node, (node, name))
+def _sketch_release(sketch: Sketch, name: str, member: Member) -> None:
+    """A small circle in the member, just beside each node to which it is not rigidly joined."""
+    line = sketch.course.last[sketch.course.members.index(name)]
+    for end, points in zip((0, 1), (line, line[::-1]), strict=True):
+        if member.release[-end] not in ("rigid", *SLIDING):
+            beside = np.linalg.norm(points - points[0], axis=1) > 0.02 * sketch.size
+            place = points[int(np.argmax(beside))]
+            sketch.dot(place, f"joint-{name}")
+            if member.release[-end] == "universal":
+                node = member.nodes[-end]
+                _sketch_cross(sketch, f"joint-{name}", place, node, (node, name))
 
 
 def _sketch_cross(sketch: Sketch, name: str, place: Array, node: str, sides: tuple[str, str]) -> None:
@@ -229,6 +221,11 @@ def _sketch_cross(sketch: Sketch, name: str, place: Array, node: str, sides: tup
 
 
 # Springs
+
+
+def _sketch_spring(sketch: Sketch, name: str, spring: Spring) -> None:
+    (_sketch_spiral if spring.type == "rotational" else _sketch_zigzag)(sketch, name, spring)
+    sketch_stops(sketch, name, spring)
 
 
 def _sketch_spiral(sketch: Sketch, name: str, spring: Spring) -> None:
@@ -285,7 +282,7 @@ def _anchor(sketch: Sketch, spring: Spring, end: Array) -> Array:
 
 
 def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
-    factor, node = _factor(sketch.step, motion.history), sketch.scene.nodes[motion.node]
+    factor, node = sketch.factor(motion.history), sketch.scene.nodes[motion.node]
     ink = Ink(f"motion-{name}", MOTION, 1.4, dotted=True)
     if motion.displacement is not None and motion.between is not None:
         # How far one side slides along the other, not where both go; what is given across the line does nothing.
@@ -310,19 +307,8 @@ def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
         _sketch_turn(sketch, sketch.at(motion.node), sketch.leaving(motion.node)[0], vector, "rad", ink)
 
 
-def _largest_force(sketch: Sketch) -> float:
-    """Largest force of the loads on points and of the reactions, N; above zero."""
-    step, scene = sketch.step, sketch.scene
-    loads = [
-        abs(_factor(step, load.history)) * norm(load.vector) for load in scene.loads.values() if load.type == "force"
-    ]
-    reactions = [norm(step.reaction(name)[0]) for name, node in scene.nodes.items() if node.support != "free"]
-    pushes = [norm(force) for entry in step.contacts.values() for force in np.atleast_2d(entry["force"])]
-    return max([*loads, *reactions, *pushes, 1e-10 * step.model.scales.force])
-
-
-def _sketch_load(sketch: Sketch, name: str, load: Load, largest: float) -> None:
-    value = _factor(sketch.step, load.history) * np.array(load.vector)
+def _sketch_load(sketch: Sketch, name: str, load: Load) -> None:
+    value = sketch.factor(load.history) * np.array(load.vector)
     if not value.any():
         return
     if load.type == "distributed":
@@ -340,39 +326,39 @@ def _sketch_load(sketch: Sketch, name: str, load: Load, largest: float) -> None:
     if load.type == "moment":
         _sketch_turn(sketch, point, along, value, "N m", ink)
     else:
-        _sketch_force(sketch, point, value, largest, ink)
+        _sketch_force(sketch, point, value, ink)
 
 
-def _sketch_reaction(sketch: Sketch, name: str, largest: float) -> None:
-    force, moment = sketch.step.reaction(name)
+def _sketch_reaction(sketch: Sketch, name: str, node: Node) -> None:
+    if node.support == "free":
+        return
+    (force, moment), largest = sketch.step.reaction(name), sketch.largest_force
     point, arm = sketch.at(name), sketch.step.model.scales.length
     moments = [largest * arm, norm(moment), *(float(np.abs(values).max()) for values in sketch.course.values)]
     ink = Ink(f"reaction-{name}", REACTION, 1.1)
     rounding = 1e-11 * sketch.step.model.scales.force
     if norm(force) > max(tolerances.NEGLIGIBLE * max(largest, max(moments) / arm), rounding):
-        _sketch_force(sketch, point, force, largest, ink, pushing=True)
+        _sketch_force(sketch, point, force, ink, pushing=True)
     if norm(moment) > max(tolerances.NEGLIGIBLE * max(moments), rounding * arm):
         _sketch_turn(sketch, point, sketch.leaving(name)[0], moment, "N m", ink)
 
 
-def _sketch_pushes(sketch: Sketch, name: str, largest: float) -> None:
+def _sketch_pushes(sketch: Sketch, name: str, contact: Contact) -> None:
     """What an obstacle pushes with."""
     entry = sketch.step.contacts[name]
     several = isinstance(entry["member"], list)
     for member, at, force in zip(
         *([entry[k]] if not several else entry[k] for k in ("member", "at", "force")), strict=True
     ):
-        if at is not None and norm(force) > tolerances.NEGLIGIBLE * largest:
+        if at is not None and norm(force) > tolerances.NEGLIGIBLE * sketch.largest_force:
             point = sketch.along(member, np.array([np.mean(at)]))[0]
-            _sketch_force(sketch, point, force, largest, Ink(f"push-{name}", REACTION, 1.1), pushing=True)
+            _sketch_force(sketch, point, force, Ink(f"push-{name}", REACTION, 1.1), pushing=True)
 
 
-def _sketch_force(
-    sketch: Sketch, point: Array, value: Array, largest: float, ink: Ink, *, pushing: bool = False
-) -> None:
+def _sketch_force(sketch: Sketch, point: Array, value: Array, ink: Ink, *, pushing: bool = False) -> None:
     """An arrow that starts at the point or, ``pushing``, ends there; the other way round where that hides less."""
     direction = value / norm(value)
-    length = ARROW * max(0.45, norm(value) / largest) * sketch.size
+    length = ARROW * max(0.45, norm(value) / sketch.largest_force) * sketch.size
     pulled = point + np.outer([0.012 * sketch.size, length], direction)
     pushed = pulled - (length + 0.012 * sketch.size) * direction
     ways = [(pushed, 0), (pulled, 1)] if pushing else [(pulled, 1), (pushed, 0)]
@@ -433,3 +419,24 @@ def _label_place(profile: Array) -> int:
     """Index of the largest value; the middle one of several."""
     largest = np.flatnonzero(profile >= profile.max() * (1.0 - 1e-9))
     return int(largest[len(largest) // 2])
+
+
+Glyph = Callable[[Sketch, str, Any], None]
+"""Sketches what belongs to a record: (sketch, name, record)."""
+
+HOLDS: tuple[tuple[str, Glyph], ...] = (
+    ("contacts", _sketch_contact),
+    ("nodes", _sketch_node),
+    ("members", _sketch_release),
+    ("members", sketch_slots),
+    ("springs", _sketch_spring),
+)
+"""Glyphs of what holds a structure, by the tables of the scene: all that a new kind of record needs for a picture."""
+
+LOADS: tuple[tuple[str, Glyph], ...] = (
+    ("motions", _sketch_motion),
+    ("loads", _sketch_load),
+    ("nodes", _sketch_reaction),
+    ("contacts", _sketch_pushes),
+)
+"""Glyphs of what acts on it."""

@@ -269,12 +269,11 @@ def _bar(sketch: Sketch, name: str, points: Array, beyond: Array) -> None:
     _strokes(sketch, points, beyond, f"stop-{name}")
 
 
-def sketch_slots(sketch: Sketch) -> None:
-    """The slot or guide in which a member end slides, with a pin or a block."""
-    for name, member in sketch.scene.members.items():
-        for node, release in zip(member.nodes, member.release, strict=True):
-            if release in SLIDING:
-                _sketch_slot(sketch, name, node, sketch.along(name, _end(member, node))[0], release == "slot")
+def sketch_slots(sketch: Sketch, name: str, member: Member) -> None:
+    """The slots or guides in which the ends of a member slide, with pins or blocks."""
+    for node, release in zip(member.nodes, member.release, strict=True):
+        if release in SLIDING:
+            _sketch_slot(sketch, name, node, sketch.along(name, _end(member, node))[0], release == "slot")
 
 
 def _sketch_slot(sketch: Sketch, member: str, node: str, end: Array, pin: bool) -> None:

@@ -280,6 +280,19 @@ class Sketch:
         """Flat samples (n, 2) of all that is sketched so far."""
         return np.vstack([self.lines, *(dense(self.view.flat(mark.points), 0.01 * self.size) for mark in self.marks)])
 
+    def factor(self, history: str | None) -> float:
+        """What multiplies loads and motions with a history, or, with None, those that grow with the load factor."""
+        return self.step.factor if history is None else self.scene.histories[history].factor(self.step.factor)
+
+    @functools.cached_property
+    def largest_force(self) -> float:
+        """Largest force of the loads on points and of the reactions, N; above zero."""
+        step, scene = self.step, self.scene
+        loads = [abs(self.factor(x.history)) * norm(x.vector) for x in scene.loads.values() if x.type == "force"]
+        reactions = [norm(step.reaction(name)[0]) for name, node in scene.nodes.items() if node.support != "free"]
+        pushes = [norm(force) for entry in step.contacts.values() for force in np.atleast_2d(entry["force"])]
+        return max([*loads, *reactions, *pushes, 1e-10 * step.model.scales.force])
+
     def at(self, node: str) -> Array:
         """Place of a node (3,), drawn units."""
         return self.step.position(node) / self.course.unit
