@@ -15,7 +15,7 @@ from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.model import assemble
 from sfetcas.solvers import redundancy
 from sfetcas.solvers import stability as stability_module
-from sfetcas.solvers.prepared import Prepared
+from sfetcas.solvers.prepared import Prepared, Solved
 from sfetcas.solvers.stability import StabilityTest
 
 EI = SOFT["EI3"]
@@ -46,7 +46,7 @@ def straight(table, load, elements=4, order=6):
     loading = prepared.model.loading(load)
     found = prepared.correct(prepared.equations.start(loading), loading)
     assert found.converged
-    return prepared.stability(found), prepared
+    return found.stability, prepared
 
 
 @pytest.mark.parametrize("name", CRITICAL)
@@ -232,8 +232,8 @@ def test_leaving_goes_to_the_side_of_less_energy(side):
     prepared = Prepared(model_of(table, 3, 4))
     loading = prepared.model.loading(1.0)
     straight_state = prepared.equations.start(loading)
-    found = prepared._test.test(prepared.equations.at(straight_state, loading))
-    nudged = prepared.nudged(straight_state, found, loading, 0.2)
+    found = Solved(prepared, straight_state, loading, prepared.equations.at(straight_state, loading), 0.0)
+    nudged = prepared.nudged(found, loading, 0.2)
     assert side * nudged.q[prepared.model.chain("m")[-1], 0] > 0.1
 
 

@@ -20,9 +20,8 @@ from ..mechanics.equations import State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch
-from ..solvers.continuation import JUMPED, near_factor
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.continuation import JUMPED, between, near_factor
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .settling import Held, Way, placed
 from .touches import COARSE, NOISE, Touched, edge_sides, obstacles_of
@@ -200,7 +199,7 @@ class ContactRun:
 
         def held(state: State, loading: Loading) -> Held:
             touched, point = Touched(prepared.equations, state, loading), prepared.equations.at(state, loading)
-            return Held(prepared, Corrected(state, point, True, 0, 0.0, 0.0, 0.0), loading, touched)
+            return Held(Solved(prepared, state, loading, point, 0.0), touched)
 
         def allowed(before: State, at: Loading, after: State, loading: Loading) -> bool:
             there = held(after, loading)
@@ -384,7 +383,7 @@ def _judge(one: Held, other: Held, factor: float) -> tuple[float, float]:
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:
-    return lambda t: Way(lambda model: model.loading(a + t * (b - a)), {})
+    return lambda t: Way(lambda model: between(model, a, b)(t), {})
 
 
 def _told(held: Held) -> str:

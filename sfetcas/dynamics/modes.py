@@ -32,8 +32,7 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.sides import Sides
 from ..solvers.stability import Stability
 from .buckling import buckling_factors
@@ -274,15 +273,15 @@ class ModalAnalysis:
         return self._answered(*answer, error)
 
     def _found(self, mesh: Mesh) -> tuple[Prepared, SmallMotion, Eigenmotions]:
-        prepared, corrected, loading = put_on(self.scene, mesh, self.rest)
-        motion = SmallMotion(prepared.equations, corrected.state, loading, corrected.point)
+        rest = put_on(self.scene, mesh, self.rest)
+        motion = SmallMotion(rest.equations, rest.state, rest.loading, rest.point)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
             # One more: of those with the frequency of the last one that is asked for a rule takes the shape.
             more = int(motion.plain and motion.symmetric)
-            return prepared, motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
+            return rest.prepared, motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
         except np.linalg.LinAlgError as error:
-            raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
+            raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", rest.state) from None
 
     def _buckling(self, prepared: Prepared) -> Array:
         """Buckling factors, none where the structure cannot be unloaded."""
@@ -314,15 +313,12 @@ class ModalAnalysis:
 
 def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
     """The undeformed scene as an equilibrium; what is free to move is neither stable nor unstable."""
-    prepared = Prepared(motion.model)
-    corrected = Corrected(motion.state, motion.point, True, 0, 0.0, 0.0, 0.0)
+    found, stability = Solved(Prepared(motion.model), motion.state, motion.loading, motion.point, 0.0), None
     if free:
-        equations = prepared.equations
+        equations = found.equations
         shapes = np.zeros(equations.rotation_unknowns), np.zeros(equations.displacement_unknowns)
         stability = Stability("neutral", 0, 0.0, *shapes)
-    else:
-        stability = prepared.stability(corrected)
-    return finished(prepared, corrected, motion.loading, 1.0, stability, estimate=0.0)
+    return finished(found, stability, error_estimate=0.0)
 
 
 def _difference(coarse: Eigenmotions, fine: Eigenmotions) -> float:
@@ -341,7 +337,7 @@ def prepared_for_motion(scene: Scene, mesh: Mesh) -> Prepared:
     return Prepared(assemble(scene, replace(mesh, places=True), assembly="nodal"))
 
 
-def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared, Corrected, Loading]:
+def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> Solved:
     """An equilibrium, or the undeformed scene (None), transferred to a mesh for masses and corrected there.
 
     Raises
@@ -354,11 +350,11 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     state = prepared.equations.start(loading)
     if rest is not None:
         state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
-    corrected = prepared.correct(state, loading, iterations=30)
-    if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
-        detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
+    found = prepared.correct(state, loading, iterations=30)
+    if not found.converged and not found.residual <= tolerances.BALANCED:
+        detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {found.residual:.1e}"
         raise SolveError(Status.FAILED, detail, state)
-    return prepared, corrected, loading
+    return found
 
 
 def carried(equations: Equations, state: State, loading: Loading) -> State:

@@ -34,9 +34,7 @@ from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.between_states import turned_between
 from ..solvers.critical import ONE_EVENT, sought
-from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
-from ..solvers.residuals import relative_residual
 from .path import FLUTTER, NO_POTENTIAL, Branch, FlutterPoint, Path, PathPoint
 
 __all__ = ["shaken", "with_modes"]
@@ -308,15 +306,10 @@ class _Level:
 
     def _entry(self, point: _Flutter, error: float | None) -> FlutterPoint:
         at = point.standing
-        residual = relative_residual(self.curve.equations, at.point)
-        corrected = Corrected(at.state, at.point, True, at.iterations, 0.0, 0.0, residual)
-        stability = self.prepared.stability(corrected)
         estimate = error if error is not None and np.isfinite(error) else None
         count = point.multiplicity
         notes = (f"{count} motions start to grow at once",) if count > 1 else ()
-        entry = finished(
-            self.prepared, corrected, at.loading, float(at.factor), stability, estimate=estimate, notes=notes
-        )
+        entry = finished(at, error_estimate=estimate, notes=notes)
         parts = {part.name: getattr(entry, part.name) for part in fields(entry)}
         return FlutterPoint(**parts, omega=point.omega / self.time)
 

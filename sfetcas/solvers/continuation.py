@@ -17,8 +17,7 @@ from ..errors import SolveError
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
-from .newton import Corrected
-from .prepared import Prepared
+from .prepared import Prepared, Solved
 
 __all__ = ["JUMPED", "NARROW", "Followed", "between", "follow", "near_factor"]
 
@@ -90,8 +89,8 @@ class Followed:
 
 
 def between(model: Model, begin: float, end: float) -> Callable[[float], Loading]:
-    """The way from one factor to another."""
-    return lambda t: model.loading(begin + t * (end - begin))
+    """The way from one factor to another, which at 1 is exactly that one."""
+    return lambda t: model.loading(end if t == 1.0 else begin + t * (end - begin))
 
 
 def near_factor(factor: float) -> str:
@@ -149,7 +148,7 @@ def follow(
                 break
             step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
             continue
-        unstable = _unstable(prepared, there) if good and switch_branch else 0
+        unstable = _unstable(there) if good and switch_branch else 0
         if not good or unstable is None:
             if done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far:
                 # No step moves the state any more, and something is out of balance, in a short step as in a long one.
@@ -161,7 +160,7 @@ def follow(
             if not switch_branch or not now.converged:
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
-            snapped = _switched(prepared, now, way(trial))
+            snapped = _switched(now, way(trial))
             if snapped is None or not free(snapped.state, trial):
                 break
             crept += prepared.distance(snapped.state, now.state) < CREPT
@@ -175,7 +174,7 @@ def follow(
             if trial - done > NARROW * done:
                 step = 0.5 * (trial - done)
                 continue
-            switched = _switched(prepared, there, way(trial))
+            switched = _switched(there, there.loading)
             if switched is None or not free(switched.state, trial):
                 break
             there = switched
@@ -188,16 +187,16 @@ def follow(
     return Followed(now.state, done >= 1.0, tuple(left))
 
 
-def _unstable(prepared: Prepared, found: Corrected) -> int | None:
+def _unstable(found: Solved) -> int | None:
     """Negative eigenvalues; None where forces without bound meet closings that no unknown changes, by rounding."""
     try:
-        return prepared.negative(found)
+        return found.negative
     except SolveError:
         return None
 
 
-def _switched(prepared: Prepared, found: Corrected, loading: Loading) -> Corrected | None:
+def _switched(found: Solved, loading: Loading) -> Solved | None:
     try:
-        return prepared.switch_branch(found.state, prepared.stability(found), loading)[0]
+        return found.prepared.switch_branch(found, loading)
     except SolveError:
         return None

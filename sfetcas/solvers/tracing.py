@@ -203,7 +203,7 @@ def _piece(curve: Curve, start: Standing, span: tuple[float, float], stride: flo
         if step is None:
             return Traced(points, events, "lost")
         there, used, left = step
-        told = curve.too_large(there.state, there.loading)
+        told = curve.too_large(there)
         if told:
             return Traced(points, events, "bent", told)
         closed = not left and len(points) >= LOOP and _closes(curve, start, now, there)
