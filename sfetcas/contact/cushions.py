@@ -117,13 +117,11 @@ class Cushions:
         found = self._grown(prepared, factors, falls) or self._direct(prepared, factors[-1])
         if found is None:
             return None
-        cushioned, rolled = self._thinned(mesh, prepared, found, loading)
+        cushioned, rolled = self._thinned(mesh, found, loading)
         self.left += [factors[-1]] if rolled else []
         return cushioned
 
-    def _thinned(
-        self, mesh: Mesh, prepared: Prepared, found: Solved, loading: Callable[[Model], Loading]
-    ) -> tuple[Cushioned, bool]:
+    def _thinned(self, mesh: Mesh, found: Solved, loading: Callable[[Model], Loading]) -> tuple[Cushioned, bool]:
         """The state on thin cushions, and whether it was left there as unstable."""
         thickness, shrink, rolled = THICKEST, SHRINK, False
         while thickness > 1.01 * THINNEST and shrink < LEAST_SHRINK:
@@ -134,9 +132,9 @@ class Cushions:
                 shrink = np.sqrt(shrink)
                 continue
             # What soft cushions hold thin ones may not: it rolls away over them, which what touches at places cannot.
-            away = self._rolled(stiffer, there, loading(stiffer.model))
-            prepared, found, thickness, rolled = stiffer, away, trial, rolled or away is not there
-        held = Held(found, Touched(prepared.equations, found.state, found.loading))
+            away = self._rolled(there)
+            found, thickness, rolled = away, trial, rolled or away is not there
+        held = Held(found, Touched.of(found.fields))
         return Cushioned(held, self._touches(held)), rolled
 
     def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Solved | None:
@@ -165,8 +163,8 @@ class Cushions:
     def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
         switch_branch = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
 
-        def allowed(before: State, at: Loading, after: State, there: Loading) -> bool:
-            return self._passes(prepared, before, after, there, at)
+        def allowed(before: Solved, after: Solved) -> bool:
+            return self._passes(prepared, before.state, after.state, after.loading, before.loading)
 
         result = follow(prepared, way, state, switch_branch=switch_branch, allowed=allowed)
         self._parts = result.left
@@ -219,8 +217,9 @@ class Cushions:
         start = prepared.equations.start(model.loading(0.0, 0.0))
         return found if found is not None and self._passes(prepared, start, found.state, loading) else None
 
-    def _rolled(self, prepared: Prepared, found: Solved, loading: Loading) -> Solved:
+    def _rolled(self, found: Solved) -> Solved:
         """Where an unstable state goes to, if that is not over an obstacle; else the state."""
+        prepared, loading = found.prepared, found.loading
         switch_branch = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
         if not switch_branch or not found.negative:
             return found

@@ -276,7 +276,7 @@ class Settler:
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN, drag=drag)
         if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
             return None
-        return Held(corrected, Touched(prepared.equations, corrected.state, loading))
+        return Held(corrected, Touched.of(corrected.fields))
 
     def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | Ran | None:
         """The equilibrium with fulfilled conditions, or the place that reached an end or a touch; None for neither."""

@@ -277,7 +277,7 @@ class Toucher:
         loading = way.loading(prepared.model)
         try:
             corrected = prepared.switch_branch(start.corrected, loading)
-            there = Held(corrected, Touched(prepared.equations, corrected.state, loading))
+            there = Held(corrected, Touched.of(corrected.fields))
             return self.resolved(replace(start.mesh, touches=()), there, touches, way)
         except SolveError:
             return None
@@ -317,7 +317,7 @@ class Toucher:
         prepared, loading = held.prepared, held.loading
         state = prepared.nudged(held.corrected, loading, NUDGE)
         corrected = replace(held.corrected, state=state, point=prepared.equations.at(state, loading))
-        return Held(corrected, Touched(prepared.equations, state, loading))
+        return Held(corrected, Touched.of(corrected.fields))
 
     def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
         """The state in contact near one of penalty contact; None if it is not found."""

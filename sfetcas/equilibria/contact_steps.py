@@ -59,7 +59,7 @@ class ContactSteps:
         if unstopped is not None:
             there = self.refinement.onto(base, unstopped)
             notes += there.notes
-            free = Held(there.solved, Touched(there.solved.equations, there.solved.state, there.solved.loading))
+            free = Held(there.solved, Touched.of(there.solved.fields))
             if contact.reviser.wrong(free, contact.at(factor)) is None:
                 answer = self.refinement.refined(replace(unstopped, way=("no contact",)))
                 if contact.clear(answer.fields):
@@ -71,7 +71,7 @@ class ContactSteps:
     def _clear_all_the_way(self, pilot: Prepared, factor: float) -> Equilibrium | None:
         """The answer without obstacles, where the growing loads lead there past none of them; else None."""
         try:
-            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped(pilot))
+            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
         except SolveError as error:
             if error.status is Status.BENT:
                 raise

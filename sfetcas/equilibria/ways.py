@@ -11,11 +11,10 @@ import numpy as np
 from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
-from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
-from ..solvers.prepared import BEYOND, Prepared
+from ..solvers.prepared import BEYOND, Prepared, Solved
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, EquilibriumResult, Meshing
@@ -99,8 +98,8 @@ are tried say :meth:`Ways.result`, :meth:`Ways.on_pilot` and, in contact,
 :meth:`~sfetcas.contact.contact_statics.ContactRun.reached`."""
 
 
-Allowed = Callable[[State, Loading, State, Loading], bool]
-"""Whether a step may be taken: from one state and loading to the next."""
+Allowed = Callable[[Solved, Solved], bool]
+"""Whether a step may be taken: from one equilibrium to the next."""
 
 
 class Ways:
@@ -367,8 +366,8 @@ class Ways:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         switch_branch, energy_known = self.meshes.switch_branch and pilot.switches_branch, pilot.model.minimisable
 
-        def refuse(there: State, loading: Loading) -> None:
-            refuse_large(Fields(pilot.equations, there, loading))
+        def refuse(there: Solved) -> None:
+            refuse_large(there.fields)
 
         result = follow(
             pilot,

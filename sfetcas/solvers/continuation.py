@@ -108,16 +108,15 @@ def follow(
     state: State,
     *,
     switch_branch: bool = True,
-    allowed: Callable[[State, Loading, State, Loading], bool] | None = None,
-    refuse: Callable[[State, Loading], None] | None = None,
+    allowed: Callable[[Solved, Solved], bool] | None = None,
+    refuse: Callable[[Solved], None] | None = None,
 ) -> Followed:
     """Natural-parameter continuation from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
     Steps are corrected by Newton's method and shortened where its corrections are long or do not shrink; the inertia is
     counted at each point.  With ``switch_branch=False`` a state that becomes unstable is followed on, as far as
-    Newton's method carries.  A step that is not ``allowed`` from one state and loading to the next is too long, and
-    where short ones are not either the way ends.  ``refuse`` is shown each state, and raises where there is no sense in
-    going on.
+    Newton's method carries.  A step that is not ``allowed`` from one equilibrium to the next is too long, and where
+    short ones are not either the way ends.  ``refuse`` is shown each, and raises where there is no sense in going on.
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
@@ -129,8 +128,8 @@ def follow(
     crept = 0
     now = prepared.correct(state, way(0.0))
 
-    def free(there: State, at: float) -> bool:
-        return allowed is None or allowed(now.state, way(done), there, way(at))
+    def free(there: Solved) -> bool:
+        return allowed is None or allowed(now, there)
 
     tries = MOST + int(AROUND * driven) if prepared.model.minimisable else MOST_WITHOUT_POTENTIAL
     for _ in range(tries):
@@ -143,7 +142,7 @@ def follow(
         )
         far = there.first > HALF_TURN and (prepared.model.unwrapping.count > 0 or there.second > LINEAR)
         good = there.converged and not far
-        if good and not free(there.state, trial):
+        if good and not free(there):
             if step <= BLOCKED:
                 break
             step *= 0.5 if there.first < 2.0 * STEP_ROTATION else 0.25
@@ -161,7 +160,7 @@ def follow(
                 break
             trial = min(1.0, done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
             snapped = _switched(now, way(trial))
-            if snapped is None or not free(snapped.state, trial):
+            if snapped is None or not free(snapped):
                 break
             crept += prepared.distance(snapped.state, now.state) < CREPT
             if crept > CREEPS:
@@ -175,14 +174,14 @@ def follow(
                 step = 0.5 * (trial - done)
                 continue
             switched = _switched(there, there.loading)
-            if switched is None or not free(switched.state, trial):
+            if switched is None or not free(switched):
                 break
             there = switched
             left.append(trial)
             step = 0.1
         now, done = there, trial
         if refuse is not None:
-            refuse(now.state, way(done))
+            refuse(now)
         step *= 4.0 if there.second < 0.05 else 2.0
     return Followed(now.state, done >= 1.0, tuple(left))
 
