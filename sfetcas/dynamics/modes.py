@@ -252,7 +252,7 @@ class ModalAnalysis:
         fixed, mesh = self.meshing.fixed, self._mesh()
         flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
         answer, error = self._found(mesh), np.inf
-        found = answer[2]
+        found = answer[1]
         for _ in range(HALVINGS):
             marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
             # Where all is prescribed the error is that beside a mesh which only estimates it.
@@ -262,24 +262,24 @@ class ModalAnalysis:
                 error = 0.0
                 break
             other = self._found(finer)
-            last, error = error, _difference(found, other[2])
+            last, error = error, _difference(found, other[1])
             # What gets no nearer is rounding: the coarser mesh has less of it.
             if prescribed or error > last:
                 break
-            mesh, found, answer = finer, other[2], other
+            mesh, found, answer = finer, other[1], other
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
                 break
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
 
-    def _found(self, mesh: Mesh) -> tuple[Prepared, SmallMotion, Eigenmotions]:
+    def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
         rest = put_on(self.scene, mesh, self.rest)
-        motion = SmallMotion(rest.equations, rest.state, rest.loading, rest.point)
+        motion = SmallMotion(rest)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
             # One more: of those with the frequency of the last one that is asked for a rule takes the shape.
             more = int(motion.plain and motion.symmetric)
-            return rest.prepared, motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
+            return motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
         except np.linalg.LinAlgError as error:
             raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", rest.state) from None
 
@@ -292,7 +292,7 @@ class ModalAnalysis:
         except (SceneError, SolveError, np.linalg.LinAlgError):
             return np.zeros(0)
 
-    def _answered(self, prepared: Prepared, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
+    def _answered(self, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
         notes = []
         asked = self.meshing.asked
         status = Status.SOLVED if error <= self.accuracy or not asked else Status.SHORT
@@ -305,7 +305,7 @@ class ModalAnalysis:
             last = _undeformed(motion, bool(found.rigid))
         modes = tuple(_mode(motion, found, i) for i in range(len(found.exponents)))
         growing = tuple((found.growing / motion.masses.time).tolist())
-        buckling = self._buckling(prepared)
+        buckling = self._buckling(motion.rest.prepared)
         return Modes(
             self.scene, status, last, modes, found.rigid, growing, error, motion, buckling, tuple(notes), self.seconds
         )
@@ -313,7 +313,7 @@ class ModalAnalysis:
 
 def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
     """The undeformed scene as an equilibrium; what is free to move is neither stable nor unstable."""
-    found, stability = Solved(Prepared(motion.model), motion.state, motion.loading, motion.point, 0.0), None
+    found, stability = replace(motion.rest, residual=0.0), None
     if free:
         equations = found.equations
         shapes = np.zeros(equations.rotation_unknowns), np.zeros(equations.displacement_unknowns)

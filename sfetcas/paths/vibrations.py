@@ -150,7 +150,7 @@ class _Level:
         self.curve = Curve(prepared, path.unit)
         self.count = path.scene.analysis.count_of_modes
         self._places: dict[tuple[int, int], _Place] = {}
-        first = self._motion(self.place(0, 0).standing)
+        first = SmallMotion(self.place(0, 0).standing)
         self.time, self.damped = first.masses.time, bool(len(first.damping.value))
         # Energy makes exponents imaginary or real where nothing turns.
         self.steady = prepared.model.conservative and not len(first.gyroscopic.value)
@@ -190,12 +190,9 @@ class _Level:
     def _model(self) -> Model:
         return self.prepared.model
 
-    def _motion(self, standing: Standing) -> SmallMotion:
-        return SmallMotion(self.curve.equations, standing.state, standing.loading, standing.point)
-
     def exponents(self, standing: Standing, negative: int = 0) -> Array:
         """Exponents of the lowest motions at an equilibrium, one more than asked for."""
-        motion, wanted, unstable = self._motion(standing), self.count + 1, negative
+        motion, wanted, unstable = SmallMotion(standing), self.count + 1, negative
         try:
             for _ in range(TRIES):
                 found = motion.eigenmotions(wanted, unstable)
