@@ -15,6 +15,7 @@ from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.model import assemble
 from sfetcas.solvers import redundancy
 from sfetcas.solvers import stability as stability_module
+from sfetcas.solvers.continuation import between
 from sfetcas.solvers.prepared import Prepared, Solved
 from sfetcas.solvers.stability import StabilityTest
 
@@ -235,6 +236,29 @@ def test_leaving_goes_to_the_side_of_less_energy(side):
     found = Solved(prepared, straight_state, loading, prepared.equations.at(straight_state, loading), 0.0)
     nudged = prepared.nudged(found, loading, 0.2)
     assert side * nudged.q[prepared.model.chain("m")[-1], 0] > 0.1
+
+
+def test_what_is_asked_of_a_solved_equilibrium_is_computed_once(monkeypatch):
+    asked, test = [], StabilityTest.test
+    monkeypatch.setattr(StabilityTest, "test", lambda self, point: asked.append(point) or test(self, point))
+    prepared = Prepared(model_of(cantilever((0, 1.0)), 2, 4))
+    found = prepared.correct(prepared.equations.start(prepared.model.loading(0.7)), prepared.model.loading(0.7))
+    assert not asked
+    assert found.stability is found.stability
+    assert found.fields is found.fields
+    assert found.factor == 0.7
+    # What is changed is another equilibrium.
+    assert replace(found, residual=0.0).stability.smallest == found.stability.smallest
+    assert len(asked) == 2
+
+
+def test_a_way_between_factors_ends_exactly_at_the_second():
+    """0.03 + (0.3 - 0.03) is not 0.3, and what is solved at the end of the way is told to be that of the factor."""
+    model = model_of(cantilever((0, 1.0)), 2, 4)
+    assert between(model, 0.03, 0.3)(1.0).factor == 0.3
+    assert between(model, 0.03, 0.3)(0.0).factor == 0.03
+    both = model.loading(0.5).plus(model.loading(0.25).scaled(-2.0))
+    assert both.factor == np.abs(both.force).max() == 0.0
 
 
 # -- springs and bodies ---------------------------------------------------------------------------------------

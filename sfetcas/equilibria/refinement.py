@@ -23,7 +23,7 @@ from ..solvers.prepared import BEYOND, Prepared, Solved
 from ..solvers.redundancy import loose_rows, named_in, stretched
 from ..solvers.residuals import LEAST_SCALE, relative_residual
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
-from ..solvers.stability import LIGHT, Stability
+from ..solvers.stability import LIGHT
 from .meshing import EquilibriumResult, Meshing
 from .mirrors import has_twin
 from .single import finished, unjudged
@@ -159,7 +159,7 @@ class Refinement:
                 # What no finite force holds straight may look balanced, by rounding, and free along the rest.
                 _with_unique_reactions(pilot)
             # What nothing holds on a coarse mesh no finer one holds.
-            _refuse_free(pilot.solved, pilot.stability)
+            _refuse_free(pilot.solved)
         if self.meshes.has_superelements:
             refuse_large(pilot.solved.fields)
         if self.meshes.prescribed:
@@ -251,7 +251,7 @@ class Refinement:
         _refuse_many_turns(solved)
         self._refuse_torn(solved)
         if not found.kept:
-            _refuse_free(solved, stability)
+            _refuse_free(solved)
         if (
             stability.negative > 0
             and self.meshes.switch_branch
@@ -337,7 +337,7 @@ def _refuse_many_turns(found: Solved) -> None:
         raise SolveError(Status.FAILED, detail, state)
 
 
-def _refuse_free(found: Solved, stability: Stability) -> None:
+def _refuse_free(found: Solved) -> None:
     """Refuse a mechanism of which neither stiffness nor loads hold some motion.
 
     Raises
@@ -345,6 +345,7 @@ def _refuse_free(found: Solved, stability: Stability) -> None:
     SceneError
         Names the motion.
     """
+    stability = found.stability
     # What rounding hides may be held or free: a note says so.
     if stability.stable != "neutral" or stability.hidden or not found.prepared.diagnosis.mobility:
         return

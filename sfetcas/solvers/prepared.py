@@ -1,4 +1,4 @@
-"""A model made ready for any number of solves, IPOPT, Newton's method and stability test; an equilibrium of it."""
+"""A model made ready for any number of solves by IPOPT and Newton's method, and the equilibria that they find."""
 
 from __future__ import annotations
 
