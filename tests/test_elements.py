@@ -8,13 +8,10 @@ from scenes import cantilever, elastica, made, turned_about
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mathematics.interpolation import differentiation, evaluation
 from sfetcas.mechanics.elements import ELEMENTS, Element, element_by_name
-from sfetcas.mechanics.equations import Equations
-from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
 from sfetcas.mechanics.terms import curvatures_of, energies_of, rotation_gradient, rows_of, slopes_of
-from sfetcas.solvers.newton import AtLoads, Limits, correct
-from sfetcas.solvers.stability import StabilityTest
+from sfetcas.solvers.prepared import Prepared
 
 ALL = [Element(space, p, gauss) for p in range(1, 9) for space in (False, True) for gauss in (False, True)]
 IDS = [f"{e.name}-{'space' if e.space else 'plane'}-{'gauss' if e.gauss else 'nodes'}" for e in ALL]
@@ -302,17 +299,14 @@ def test_cross_terms_of_the_stiffness():
 
 def tip(order, gauss, elements, space=False):
     scene = made({**cantilever((0.0, 10.0)), "dimension": "space" if space else "plane"})
-    equations = Equations(assemble(scene, uniform_mesh(scene, order, elements, gauss)))
-    loading = equations.model.loading(1.0)
-    weight = StabilityTest(equations).weight
-    state = equations.start(loading)
+    prepared = Prepared(assemble(scene, uniform_mesh(scene, order, elements, gauss)))
+    loading = prepared.model.loading(1.0)
+    state = prepared.equations.start(loading)
     for part in (0.05, 0.2, 0.5, 1.0):
-        state = correct(
-            AtLoads(equations, equations.model.loading(part), weight), state, limits=Limits(iterations=30)
-        ).state
-    found = correct(AtLoads(equations, loading, weight), state)
+        state = prepared.correct(state, prepared.model.loading(part), iterations=30).state
+    found = prepared.correct(state, loading)
     assert found.converged
-    return Fields(equations, found.state, loading).position("B")[:2]
+    return found.fields.position("B")[:2]
 
 
 REFERENCE = elastica(10.0)

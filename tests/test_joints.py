@@ -11,9 +11,7 @@ from sfetcas.description.matrices import rigid_motions
 from sfetcas.mathematics import quaternion as quat
 from sfetcas.mechanics import joints, terms
 from sfetcas.mechanics.equations import Equations
-from sfetcas.mechanics.fields import Fields
 from sfetcas.mechanics.positions import normals
-from sfetcas.solvers.newton import AtLoads, Limits, correct
 from sfetcas.solvers.prepared import Prepared
 
 AXIS = np.array([0.2, -1.0, 0.5]) / np.linalg.norm([0.2, -1.0, 0.5])
@@ -549,11 +547,10 @@ def test_joint_in_a_scene_carries_nothing_along_its_freedoms(joint, space):
     from_rest = prepared.correct(prepared.equations.start(prepared.model.loading(0.0)), prepared.model.loading(0.0))
     state = from_rest.state
     for factor in np.linspace(0.1, 1.0, 10):
-        system = AtLoads(prepared.equations, prepared.model.loading(factor), prepared.equations.mass)
-        found = correct(system, state, limits=Limits(iterations=30))
+        found = prepared.correct(state, prepared.model.loading(factor), iterations=30)
         assert found.converged
         state = found.state
-    fields = Fields(prepared.equations, state, prepared.model.loading(1.0))
+    fields = found.fields
     link, base = fields.along("link", np.array([0.0])), fields.along("first", np.array([1.0]))
     node = made(table).nodes["B"]
 

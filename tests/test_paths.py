@@ -786,13 +786,14 @@ def test_no_point_of_a_path_is_outside_its_range(monkeypatch):
     from sfetcas.paths import paths
     from sfetcas.solvers import tracing
 
+    def at(standing, factor):
+        return replace(standing, loading=replace(standing.loading, factor=factor))
+
     def moved(events):
-        return [
-            replace(e, standing=replace(e.standing, factor=-1e-24 if e.standing.factor < 15 else 20)) for e in events
-        ]
+        return [replace(e, standing=at(e.standing, -1e-24 if e.standing.factor < 15 else 20)) for e in events]
 
     monkeypatch.setattr(tracing, "events_between", lambda *ends: moved(events_between(*ends)))
-    monkeypatch.setattr(paths, "switched", lambda curve, event, *_: replace(event.standing, factor=-1e-3))
+    monkeypatch.setattr(paths, "switched", lambda curve, event, *_: at(event.standing, -1e-3))
     scene = Scene(
         sections={"s": {"EI3": 1.0}},
         nodes={"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},

@@ -13,10 +13,8 @@ from sfetcas.mathematics import quaternion as quat
 from sfetcas.mathematics.nlp import Ipopt
 from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.fields import Fields
-from sfetcas.solvers.newton import AtLoads, Limits, correct
 from sfetcas.solvers.prepared import Prepared
 from sfetcas.solvers.problem import EquilibriumProblem
-from sfetcas.solvers.stability import StabilityTest
 
 # Terms and tables are those of the equations, which both assemblies of every scene are tested of: here by turns.
 CASES = [(name, ("closing", "nodal")[i % 2], False) for i, name in enumerate(EVERY)]
@@ -121,13 +119,13 @@ def test_states_go_there_and_back(name, assembly, gauss):
 
 def by_newton(model, factor=1.0, parts=20):
     """Root finding alone: Newton's method from the undeformed scene in small steps."""
-    equations = Equations(model)
-    weight, state = StabilityTest(equations).weight, equations.start(model.loading(0.0))
+    prepared = Prepared(model)
+    state = prepared.equations.start(model.loading(0.0))
     for part in np.linspace(0, factor, parts + 1)[1:]:
-        found = correct(AtLoads(equations, model.loading(part), weight), state, limits=Limits(iterations=30))
+        found = prepared.correct(state, model.loading(part), iterations=30)
         assert found.converged
         state = found.state
-    return equations, state
+    return prepared.equations, state
 
 
 def by_minimisation(model):

@@ -46,12 +46,11 @@ def test_tangent_and_energy_have_the_same_unit():
     """Next to what is stiff all weights are far below one."""
     prepared = prepared_of(hinged_lever(0.3, 1e4))
     found = prepared.correct(prepared.equations.start(prepared.model.loading(1.0)), prepared.model.loading(1.0))
-    energy = prepared.stability(found)
     assert prepared.softest < 1e-3
     tangent = TangentTest(prepared.equations, prepared.softest)
     lowest = tangent.around_zero(found.point)[1][0]
     # The tangent tells eigenvalues in units of the softest, the energy by masses.
-    assert lowest * prepared.softest == pytest.approx(energy.smallest, rel=1e-6)
+    assert lowest * prepared.softest == pytest.approx(found.stability.smallest, rel=1e-6)
 
 
 @pytest.mark.parametrize("turns", [20, 30, 40])
@@ -128,7 +127,7 @@ def test_shapes_of_equal_eigenvalues_are_chosen_by_a_rule():
     for moved in (0.0, 1e-14):
         prepared = prepared_of(round_rod(1, moved), 4)
         still = prepared.model.loading(0.0)
-        found.append(prepared.spectrum(prepared.correct(prepared.equations.start(still), still), 2))
+        found.append(prepared.correct(prepared.equations.start(still), still).spectrum(2))
     assert found[0][0][:3] == pytest.approx(np.full(3, np.pi**2 / 4.0), rel=1e-4)
     assert found[1][1] == pytest.approx(found[0][1], abs=1e-5)
 

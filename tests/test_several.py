@@ -119,7 +119,7 @@ def scanned(scene):
     """Tip angles of what a scan finds on a mesh that is fine enough for it."""
     prepared = Prepared(assemble(scene, uniform_mesh(scene, 5, 32)))
     loading = prepared.model.loading(1.0)
-    result = scan(prepared, loading, cold(prepared, loading)[0])
+    result = scan(cold(prepared, loading)[0])
     end = prepared.model.chain("m")[-1]
     return result, sorted(float(found.state.q[end, 0]) for found in result.found)
 
@@ -414,7 +414,7 @@ def test_mirror_images_of_an_equilibrium_of_a_symmetric_scene_are_equilibria():
     table["sections"]["s"] = {"EI2": 2.0, "EI3": 1.0, "GJ": 0.8}
     ready, loading = prepared(table)
     start = ready.equations.start(loading)
-    shapes = ready.spectrum(ready.correct(start, loading), 2)[1]
+    shapes = ready.correct(start, loading).spectrum(2)[1]
     assert len(shapes) == 2
     for shape in shapes:
         step = np.zeros(ready.equations.total)
@@ -482,7 +482,7 @@ def test_mirrors_of_an_arc_and_of_a_crooked_frame():
 def test_a_search_keeps_to_its_number_of_runs():
     ready, loading = prepared(cantilever((-10.0 * FIRST_LOAD, 0.0)))
     first = ready.correct(ready.equations.start(loading), loading)
-    result = search(ready, loading, first, runs=20)
+    result = search(first, runs=20)
     assert result.total + result.smaller == 20
     assert result.exhausted
     assert "largest number of runs" in result.sentence()

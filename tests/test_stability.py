@@ -15,7 +15,8 @@ from sfetcas.mechanics.equations import Equations
 from sfetcas.mechanics.model import assemble
 from sfetcas.solvers import redundancy
 from sfetcas.solvers import stability as stability_module
-from sfetcas.solvers.prepared import Prepared
+from sfetcas.solvers.continuation import between
+from sfetcas.solvers.prepared import Prepared, Solved
 from sfetcas.solvers.stability import StabilityTest
 
 EI = SOFT["EI3"]
@@ -46,7 +47,7 @@ def straight(table, load, elements=4, order=6):
     loading = prepared.model.loading(load)
     found = prepared.correct(prepared.equations.start(loading), loading)
     assert found.converged
-    return prepared.stability(found), prepared
+    return found.stability, prepared
 
 
 @pytest.mark.parametrize("name", CRITICAL)
@@ -232,9 +233,32 @@ def test_leaving_goes_to_the_side_of_less_energy(side):
     prepared = Prepared(model_of(table, 3, 4))
     loading = prepared.model.loading(1.0)
     straight_state = prepared.equations.start(loading)
-    found = prepared._test.test(prepared.equations.at(straight_state, loading))
-    nudged = prepared.nudged(straight_state, found, loading, 0.2)
+    found = Solved(prepared, straight_state, loading, prepared.equations.at(straight_state, loading), 0.0)
+    nudged = prepared.nudged(found, loading, 0.2)
     assert side * nudged.q[prepared.model.chain("m")[-1], 0] > 0.1
+
+
+def test_what_is_asked_of_a_solved_equilibrium_is_computed_once(monkeypatch):
+    asked, test = [], StabilityTest.test
+    monkeypatch.setattr(StabilityTest, "test", lambda self, point: asked.append(point) or test(self, point))
+    prepared = Prepared(model_of(cantilever((0, 1.0)), 2, 4))
+    found = prepared.correct(prepared.equations.start(prepared.model.loading(0.7)), prepared.model.loading(0.7))
+    assert not asked
+    assert found.stability is found.stability
+    assert found.fields is found.fields
+    assert found.factor == 0.7
+    # What is changed is another equilibrium.
+    assert replace(found, residual=0.0).stability.smallest == found.stability.smallest
+    assert len(asked) == 2
+
+
+def test_a_way_between_factors_ends_exactly_at_the_second():
+    """0.03 + (0.3 - 0.03) is not 0.3, and what is solved at the end of the way is told to be that of the factor."""
+    model = model_of(cantilever((0, 1.0)), 2, 4)
+    assert between(model, 0.03, 0.3)(1.0).factor == 0.3
+    assert between(model, 0.03, 0.3)(0.0).factor == 0.03
+    both = model.loading(0.5).plus(model.loading(0.25).scaled(-2.0))
+    assert both.factor == np.abs(both.force).max() == 0.0
 
 
 # -- springs and bodies ---------------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ class ContactStability:
 
     def strictly(self, held: Held, way: Way) -> Stability | None:
         """The stability test with sliding places, with a nan eigenvalue; None if sliding changes nothing."""
-        judged = held.prepared.stability(rolling(held))
+        judged = rolling(held).stability
         freed = self._freed(held, way) if judged.stable in (True, False) else 0
         if not freed:
             return None
@@ -47,7 +47,7 @@ class ContactStability:
         A stretch without pressure may leave its obstacle between its ends: only these are constrained.
         """
         held = self.pressing(held, way)
-        stability = held.prepared.stability(rolling(held))
+        stability = rolling(held).stability
         if stability.negative > 0 and stability.negative + self._freed(held, way) <= 0:
             # The smallest eigenvalue was that of places that do not slide.
             stability = replace(stability, stable=True, negative=0, smallest=np.nan)

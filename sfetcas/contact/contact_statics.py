@@ -16,13 +16,10 @@ from ..errors import SolveError, Status
 from ..mathematics.arrays import Array, unit
 from ..mechanics.accuracy import halving, roughness
 from ..mechanics.balance import three
-from ..mechanics.equations import State
 from ..mechanics.fields import Fields
-from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch
-from ..solvers.continuation import JUMPED, near_factor
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.continuation import JUMPED, between, near_factor
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .settling import Held, Way, placed
 from .touches import COARSE, NOISE, Touched, edge_sides, obstacles_of
@@ -195,20 +192,12 @@ class ContactRun:
         """The loads at a factor as a point of a way."""
         return Way(lambda model: model.loading(factor), {})
 
-    def unstopped(self, prepared: Prepared) -> Callable[[State, Loading, State, Loading], bool]:
-        """The check whether a step (state, loading, state, loading) computed without obstacles meets none of them."""
-
-        def held(state: State, loading: Loading) -> Held:
-            touched, point = Touched(prepared.equations, state, loading), prepared.equations.at(state, loading)
-            return Held(prepared, Corrected(state, point, True, 0, 0.0, 0.0, 0.0), loading, touched)
-
-        def allowed(before: State, at: Loading, after: State, loading: Loading) -> bool:
-            there = held(after, loading)
-            if there.touched.inside({}, self.reviser.sides, tolerances.CLOSED * self.scene.size):
-                return False
-            return not self.toucher.passing.possible(held(before, at), there, {})
-
-        return allowed
+    def unstopped(self, before: Solved, after: Solved) -> bool:
+        """Whether a step from one equilibrium without obstacles to another meets none of them."""
+        held, there = (Held(found, Touched.of(found.fields)) for found in (before, after))
+        if there.touched.inside({}, self.reviser.sides, tolerances.CLOSED * self.scene.size):
+            return False
+        return not self.toucher.passing.possible(held, there, {})
 
     def clear(self, fields: Fields) -> bool:
         """Whether no obstacle is in the way of a state."""
@@ -384,7 +373,7 @@ def _judge(one: Held, other: Held, factor: float) -> tuple[float, float]:
 
 
 def _between(a: float, b: float) -> Callable[[float], Way]:
-    return lambda t: Way(lambda model: model.loading(a + t * (b - a)), {})
+    return lambda t: Way(lambda model: between(model, a, b)(t), {})
 
 
 def _told(held: Held) -> str:

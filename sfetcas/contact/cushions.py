@@ -22,8 +22,8 @@ from ..mechanics.loading import Loading
 from ..mechanics.mesh import Cushion, Mesh, Touch
 from ..mechanics.model import Model
 from ..solvers.continuation import between, follow
-from ..solvers.newton import Corrected, descend
-from ..solvers.prepared import Prepared
+from ..solvers.newton import descend
+from ..solvers.prepared import Prepared, Solved
 from .settling import Held
 from .touches import Touched
 
@@ -117,13 +117,11 @@ class Cushions:
         found = self._grown(prepared, factors, falls) or self._direct(prepared, factors[-1])
         if found is None:
             return None
-        cushioned, rolled = self._thinned(mesh, prepared, found, loading)
+        cushioned, rolled = self._thinned(mesh, found, loading)
         self.left += [factors[-1]] if rolled else []
         return cushioned
 
-    def _thinned(
-        self, mesh: Mesh, prepared: Prepared, found: Corrected, loading: Callable[[Model], Loading]
-    ) -> tuple[Cushioned, bool]:
+    def _thinned(self, mesh: Mesh, found: Solved, loading: Callable[[Model], Loading]) -> tuple[Cushioned, bool]:
         """The state on thin cushions, and whether it was left there as unstable."""
         thickness, shrink, rolled = THICKEST, SHRINK, False
         while thickness > 1.01 * THINNEST and shrink < LEAST_SHRINK:
@@ -134,13 +132,12 @@ class Cushions:
                 shrink = np.sqrt(shrink)
                 continue
             # What soft cushions hold thin ones may not: it rolls away over them, which what touches at places cannot.
-            away = self._rolled(stiffer, there, loading(stiffer.model))
-            prepared, found, thickness, rolled = stiffer, away, trial, rolled or away is not there
-        here = loading(prepared.model)
-        held = Held(prepared, found, here, Touched(prepared.equations, found.state, here))
+            away = self._rolled(there)
+            found, thickness, rolled = away, trial, rolled or away is not there
+        held = Held(found, Touched.of(found.fields))
         return Cushioned(held, self._touches(held)), rolled
 
-    def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Corrected | None:
+    def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Solved | None:
         """Loads growing through the factors from the undeformed scene."""
         model = prepared.model
         state, first = prepared.equations.start(model.loading(0.0, 0.0)), factors[0]
@@ -166,8 +163,8 @@ class Cushions:
     def _followed(self, prepared: Prepared, way: Callable[[float], Loading], state: State) -> State | None:
         switch_branch = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
 
-        def allowed(before: State, at: Loading, after: State, there: Loading) -> bool:
-            return self._passes(prepared, before, after, there, at)
+        def allowed(before: Solved, after: Solved) -> bool:
+            return self._passes(prepared, before.state, after.state, after.loading, before.loading)
 
         result = follow(prepared, way, state, switch_branch=switch_branch, allowed=allowed)
         self._parts = result.left
@@ -189,7 +186,7 @@ class Cushions:
         touched = Touched(prepared.equations, state, loading)
         return {name: touched.course(name) for name in prepared.model.members}
 
-    def _fallen(self, prepared: Prepared, factor: float) -> Corrected | None:
+    def _fallen(self, prepared: Prepared, factor: float) -> Solved | None:
         """Downhill from the undeformed scene in short steps, to where obstacles and supports hold what falls."""
         if not prepared.model.minimisable:
             return None
@@ -207,7 +204,7 @@ class Cushions:
                 break
         return self._settled(prepared, state, loading)
 
-    def _direct(self, prepared: Prepared, factor: float) -> Corrected | None:
+    def _direct(self, prepared: Prepared, factor: float) -> Solved | None:
         """Downhill from the start guess."""
         model, loading = prepared.model, prepared.model.loading(factor)
         if not prepared.model.minimisable:
@@ -220,21 +217,22 @@ class Cushions:
         start = prepared.equations.start(model.loading(0.0, 0.0))
         return found if found is not None and self._passes(prepared, start, found.state, loading) else None
 
-    def _rolled(self, prepared: Prepared, found: Corrected, loading: Loading) -> Corrected:
+    def _rolled(self, found: Solved) -> Solved:
         """Where an unstable state goes to, if that is not over an obstacle; else the state."""
+        prepared, loading = found.prepared, found.loading
         switch_branch = self.scene.analysis.unstable == "leave" and prepared.model.minimisable
-        if not switch_branch or not prepared.negative(found):
+        if not switch_branch or not found.negative:
             return found
         try:
-            there = prepared.switch_branch(found.state, prepared.stability(found), loading)[0]
+            there = prepared.switch_branch(found, loading)
         except SolveError:
             return found
         return there if self._passes(prepared, found.state, there.state, loading) else found
 
-    def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Corrected | None:
+    def _settled(self, prepared: Prepared, state: State, loading: Loading) -> Solved | None:
         """The equilibrium near a state; downhill from there where Newton's method does not find it, if not far."""
 
-        def near(found: Corrected) -> bool:
+        def near(found: Solved) -> bool:
             there = found.state
             return prepared.distance(state, there) < NEARBY and self._passes(prepared, state, there, loading)
 

@@ -20,13 +20,13 @@ from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.mesh import Touch
 from ..mechanics.rotations import STIFF, end_joints
-from ..solvers.newton import Corrected
+from ..solvers.prepared import Solved
 from .settling import Held
 
 __all__ = ["rolling"]
 
 
-def rolling(held: Held) -> Corrected:
+def rolling(held: Held) -> Solved:
     """The state with the stiffness of rolling added to the entries of the Newton matrix, for tests of stability."""
     corrected, equations = held.corrected, held.prepared.equations
     entries = corrected.point.entries.copy()

@@ -19,8 +19,7 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh, Touch, breaks_of
 from ..mechanics.model import Model
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.pseudo_transient import Drag
 from .touches import Touched
 
@@ -79,19 +78,25 @@ class Held:
 
     Attributes
     ----------
-    prepared : Prepared
-    corrected : Corrected
-    loading : Loading
+    corrected : Solved
     touched : Touched
     slopes : ndarray (places, places), optional
         Derivative of the conditions by the free places, dimensionless.
     """
 
-    prepared: Prepared
-    corrected: Corrected
-    loading: Loading
+    corrected: Solved
     touched: Touched
     slopes: Array | None = None
+
+    @property
+    def prepared(self) -> Prepared:
+        """The model with its touches."""
+        return self.corrected.prepared
+
+    @property
+    def loading(self) -> Loading:
+        """Loads and motions."""
+        return self.corrected.loading
 
     @property
     def mesh(self) -> Mesh:
@@ -271,7 +276,7 @@ class Settler:
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN, drag=drag)
         if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
             return None
-        return Held(prepared, corrected, loading, Touched(prepared.equations, corrected.state, loading))
+        return Held(corrected, Touched.of(corrected.fields))
 
     def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | Ran | None:
         """The equilibrium with fulfilled conditions, or the place that reached an end or a touch; None for neither."""

@@ -276,11 +276,8 @@ class Toucher:
             prepared = self.prepare(replace(start.mesh, touches=mesh_touches))
         loading = way.loading(prepared.model)
         try:
-            corrected, _ = prepared.switch_branch(
-                start.corrected.state, start.prepared.stability(start.corrected), loading
-            )
-            touched = Touched(prepared.equations, corrected.state, loading)
-            there = Held(prepared, corrected, loading, touched)
+            corrected = prepared.switch_branch(start.corrected, loading)
+            there = Held(corrected, Touched.of(corrected.fields))
             return self.resolved(replace(start.mesh, touches=()), there, touches, way)
         except SolveError:
             return None
@@ -318,10 +315,9 @@ class Toucher:
     def _nudged(held: Held) -> Held:
         """An unstable equilibrium moved along its unstable mode, so that it begins to fall."""
         prepared, loading = held.prepared, held.loading
-        stability = prepared.stability(held.corrected)
-        state = prepared.nudged(held.corrected.state, stability, loading, NUDGE)
+        state = prepared.nudged(held.corrected, loading, NUDGE)
         corrected = replace(held.corrected, state=state, point=prepared.equations.at(state, loading))
-        return Held(prepared, corrected, loading, Touched(prepared.equations, state, loading))
+        return Held(corrected, Touched.of(corrected.fields))
 
     def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
         """The state in contact near one of penalty contact; None if it is not found."""

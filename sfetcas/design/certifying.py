@@ -12,13 +12,12 @@ from ..description.scene import Scene
 from ..equilibria.single import finished, unjudged
 from ..equilibria.solution import Equilibrium
 from ..errors import SolveError, Status
-from ..mathematics.arrays import Array
 from ..mechanics.accuracy import halving
 from ..mechanics.equations import State
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from .equations import CaseEquations
 from .formulation import labelled
 
@@ -31,22 +30,16 @@ class Certified:
 
     Attributes
     ----------
-    equilibrium : Equilibrium
+    solved : Solved
         On the mesh of the program.
-    shape : ndarray
-        Eigenvector of its lowest eigenvalue: rotations (rad), then displacements (dimensionless).
-    smallest : float
-        The eigenvalue, dimensionless.
-    prepared : Prepared
-        Its model.
+    equilibrium : Equilibrium
+        The answer that this is.
     error : float
         Difference of positions to those with all elements halved, over the size of the scene.
     """
 
+    solved: Solved
     equilibrium: Equilibrium
-    shape: Array
-    smallest: float
-    prepared: Prepared
     error: float
 
 
@@ -59,17 +52,11 @@ def certified(scene: Scene, equations: CaseEquations, state: State, case: str) -
         The case is no equilibrium of its scene.
     """
     prepared = prepared_case(scene, equations, equations.mesh)
-    factor = float(scene.analysis.steps[-1])
-    loading = prepared.model.loading(factor)
-    found = prepared.correct(state, loading)
+    found = prepared.correct(state, prepared.model.loading(float(scene.analysis.steps[-1])))
     if not found.residual <= tolerances.BALANCED or prepared.distance(found.state, state) > tolerances.SAME_STATE:
         raise SolveError(Status.FAILED, labelled(case, "what was found is no equilibrium of the scene"), state)
-    stability = prepared.stability(found)
-    error, notes = _error(scene, equations, prepared, unjudged(prepared, found, loading, factor))
-    equilibrium = finished(prepared, found, loading, factor, stability, estimate=error, notes=notes)
-    return Certified(
-        equilibrium, np.concatenate([stability.shape, stability.travel]), stability.smallest, prepared, error
-    )
+    error, notes = _error(scene, equations, found)
+    return Certified(found, finished(found, error_estimate=error, notes=notes), error)
 
 
 def prepared_case(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepared:
@@ -78,16 +65,14 @@ def prepared_case(scene: Scene, equations: CaseEquations, mesh: Mesh) -> Prepare
     return Prepared(assemble(scene, mesh, assembly=assembly, scales=equations.scales))
 
 
-def _error(
-    scene: Scene, equations: CaseEquations, coarse: Prepared, here: Equilibrium
-) -> tuple[float, tuple[str, ...]]:
-    mesh = coarse.model.mesh.refined()
-    if mesh.same(coarse.model.mesh):
+def _error(scene: Scene, equations: CaseEquations, here: Solved) -> tuple[float, tuple[str, ...]]:
+    mesh = here.model.mesh.refined()
+    if mesh.same(here.model.mesh):
         return 0.0, ()
     fine = prepared_case(scene, equations, mesh)
-    loading = fine.model.loading(here.factor)
-    found = fine.correct(transferred(coarse.model, here.state, fine.model), loading, iterations=25, most=1.5)
+    state = transferred(here.model, here.state, fine.model)
+    found = fine.correct(state, fine.model.loading(here.factor), iterations=25, most=1.5)
     if not found.converged:
         return np.inf, ("an equilibrium of a coarse mesh only",)
-    difference, left = halving(here.fields, unjudged(fine, found, loading, here.factor).fields)
+    difference, left = halving(here.fields, unjudged(found).fields)
     return difference + left, ()

@@ -21,7 +21,7 @@ from ..mathematics.nlp import Ipopt
 from ..mathematics.statements import Bounds
 from ..parametric.arguments import Parameter
 from .formulation import Cases, Formulation, labelled
-from .solving import Iterate, Solved, Solving
+from .solving import Iterate, Optimum, Solving
 
 __all__ = ["Design", "DesignAnswer", "DesignIterate", "find"]
 
@@ -267,15 +267,15 @@ class Design(Cases):
         cases = self.statement.cases
         return {(cases[key[1][0]], key[0], key[2]): value for key, value in iterate.asked.items()}
 
-    def _answered(self, solved: Solved, iterations: int) -> DesignAnswer:
-        formulation, iterate = self.statement, solved.iterate
+    def _answered(self, optimum: Optimum, iterations: int) -> DesignAnswer:
+        formulation, iterate = self.statement, optimum.iterate
         names = formulation.cases
         return DesignAnswer(
             values={n: float(x[0]) if x.shape == (1,) else x for n, x in iterate.values.items()},
             objective=iterate.objective,
-            cases={name: case.equilibrium for name, case in zip(names, solved.cases, strict=True)},
-            multipliers=solved.multipliers,
-            notes=solved.notes,
+            cases={name: case.equilibrium for name, case in zip(names, optimum.cases, strict=True)},
+            multipliers=optimum.multipliers,
+            notes=optimum.notes,
             iterations=iterations,
             outputs=self._outputs(iterate),
             scenes={name: formulation.case_scene(i, iterate.values) for i, name in enumerate(names)},

@@ -20,9 +20,10 @@ from ..mathematics.nlp import Ipopt
 from ..mathematics.statements import Bounds
 from ..mechanics.equations import State
 from ..parametric.arguments import Parameter
-from .certifying import Certified, prepared_case
+from ..solvers.prepared import Solved
+from .certifying import prepared_case
 from .formulation import Cases, Formulation
-from .solving import Iterate, Solved, Solving
+from .solving import Iterate, Optimum, Solving
 
 __all__ = ["QuasiStatic", "QuasiStaticAnswer", "QuasiStaticIterate"]
 
@@ -282,10 +283,10 @@ class QuasiStatic(Cases):
     def _outputs(self, iterate: Iterate) -> dict[str, Array]:
         return {key[0]: value for key, value in iterate.asked.items()}
 
-    def _answered(self, solved: Solved, iterations: int) -> QuasiStaticAnswer:
-        inputs, values = self._parted(solved.iterate)
-        jumps = tuple(i for i in range(1, len(self.s)) if not self._leads(solved, i))
-        notes = list(solved.notes)
+    def _answered(self, optimum: Optimum, iterations: int) -> QuasiStaticAnswer:
+        inputs, values = self._parted(optimum.iterate)
+        jumps = tuple(i for i in range(1, len(self.s)) if not self._leads(optimum, i))
+        notes = list(optimum.notes)
         if jumps:
             places = ", ".join(f"{self.s[i]:.4g}" for i in jumps)
             notes.append(f"the equilibrium at s = {places} is not the one that the point before leads to")
@@ -294,35 +295,33 @@ class QuasiStatic(Cases):
             s=self.s,
             inputs=inputs,
             values=values,
-            outputs=self._outputs(solved.iterate),
-            objective=solved.iterate.objective,
-            cases=tuple(case.equilibrium for case in solved.cases),
+            outputs=self._outputs(optimum.iterate),
+            objective=optimum.iterate.objective,
+            cases=tuple(case.equilibrium for case in optimum.cases),
             jumps=jumps,
-            multipliers=solved.multipliers,
+            multipliers=optimum.multipliers,
             notes=tuple(notes),
             iterations=iterations,
-            scenes=tuple(self.statement.case_scene(i, solved.iterate.values) for i in range(count)),
+            scenes=tuple(self.statement.case_scene(i, optimum.iterate.values) for i in range(count)),
         )
 
-    def _leads(self, solved: Solved, i: int) -> bool:
+    def _leads(self, optimum: Optimum, i: int) -> bool:
         """Whether the equilibrium before leads to this one: at once, or by smaller steps of all numbers."""
-        before, here = solved.cases[i - 1], solved.cases[i]
-        if _arrives(before.equilibrium.state, here):
+        here, state = optimum.cases[i].solved, optimum.cases[i - 1].solved.state
+        if _arrives(state, here):
             return True
-        names = [one.name for one in solved.equations.arguments.arguments]
-        state = before.equilibrium.state
+        names = [one.name for one in optimum.equations.arguments.arguments]
         for share in SHARES:
-            numbers = (1.0 - share) * solved.numbers[i - 1] + share * solved.numbers[i]
+            numbers = (1.0 - share) * optimum.numbers[i - 1] + share * optimum.numbers[i]
             scene = self.statement.scene_with(dict(zip(names, numbers.tolist(), strict=True)))
-            prepared = prepared_case(scene, solved.equations, solved.mesh)
-            found = prepared.correct(state, prepared.model.loading(here.equilibrium.factor), most=1.0)
+            prepared = prepared_case(scene, optimum.equations, optimum.mesh)
+            found = prepared.correct(state, prepared.model.loading(here.factor), most=1.0)
             if not found.converged:
                 return False
             state = found.state
-        return here.prepared.distance(state, here.equilibrium.state) < tolerances.SAME_STATE
+        return here.prepared.distance(state, here.state) < tolerances.SAME_STATE
 
 
-def _arrives(state: State, here: Certified) -> bool:
-    loading = here.prepared.model.loading(here.equilibrium.factor)
-    found = here.prepared.correct(state, loading, most=1.0)
-    return found.converged and here.prepared.distance(found.state, here.equilibrium.state) < tolerances.SAME_STATE
+def _arrives(state: State, here: Solved) -> bool:
+    found = here.prepared.correct(state, here.loading, most=1.0)
+    return found.converged and here.prepared.distance(found.state, here.state) < tolerances.SAME_STATE

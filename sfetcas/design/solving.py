@@ -28,7 +28,7 @@ from .certifying import Certified, certified
 from .equations import CaseEquations
 from .formulation import Formulation, labelled
 
-__all__ = ["Iterate", "Solved", "Solving"]
+__all__ = ["Iterate", "Optimum", "Solving"]
 
 ROUNDS = 6
 """Meshes, references and sets of eigenvalues that are tried one after the other."""
@@ -84,7 +84,7 @@ class Iterate:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class Optimum:
     """A solution of a formulation.
 
     Attributes
@@ -184,7 +184,7 @@ class Solving:
     # -- rounds -------------------------------------------------------------------------------------
 
     @single_threaded
-    def solve(self) -> Solved:
+    def solve(self) -> Optimum:
         """Solve the formulation.
 
         Raises
@@ -322,7 +322,7 @@ class Solving:
             if case.equilibrium.certificate.stable == "not defined":
                 message = "found a margin of stability, accepted: none, as its loads have no potential"
                 raise SceneError(message, ("stable", self.formulation.cases[i]))
-            if case.smallest < margin - VIOLATED * max(margin, 1.0):
+            if case.solved.stability.smallest < margin - VIOLATED * max(margin, 1.0):
                 new.append(self._pair(i, case, program, margin))
         if not new:
             return []
@@ -340,11 +340,11 @@ class Solving:
 
     @staticmethod
     def _pair(number: int, case: Certified, program: Assembled, margin: float) -> Pair:
-        mass = program.equations.mass
-        shape = np.zeros(len(mass))
-        shape[: len(case.shape)] = case.shape
+        mass, stability = program.equations.mass, case.solved.stability
+        mode, shape = np.concatenate([stability.shape, stability.travel]), np.zeros(len(mass))
+        shape[: len(mode)] = mode
         shape /= np.sqrt(shape @ (mass * shape))
-        return Pair(number, shape, case.smallest, margin)
+        return Pair(number, shape, stability.smallest, margin)
 
     # -- the answer -----------------------------------------------------------------------------------
 
@@ -362,7 +362,7 @@ class Solving:
             iterations=self.iterations,
         )
 
-    def _answer(self, program: Assembled, result: NLPResult, cases: Sequence[Certified]) -> Solved:
+    def _answer(self, program: Assembled, result: NLPResult, cases: Sequence[Certified]) -> Optimum:
         multipliers: dict[str, Array] = {}
         pieces = np.array([piece for piece, _ in program.pieces.row_owners()])
         for one in self.formulation.required:
@@ -373,7 +373,7 @@ class Solving:
         unstable = [self.formulation.cases[i] for i, c in enumerate(cases) if c.equilibrium.certificate.stable is False]
         told = [*unstable[:3], *([counted(len(unstable) - 3, "other", "others")] if unstable[3:] else [])]
         notes = [labelled(", ".join(told), "unstable")] if unstable else []
-        return Solved(
+        return Optimum(
             iterate=self._iterate(program, result),
             cases=tuple(cases),
             multipliers=multipliers,

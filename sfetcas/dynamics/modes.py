@@ -32,8 +32,7 @@ from ..mechanics.fields import Fields, transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.sides import Sides
 from ..solvers.stability import Stability
 from .buckling import buckling_factors
@@ -253,7 +252,7 @@ class ModalAnalysis:
         fixed, mesh = self.meshing.fixed, self._mesh()
         flexible = [name for name, member in self.scene.members.items() if member.type == "flexible"]
         answer, error = self._found(mesh), np.inf
-        found = answer[2]
+        found = answer[1]
         for _ in range(HALVINGS):
             marks = {name: np.full(len(cuts) - 1, name not in fixed) for name, cuts in mesh.cuts.items()}
             # Where all is prescribed the error is that beside a mesh which only estimates it.
@@ -263,26 +262,26 @@ class ModalAnalysis:
                 error = 0.0
                 break
             other = self._found(finer)
-            last, error = error, _difference(found, other[2])
+            last, error = error, _difference(found, other[1])
             # What gets no nearer is rounding: the coarser mesh has less of it.
             if prescribed or error > last:
                 break
-            mesh, found, answer = finer, other[2], other
+            mesh, found, answer = finer, other[1], other
             if error <= self.accuracy or 2 * mesh.elements > MOST_ELEMENTS:
                 break
         self.seconds["solve"] += time.perf_counter() - begin
         return self._answered(*answer, error)
 
-    def _found(self, mesh: Mesh) -> tuple[Prepared, SmallMotion, Eigenmotions]:
-        prepared, corrected, loading = put_on(self.scene, mesh, self.rest)
-        motion = SmallMotion(prepared.equations, corrected.state, loading, corrected.point)
+    def _found(self, mesh: Mesh) -> tuple[SmallMotion, Eigenmotions]:
+        rest = put_on(self.scene, mesh, self.rest)
+        motion = SmallMotion(rest)
         negative = 0 if self.rest is None else self.rest.certificate.negative
         try:
             # One more: of those with the frequency of the last one that is asked for a rule takes the shape.
             more = int(motion.plain and motion.symmetric)
-            return prepared, motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
+            return motion, _by_rule(motion, motion.eigenmotions(self.count + more, negative), self.count)
         except np.linalg.LinAlgError as error:
-            raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", corrected.state) from None
+            raise SolveError(Status.FAILED, f"the frequencies could not be found: {error}", rest.state) from None
 
     def _buckling(self, prepared: Prepared) -> Array:
         """Buckling factors, none where the structure cannot be unloaded."""
@@ -293,7 +292,7 @@ class ModalAnalysis:
         except (SceneError, SolveError, np.linalg.LinAlgError):
             return np.zeros(0)
 
-    def _answered(self, prepared: Prepared, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
+    def _answered(self, motion: SmallMotion, found: Eigenmotions, error: float) -> Modes:
         notes = []
         asked = self.meshing.asked
         status = Status.SOLVED if error <= self.accuracy or not asked else Status.SHORT
@@ -306,7 +305,7 @@ class ModalAnalysis:
             last = _undeformed(motion, bool(found.rigid))
         modes = tuple(_mode(motion, found, i) for i in range(len(found.exponents)))
         growing = tuple((found.growing / motion.masses.time).tolist())
-        buckling = self._buckling(prepared)
+        buckling = self._buckling(motion.rest.prepared)
         return Modes(
             self.scene, status, last, modes, found.rigid, growing, error, motion, buckling, tuple(notes), self.seconds
         )
@@ -314,15 +313,12 @@ class ModalAnalysis:
 
 def _undeformed(motion: SmallMotion, free: bool) -> Equilibrium:
     """The undeformed scene as an equilibrium; what is free to move is neither stable nor unstable."""
-    prepared = Prepared(motion.model)
-    corrected = Corrected(motion.state, motion.point, True, 0, 0.0, 0.0, 0.0)
+    found, stability = replace(motion.rest, residual=0.0), None
     if free:
-        equations = prepared.equations
+        equations = found.equations
         shapes = np.zeros(equations.rotation_unknowns), np.zeros(equations.displacement_unknowns)
         stability = Stability("neutral", 0, 0.0, *shapes)
-    else:
-        stability = prepared.stability(corrected)
-    return finished(prepared, corrected, motion.loading, 1.0, stability, estimate=0.0)
+    return finished(found, stability, error_estimate=0.0)
 
 
 def _difference(coarse: Eigenmotions, fine: Eigenmotions) -> float:
@@ -341,7 +337,7 @@ def prepared_for_motion(scene: Scene, mesh: Mesh) -> Prepared:
     return Prepared(assemble(scene, replace(mesh, places=True), assembly="nodal"))
 
 
-def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared, Corrected, Loading]:
+def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> Solved:
     """An equilibrium, or the undeformed scene (None), transferred to a mesh for masses and corrected there.
 
     Raises
@@ -354,11 +350,11 @@ def put_on(scene: Scene, mesh: Mesh, rest: Equilibrium | None) -> tuple[Prepared
     state = prepared.equations.start(loading)
     if rest is not None:
         state = carried(prepared.equations, transferred(rest.model, rest.state, prepared.model), loading)
-    corrected = prepared.correct(state, loading, iterations=30)
-    if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
-        detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {corrected.residual:.1e}"
+    found = prepared.correct(state, loading, iterations=30)
+    if not found.converged and not found.residual <= tolerances.BALANCED:
+        detail = f"the equilibrium is none on the mesh of its masses: Newton's method left {found.residual:.1e}"
         raise SolveError(Status.FAILED, detail, state)
-    return prepared, corrected, loading
+    return found
 
 
 def carried(equations: Equations, state: State, loading: Loading) -> State:

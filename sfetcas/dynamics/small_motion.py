@@ -25,10 +25,10 @@ from ..mathematics.linear import SparseMap, SparseSolver, places_of
 from ..mathematics.quaternion import cross_matrix
 from ..mathematics.spectra import largest
 from ..mechanics.batches import GroupBatch
-from ..mechanics.equations import Equations, Point, State, turned_tangents
-from ..mechanics.loading import Loading
+from ..mechanics.equations import turned_tangents
 from ..mechanics.masses import masses_of
 from ..mechanics.terms import rotation_gradient
+from ..solvers.prepared import Solved
 from .stages import StageEquations
 
 __all__ = ["Eigenmotions", "SmallMotion"]
@@ -114,10 +114,8 @@ class SmallMotion:
 
     Parameters
     ----------
-    equations : Equations
+    rest : Solved
         Of a model with a displacement at every end of an element, see :func:`~sfetcas.dynamics.modes.put_on`.
-    state, loading, point
-        The equilibrium.
 
     Raises
     ------
@@ -125,12 +123,12 @@ class SmallMotion:
         Nothing has mass.
     """
 
-    def __init__(self, equations: Equations, state: State, loading: Loading, point: Point) -> None:
-        self.equations, self.state, self.loading, self.point = equations, state, loading, point
-        self.model = equations.model
+    def __init__(self, rest: Solved) -> None:
+        self.rest, self.state, self.loading, self.point = rest, rest.state, rest.loading, rest.point
+        self.equations, self.model = rest.equations, rest.model
         self.masses = masses_of(self.model)
-        self._system = StageEquations(equations, self.masses, "interpreted")
-        self.unknowns = equations.unknowns
+        self._system = StageEquations(self.equations, self.masses, "interpreted")
+        self.unknowns = self.equations.unknowns
         jacobian = self._jacobian()
         self.mass = _sandwich(jacobian, self._weights("mass"))
         self.damping = _sandwich(jacobian, self._weights("damping"))

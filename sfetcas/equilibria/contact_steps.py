@@ -57,11 +57,11 @@ class ContactSteps:
         unstopped, failure = self._unstopped(pilot, factor) if self.ways.started else (None, None)
         free = None
         if unstopped is not None:
-            there = self.refinement.onto(base, unstopped, factor)
+            there = self.refinement.onto(base, unstopped)
             notes += there.notes
-            free = _as_held(there, factor)
+            free = Held(there.solved, Touched.of(there.solved.fields))
             if contact.reviser.wrong(free, contact.at(factor)) is None:
-                answer = self.refinement.refined(replace(unstopped, way=("no contact",)), factor)
+                answer = self.refinement.refined(replace(unstopped, way=("no contact",)))
                 if contact.clear(answer.fields):
                     contact.last = (factor, free)
                     return answer
@@ -71,14 +71,14 @@ class ContactSteps:
     def _clear_all_the_way(self, pilot: Prepared, factor: float) -> Equilibrium | None:
         """The answer without obstacles, where the growing loads lead there past none of them; else None."""
         try:
-            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped(pilot))
+            found = self.ways.grown_from_zero(pilot, factor, self.run.unstopped)
         except SolveError as error:
             if error.status is Status.BENT:
                 raise
             found = None
         if found is None or (self.meshes.switch_branch and found.stability.negative > 0):
             return None
-        answer = self.refinement.refined(replace(found, way=("no contact",)), factor)
+        answer = self.refinement.refined(replace(found, way=("no contact",)))
         return answer if self.run.clear(answer.fields) else None
 
     def _first_pressed(
@@ -113,8 +113,7 @@ class ContactSteps:
 
     def _judged(self, coarse: Held, fine: Held, factor: float) -> tuple[float, float]:
         """How far two states in contact are apart, and the estimated error of the finer one."""
-        one, other = (unjudged(held.prepared, held.corrected, held.loading, factor) for held in (coarse, fine))
-        return self.meshes.judged(one, other)
+        return self.meshes.judged(unjudged(coarse.corrected), unjudged(fine.corrected))
 
     def _unstopped(self, pilot: Prepared, factor: float) -> tuple[EquilibriumResult | None, SolveError | None]:
         """The answer as if there were no obstacles; None where nothing else holds the structure."""
@@ -128,22 +127,12 @@ class ContactSteps:
         refuse_unbalanced(held.touched.fields)
         refuse_large(held.touched.fields)
         answer = finished(
-            held.prepared,
             held.corrected,
-            held.loading,
-            factor,
             found.stability,
-            estimate=found.error,
+            error_estimate=found.error,
             error_of=self.meshes.error_of,
             notes=found.notes,
             way=way,
         )
         refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
         return answer
-
-
-def _as_held(found: EquilibriumResult, factor: float) -> Held:
-    """An equilibrium without contact as one that may begin it."""
-    loading = found.prepared.model.loading(factor)
-    touched = Touched(found.prepared.equations, found.corrected.state, loading)
-    return Held(found.prepared, found.corrected, loading, touched)

@@ -43,15 +43,13 @@ class FurtherEquilibria:
         self.others: list[tuple[Model, State]] = []
         self._refuse(model)
 
-    def answers(self, found: EquilibriumResult, answer: Equilibrium, factor: float) -> list[Equilibrium]:
+    def answers(self, found: EquilibriumResult, answer: Equilibrium) -> list[Equilibrium]:
         """The answer with a note about the search, then the further equilibria of its load factor by rising energy."""
-        result = self._searched(found, factor)
+        result = self._searched(found)
         answers, dropped = [replace(answer, notes=(*answer.notes, *result.family_note(0)))], 0
-        for number, corrected in enumerate(result.found[1:], start=1):
-            stability = result.prepared.stability(corrected)
+        for number, solved in enumerate(result.found[1:], start=1):
             notes = result.family_note(number)
-            candidate = EquilibriumResult(result.prepared, corrected, stability, notes, kept=True, way=("search",))
-            further = self._further(candidate, factor)
+            further = self._further(EquilibriumResult(solved, solved.stability, notes, kept=True, way=("search",)))
             if further is None:
                 dropped += 1
             elif not any(same(further, other) for other in answers):
@@ -83,43 +81,43 @@ class FurtherEquilibria:
             why = "the energy of pressure, by which equilibria are sorted and told apart, is not evaluated"
         raise SceneError(f"found 'all', accepted: 'one', as {why}", ("analysis", "equilibria"))
 
-    def _further(self, candidate: EquilibriumResult, factor: float) -> Equilibrium | None:
+    def _further(self, candidate: EquilibriumResult) -> Equilibrium | None:
         """The answer to what a search found; None where finer meshes do not have it."""
         try:
-            answer = self.refinement.refined(candidate, factor)
+            answer = self.refinement.refined(candidate)
         except SolveError:
             return None
         short = (answer.certificate.error_estimate or 0.0) > self.meshes.accuracy
         return None if short and not self.meshes.prescribed else answer
 
-    def _searched(self, found: EquilibriumResult, factor: float) -> Search | Scan:
+    def _searched(self, found: EquilibriumResult) -> Search | Scan:
         """The scan or, where one number does not give all equilibria, the search.
 
         On a mesh fine enough for what is strongly curled, but for elements that are prescribed.
         """
         first = found
         if not self.meshes.prescribed:
-            first = self.refinement.onto(self.refinement.halved(found), found, factor)
+            first = self.refinement.onto(self.refinement.halved(found), found)
         elif self.meshes.pilot_mesh is not self.meshes.target:
-            first = self.refinement.onto(found.prepared.model.mesh.refined(), found, factor)
+            first = self.refinement.onto(found.solved.model.mesh.refined(), found)
         for _ in range(LEVELS if first is not found else 0):
-            long = long_elements(first.prepared, first.prepared.model.loading(factor), first.corrected)
+            long = long_elements(first.solved)
             marks = {name: marked & (name not in self.meshes.fixed) for name, marked in long.items()}
             if not any(marked.any() for marked in marks.values()):
                 break
-            first = self.refinement.onto(first.prepared.model.mesh.refined(marks), first, factor)
-        prepared, loading = first.prepared, first.prepared.model.loading(factor)
-        starts = [transferred(model, state, prepared.model) for model, state in self.others]
+            first = self.refinement.onto(first.solved.model.mesh.refined(marks), first)
+        begin = first.solved
+        starts = [transferred(model, state, begin.model) for model, state in self.others]
         # Whoever gives the number of runs wants the search.
-        scanned = scan(prepared, loading, first.corrected) if self.meshes.settings.runs is None else None
+        scanned = scan(begin) if self.meshes.settings.runs is None else None
         for _ in range(0 if self.meshes.prescribed else FINER):
             if scanned is None or len(scanned.found) >= scanned.roots:
                 break
-            first = self.refinement.onto(self.refinement.halved(first), first, factor)
-            again = scan(first.prepared, first.prepared.model.loading(factor), first.corrected)
+            first = self.refinement.onto(self.refinement.halved(first), first)
+            again = scan(first.solved)
             if again is None or len(again.found) <= len(scanned.found):
                 break
             scanned = again
-        result = scanned or search(prepared, loading, first.corrected, starts, self.meshes.settings.runs)
-        self.others = [(result.prepared.model, other.state) for other in result.found]
+        result = scanned or search(begin, starts, self.meshes.settings.runs)
+        self.others = [(other.model, other.state) for other in result.found]
         return result

@@ -12,8 +12,7 @@ from ..mechanics.accuracy import gained, halving, remaining
 from ..mechanics.elements import ELEMENTS
 from ..mechanics.mesh import Mesh, first_mesh, uniform_mesh
 from ..mechanics.model import Model, assemble
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .quantities import WHERE, Quantity
 from .settings import Settings
@@ -33,12 +32,13 @@ PILOT_ORDER = 4
 
 @dataclass
 class EquilibriumResult:
-    """An equilibrium in the course of an analysis, with the model that it belongs to.
+    """An equilibrium in the course of an analysis.
 
     Attributes
     ----------
-    prepared, corrected, stability
-        Model, state and result of the stability test.
+    solved : Solved
+    stability : Stability
+        On the mesh where it was found first: finer meshes do not repeat the test before the answer.
     notes : tuple of str
     iterations : int
         Iterations of IPOPT.
@@ -50,12 +50,10 @@ class EquilibriumResult:
         Strategies that found it, see :data:`~sfetcas.equilibria.ways.WAYS`.
     """
 
-    prepared: Prepared
-    corrected: Corrected
+    solved: Solved
     stability: Stability
     notes: tuple[str, ...] = ()
     iterations: int = 0
-    left: tuple[float, ...] = ()
     kept: bool = False
     drifts: int = 0
     way: tuple[str, ...] = ()

@@ -16,11 +16,9 @@ from .. import tolerances
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from ..mechanics.fields import rotations_along
-from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..mechanics.rotations import RotationFreedom
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Solved
 
 __all__ = ["Mirror", "has_twin", "mirrored", "mirrors"]
 
@@ -68,8 +66,9 @@ def mirrors(model: Model) -> tuple[Mirror, ...]:
     return tuple(found)
 
 
-def has_twin(prepared: Prepared, found: Corrected, loading: Loading) -> bool:
+def has_twin(found: Solved) -> bool:
     """Whether a mirror image of an equilibrium is another equilibrium with the same energy."""
+    prepared, loading = found.prepared, found.loading
     for mirror in mirrors(prepared.model):
         image = prepared.equations.holding(mirrored(prepared.model, found.state, mirror), loading)
         if prepared.distance(image, found.state) < OTHER_STATE:

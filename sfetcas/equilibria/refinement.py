@@ -14,17 +14,16 @@ from ..mathematics.arrays import Array
 from ..mathematics.linear import blurred
 from ..mechanics.accuracy import every_other, roughness
 from ..mechanics.equations import State
-from ..mechanics.fields import Fields, transferred
+from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..solvers.constraints import in_words, moves_nodes
 from ..solvers.deflation import deflated
-from ..solvers.newton import Corrected
-from ..solvers.prepared import BEYOND, Prepared
+from ..solvers.prepared import BEYOND, Prepared, Solved
 from ..solvers.redundancy import loose_rows, named_in, stretched
 from ..solvers.residuals import LEAST_SCALE, relative_residual
 from ..solvers.sharing import SHARED, SMALLEST, shared, stretches
-from ..solvers.stability import LIGHT, Stability
+from ..solvers.stability import LIGHT
 from .meshing import EquilibriumResult, Meshing
 from .mirrors import has_twin
 from .single import finished, unjudged
@@ -102,7 +101,7 @@ class Refinement:
     def __init__(self, meshes: Meshing) -> None:
         self.meshes = meshes
 
-    def onto(self, mesh: Mesh, source: EquilibriumResult, factor: float) -> EquilibriumResult:
+    def onto(self, mesh: Mesh, source: EquilibriumResult) -> EquilibriumResult:
         """The equilibrium carried over to another mesh and corrected there by Newton's method.
 
         Raises
@@ -110,44 +109,44 @@ class Refinement:
         SolveError
             Newton's method does not converge there.
         """
-        if mesh.same(source.prepared.model.mesh):
+        if mesh.same(source.solved.model.mesh):
             # Without flexible members nothing is halved.
             return source
         prepared = self.meshes.prepared(mesh)
-        loading = prepared.model.loading(factor)
-        state = transferred(source.prepared.model, source.corrected.state, prepared.model)
-        corrected = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
-        if source.kept and not corrected.converged:
-            corrected = deflated(prepared, state, loading, ()) or corrected
-        if source.kept and (not corrected.converged or prepared.distance(state, corrected.state) > DRIFT):
+        loading = prepared.model.loading(source.solved.factor)
+        state = transferred(source.solved.model, source.solved.state, prepared.model)
+        solved = self._corrected(prepared, state, loading, source.stability.stable == "neutral")
+        if source.kept and not solved.converged:
+            solved = deflated(prepared, state, loading, ()) or solved
+        if source.kept and (not solved.converged or prepared.distance(state, solved.state) > DRIFT):
             raise SolveError(Status.FAILED, "an equilibrium of a coarse mesh only", state)
         drifts, way = source.drifts, source.way
-        if not corrected.converged:
+        if not solved.converged:
             way = way if "refound" in way else (*way, "refound")
             try:
-                corrected, _ = prepared.minimise(loading, state)
+                solved, _ = prepared.minimise(loading, state)
             except SolveError as error:
                 raise SolveError(error.status, error.detail + more_than(mesh, source), error.last) from None
-            drifts += prepared.distance(state, corrected.state) > DRIFT
+            drifts += prepared.distance(state, solved.state) > DRIFT
             if drifts == DRIFTS:
                 detail = f"each of {DRIFTS} finer meshes has another equilibrium, far from that of the mesh before"
                 raise SolveError(Status.FAILED, detail, state)
-        apart = prepared.distance(state, corrected.state) > DRIFT and ELSEWHERE not in source.notes
+        apart = prepared.distance(state, solved.state) > DRIFT and ELSEWHERE not in source.notes
         notes = (*source.notes, ELSEWHERE) if apart else source.notes
-        return replace(source, prepared=prepared, corrected=corrected, notes=notes, drifts=drifts, way=way)
+        return replace(source, solved=solved, notes=notes, drifts=drifts, way=way)
 
     @staticmethod
-    def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Corrected:
+    def _corrected(prepared: Prepared, state: State, loading: Loading, flat: bool) -> Solved:
         """Newton's method; along a flat energy rounding of 1e-14 leads it 1e-5 rad astray from mesh to mesh."""
         near = prepared.correct(state, loading, iterations=25, most=1.5)
         if not flat or not near.converged:
             return near
         _, values, shapes = prepared.around_zero(near.point)
-        still = shapes[:, np.abs(values) <= prepared.stability(near).limit]
+        still = shapes[:, np.abs(values) <= near.stability.limit]
         held = prepared.correct(state, loading, iterations=25, most=1.5, flat=still)
         return held if held.converged else near
 
-    def refined(self, pilot: EquilibriumResult, factor: float) -> Equilibrium:
+    def refined(self, pilot: EquilibriumResult) -> Equilibrium:
         """The answer that is found on a pilot mesh, on one that is fine enough.
 
         Raises
@@ -156,73 +155,71 @@ class Refinement:
             Nothing holds it, or finer meshes do not have it.
         """
         if not pilot.kept:
-            if pilot.prepared.multipliers(pilot.corrected) > BEYOND:
+            if pilot.solved.multipliers > BEYOND:
                 # What no finite force holds straight may look balanced, by rounding, and free along the rest.
-                _with_unique_reactions(pilot, pilot.prepared.model.loading(factor))
+                _with_unique_reactions(pilot)
             # What nothing holds on a coarse mesh no finer one holds.
-            _refuse_free(pilot.prepared, pilot.corrected, pilot.stability)
+            _refuse_free(pilot.solved)
         if self.meshes.has_superelements:
-            refuse_large(Fields(pilot.prepared.equations, pilot.corrected.state, pilot.prepared.model.loading(factor)))
+            refuse_large(pilot.solved.fields)
         if self.meshes.prescribed:
-            return self._on_target(pilot, factor)
-        mesh = pilot.prepared.model.mesh
+            return self._on_target(pilot)
+        mesh = pilot.solved.model.mesh
         own = mesh is not self.meshes.pilot_mesh and mesh.order == self.meshes.target.order and not self.meshes.fixed
         there = mesh is self.meshes.target or own
-        now = pilot if there else self._onto_target(pilot, factor)
+        now = pilot if there else self._onto_target(pilot)
         usual = np.sqrt(self.meshes.accuracy)
         # Of one quantity a mesh may be right that is too coarse for all positions.
         smooth, last, stalled = usual if self.meshes.quantity is None else max(usual, 0.5 * TORN), np.inf, 0
-        loading = now.prepared.model.loading(factor)
         for _ in range(LEVELS):
-            marked = self._marked(now, loading, smooth)
+            marked = self._marked(now, smooth)
             if not any(m.any() for m in marked.values()):
-                finer = self.onto(self.halved(now), now, factor)
-                difference, error = self._difference(now, finer, factor)
+                finer = self.onto(self.halved(now), now)
+                difference, error = self._difference(now, finer)
                 now = finer
                 if error <= self.meshes.accuracy:
-                    return self._answer(now, factor, max(error, self._of_fixed(now, factor)), difference)
+                    return self._answer(now, max(error, self._of_fixed(now)), difference)
                 stalled = stalled + 1 if error > 0.5 * last else 0
                 if stalled == STALLED:
-                    return self._answer(now, factor, max(error, self._of_fixed(now, factor)), difference)
+                    return self._answer(now, max(error, self._of_fixed(now)), difference)
                 last, smooth = error, min(usual, 0.1 * smooth)
-            elif now.prepared.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
+            elif now.solved.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
                 break
             else:
-                now = self.onto(now.prepared.model.mesh.refined(marked), now, factor)
-            loading = now.prepared.model.loading(factor)
-        finer = self.onto(self.halved(now), now, factor)
-        difference, error = self._difference(now, finer, factor)
-        return self._answer(finer, factor, max(error, self._of_fixed(finer, factor)), difference)
+                now = self.onto(now.solved.model.mesh.refined(marked), now)
+        finer = self.onto(self.halved(now), now)
+        difference, error = self._difference(now, finer)
+        return self._answer(finer, max(error, self._of_fixed(finer)), difference)
 
-    def _of_fixed(self, now: EquilibriumResult, factor: float) -> float:
+    def _of_fixed(self, now: EquilibriumResult) -> float:
         """What members contribute whose number of elements is asked for, and which the halving left as they were."""
         if not self.meshes.fixed:
             return 0.0
-        return sum(self._difference(now, self.onto(now.prepared.model.mesh.refined(), now, factor), factor))
+        return sum(self._difference(now, self.onto(now.solved.model.mesh.refined(), now)))
 
     def halved(self, now: EquilibriumResult) -> Mesh:
         """The mesh with all elements halved, but those of members whose number of elements is prescribed."""
-        cuts = now.prepared.model.mesh.cuts
-        marks = {n: np.full(len(c) - 1, n not in self.meshes.fixed) for n, c in cuts.items()}
-        return now.prepared.model.mesh.refined(marks)
+        mesh = now.solved.model.mesh
+        marks = {n: np.full(len(c) - 1, n not in self.meshes.fixed) for n, c in mesh.cuts.items()}
+        return mesh.refined(marks)
 
-    def _on_target(self, pilot: EquilibriumResult, factor: float) -> Equilibrium:
+    def _on_target(self, pilot: EquilibriumResult) -> Equilibrium:
         """Everything was prescribed: solve there, and estimate the error from a mesh beside it."""
         mesh = self.meshes.target
         if mesh.elements > HUGE:
             half = replace(mesh, cuts={n: every_other(c) for n, c in mesh.cuts.items()})
-            coarse = self.onto(half, pilot, factor)
-            now = self.onto(mesh, coarse, factor)
+            coarse = self.onto(half, pilot)
+            now = self.onto(mesh, coarse)
             # The error falls by 4^p a halving; twice that share for not being there yet.
-            difference, _ = self._difference(coarse, now, factor)
-            return self._answer(now, factor, difference * 2.0 / (4.0**mesh.order - 1.0), difference)
-        now = pilot if self.meshes.pilot_mesh is mesh else self._onto_target(pilot, factor)
-        finer = self.onto(mesh.refined(), now, factor)
+            difference, _ = self._difference(coarse, now)
+            return self._answer(now, difference * 2.0 / (4.0**mesh.order - 1.0), difference)
+        now = pilot if self.meshes.pilot_mesh is mesh else self._onto_target(pilot)
+        finer = self.onto(mesh.refined(), now)
         # The error before the halving is what that changes and what it leaves.
-        error = sum(self._difference(now, finer, factor))
-        return self._answer(_with_coarse_moments(now, finer, factor), factor, error)
+        error = sum(self._difference(now, finer))
+        return self._answer(_with_coarse_moments(now, finer), error)
 
-    def _onto_target(self, pilot: EquilibriumResult, factor: float) -> EquilibriumResult:
+    def _onto_target(self, pilot: EquilibriumResult) -> EquilibriumResult:
         """The same on the mesh that is asked for.
 
         Raises
@@ -230,34 +227,31 @@ class Refinement:
         SolveError
             That is too coarse for it.
         """
-        now = self.onto(self.meshes.target, pilot, factor)
-        if not now.prepared.model.space:
+        now = self.onto(self.meshes.target, pilot)
+        if not now.solved.model.space:
             return now
-        fine, coarse = pilot.prepared, now.prepared.model
-        apart = fine.distance(transferred(coarse, now.corrected.state, fine.model), pilot.corrected.state)
+        fine, state = pilot.solved.prepared, now.solved.state
+        apart = fine.distance(transferred(now.solved.model, state, fine.model), pilot.solved.state)
         few, many = (counted(n, "element", "elements") for n in (self.meshes.target.elements, fine.model.mesh.elements))
         if apart > TURN_LOST:
             detail = f"{few} asked for turn {apart:.2g} rad away from what was found on {many}" + more_than(
                 self.meshes.target, pilot
             )
-            raise SolveError(Status.FAILED, detail, now.corrected.state)
-        if pilot.stability.negative == 0 < now.prepared.negative(now.corrected):
+            raise SolveError(Status.FAILED, detail, state)
+        if pilot.stability.negative == 0 < now.solved.negative:
             detail = f"{few} asked for snap away from what is stable on {many}" + more_than(self.meshes.target, pilot)
-            raise SolveError(Status.FAILED, detail, now.corrected.state)
+            raise SolveError(Status.FAILED, detail, state)
         return now
 
-    def _answer(
-        self, found: EquilibriumResult, factor: float, error: float, halved: float | None = None
-    ) -> Equilibrium:
+    def _answer(self, found: EquilibriumResult, error: float, halved: float | None = None) -> Equilibrium:
         """The answer with its estimated error, and how far it is from that on half the elements."""
-        prepared = found.prepared
-        found = _with_unique_reactions(found, prepared.model.loading(factor))
-        stability = prepared.stability(found.corrected)
-        loading = prepared.model.loading(factor)
-        _refuse_many_turns(prepared, found.corrected)
-        self._refuse_torn(found, loading)
+        found = _with_unique_reactions(found)
+        solved, prepared = found.solved, found.solved.prepared
+        stability = solved.stability
+        _refuse_many_turns(solved)
+        self._refuse_torn(solved)
         if not found.kept:
-            _refuse_free(prepared, found.corrected, stability)
+            _refuse_free(solved)
         if (
             stability.negative > 0
             and self.meshes.switch_branch
@@ -265,29 +259,24 @@ class Refinement:
             and not found.kept
             and KEPT not in found.notes
         ):
-            corrected, stability = prepared.switch_branch(found.corrected.state, stability, loading)
+            solved = prepared.switch_branch(solved, solved.loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             notes, way = (*found.notes, note), (*found.way, "left")
-            found = replace(found, corrected=corrected, stability=stability, notes=notes, way=way)
+            found = replace(found, solved=solved, stability=solved.stability, notes=notes, way=way)
             # The error was that of the state that was left.
-            error = sum(self._difference(found, self.onto(prepared.model.mesh.refined(), found, factor), factor))
-        if any(ALONG_MODE in note for note in found.notes) and has_twin(prepared, found.corrected, loading):
-            found = replace(found, notes=(*found.notes, TWIN))
+            error = sum(self._difference(found, self.onto(solved.model.mesh.refined(), found)))
+        twin = any(ALONG_MODE in note for note in found.notes) and has_twin(solved)
         return finished(
-            prepared,
-            found.corrected,
-            loading,
-            factor,
-            stability,
-            estimate=error,
+            solved,
+            error_estimate=error,
             halved=halved,
             error_of=self.meshes.error_of,
-            notes=found.notes,
+            notes=(*found.notes, TWIN) if twin else found.notes,
             iterations=found.iterations,
             way=found.way,
         )
 
-    def _refuse_torn(self, found: EquilibriumResult, loading: Loading) -> None:
+    def _refuse_torn(self, found: Solved) -> None:
         """Refuse rotations that jump within an element, however short: a full turn there bends no beam.
 
         Between q and -q elements pass by without a place moved or, at their nodes, a moment: no estimate sees it.
@@ -297,41 +286,34 @@ class Refinement:
         SolveError
             Names the member.
         """
-        model = found.prepared.model
-        rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading))
-        for name in model.members:
-            worst = float(rough[model.elements_of(name)].max(initial=0.0))
+        rough = roughness(found.fields)
+        for name in found.model.members:
+            worst = float(rough[found.model.elements_of(name)].max(initial=0.0))
             if name not in self.meshes.fixed and worst > TORN:
                 detail = f"an equilibrium of the mesh only: member {name!r} turns by a jump within an element"
-                raise SolveError(Status.FAILED, detail, found.corrected.state)
+                raise SolveError(Status.FAILED, detail, found.state)
 
-    def _difference(self, coarse: EquilibriumResult, fine: EquilibriumResult, factor: float) -> tuple[float, float]:
+    def _difference(self, coarse: EquilibriumResult, fine: EquilibriumResult) -> tuple[float, float]:
         """How far two answers are apart in what the accuracy is of, and the estimated error of the finer one."""
-        one, other = (
-            unjudged(found.prepared, found.corrected, found.prepared.model.loading(factor), factor)
-            for found in (coarse, fine)
-        )
-        return self.meshes.judged(one, other)
+        return self.meshes.judged(unjudged(coarse.solved), unjudged(fine.solved))
 
-    def _marked(self, found: EquilibriumResult, loading: Loading, smooth: float) -> dict[str, Array]:
+    def _marked(self, found: EquilibriumResult, smooth: float) -> dict[str, Array]:
         """Elements to halve: those that are not smooth, of members whose mesh is not prescribed."""
-        rough = roughness(Fields(found.prepared.equations, found.corrected.state, loading)) > smooth
-        model = found.prepared.model
+        rough, model = roughness(found.solved.fields) > smooth, found.solved.model
         return {n: rough[model.elements_of(n)] & (n not in self.meshes.fixed) for n in model.members}
 
 
 def more_than(mesh: Mesh, source: EquilibriumResult) -> str:
     """The advice to take more elements, where fewer were asked for than an equilibrium was found on."""
-    return ": take more" if mesh.elements < source.prepared.model.mesh.elements else ""
+    return ": take more" if mesh.elements < source.solved.model.mesh.elements else ""
 
 
-def _with_coarse_moments(now: EquilibriumResult, finer: EquilibriumResult, factor: float) -> EquilibriumResult:
+def _with_coarse_moments(now: EquilibriumResult, finer: EquilibriumResult) -> EquilibriumResult:
     """The same, with a note where section moments are far from those on half the elements, wherever positions are."""
-    sides = [Fields(f.prepared.equations, f.corrected.state, f.prepared.model.loading(factor)) for f in (now, finer)]
     most = apart = 0.0
-    for name, cuts in now.prepared.model.mesh.cuts.items():
+    for name, cuts in now.solved.model.mesh.cuts.items():
         middles = 0.5 * (cuts[1:] + cuts[:-1])
-        coarse, fine = (side.along(name, middles)["moment"] for side in sides)
+        coarse, fine = (side.solved.fields.along(name, middles)["moment"] for side in (now, finer))
         most = max(most, float(np.linalg.norm(fine, axis=1).max(initial=0.0)))
         apart = max(apart, float(np.linalg.norm(fine - coarse, axis=1).max(initial=0.0)))
     if apart <= COARSE * most:
@@ -340,7 +322,7 @@ def _with_coarse_moments(now: EquilibriumResult, finer: EquilibriumResult, facto
     return replace(now, notes=(*now.notes, f"section moments differ {share} from those on half the elements asked for"))
 
 
-def _refuse_many_turns(prepared: Prepared, found: Corrected) -> None:
+def _refuse_many_turns(found: Solved) -> None:
     """Refuse angles that count so many turns that rounding leaves little of where they point.
 
     Raises
@@ -348,14 +330,14 @@ def _refuse_many_turns(prepared: Prepared, found: Corrected) -> None:
     SolveError
         Says how far.
     """
-    state, model = found.state, prepared.model
-    turned = np.abs(np.append(state.unwrapped, 0.0) if model.space else state.q).max(initial=0.0)
+    state = found.state
+    turned = np.abs(np.append(state.unwrapped, 0.0) if found.model.space else state.q).max(initial=0.0)
     if turned > MOST_TURNED:
         detail = f"something turns by {turned:.1e} rad, of which rounding leaves no angle: next to nothing resists it"
         raise SolveError(Status.FAILED, detail, state)
 
 
-def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> None:
+def _refuse_free(found: Solved) -> None:
     """Refuse a mechanism of which neither stiffness nor loads hold some motion.
 
     Raises
@@ -363,23 +345,24 @@ def _refuse_free(prepared: Prepared, found: Corrected, stability: Stability) -> 
     SceneError
         Names the motion.
     """
+    stability = found.stability
     # What rounding hides may be held or free: a note says so.
-    if stability.stable != "neutral" or stability.hidden or not prepared.diagnosis.mobility:
+    if stability.stable != "neutral" or stability.hidden or not found.prepared.diagnosis.mobility:
         return
-    equations, shape = prepared.equations, np.concatenate([stability.shape, stability.travel])
+    equations, shape = found.equations, np.concatenate([stability.shape, stability.travel])
     inside = (equations.row < equations.unknowns) & (equations.column < equations.unknowns)
     row, column, entries = equations.row[inside], equations.column[inside], found.point.entries[inside]
     size = float(np.append(equations.mass, np.full(len(stability.travel), LIGHT)) @ shape**2)
     if (
         stability.smallest
-        > RESISTED * prepared.softest + float(blurred(row, column, entries, shape[:, None])[0]) / size
+        > RESISTED * found.prepared.softest + float(blurred(row, column, entries, shape[:, None])[0]) / size
     ):
         return
     if moves_nodes(equations, shape, found.state):
         raise SceneError(free_to_move(in_words(equations, shape)))
 
 
-def _with_unique_reactions(found: EquilibriumResult, loading: Loading) -> EquilibriumResult:
+def _with_unique_reactions(found: EquilibriumResult) -> EquilibriumResult:
     """The same, with the smallest reactions and a note where closings are redundant.
 
     Raises
@@ -387,28 +370,27 @@ def _with_unique_reactions(found: EquilibriumResult, loading: Loading) -> Equili
     SolveError
         Members stretched between held points: no finite reaction holds an inextensible member straight.
     """
-    equations, corrected = found.prepared.equations, found.corrected
-    loose = loose_rows(equations, corrected.point)
-    largest = found.prepared.multipliers(found.corrected)
+    solved, equations, loading = found.solved, found.solved.equations, found.solved.loading
+    loose = loose_rows(equations, solved.point)
     if not loose.size:
-        told = stretched(equations, corrected.point) if largest > LARGE else ""
+        told = stretched(equations, solved.point) if solved.multipliers > LARGE else ""
         if told:
-            raise SolveError(Status.STRETCHED, told, corrected.state)
+            raise SolveError(Status.STRETCHED, told, solved.state)
         return found
-    state = shared(equations, corrected.state, loading, loose, reactions=True)
+    state = shared(equations, solved.state, loading, loose, reactions=True)
     point = equations.at(state, loading)
     residual = relative_residual(equations, point)
     note = SHARED if stretches(equations, state, loading, loose) else SMALLEST
     # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
-    acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, corrected.point.residual))
+    acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, solved.point.residual))
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
     needed = carried > CARRIED * acting.max(initial=LEAST_SCALE) and carried > np.abs(left).max(initial=0.0)
     if residual <= tolerances.BALANCED and not needed:
-        corrected = replace(corrected, state=state, point=point, residual=residual)
-    elif largest > BEYOND or needed:
-        raise SolveError(Status.STRETCHED, stretched(equations, corrected.point, loose), corrected.state)
+        solved = replace(solved, state=state, point=point, residual=residual)
+    elif solved.multipliers > BEYOND or needed:
+        raise SolveError(Status.STRETCHED, stretched(equations, solved.point, loose), solved.state)
     else:
         # Where straight bars are all that acts, rounding of large multipliers is much beside what is in balance.
         note = "reactions are not unique, one set of many is given"
     note += f"; redundant: {named_in(equations, loose)}"
-    return replace(found, corrected=corrected, notes=(*found.notes, note))
+    return replace(found, solved=solved, notes=(*found.notes, note))

@@ -19,11 +19,9 @@ from .. import tolerances
 from ..description.records import counted
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
-from ..mechanics.fields import Fields
-from ..mechanics.loading import Loading
+from ..mechanics.model import Model
 from ..solvers.deflation import deflated
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Solved
 from .solution import Equilibrium
 
 __all__ = ["Scan", "scan"]
@@ -74,8 +72,7 @@ class Scan:
 
     Attributes
     ----------
-    prepared : Prepared
-    found : list of Corrected
+    found : list of Solved
         Distinct equilibria; the first is the one that the scan was given.
     roots : int
         Number of equilibria that the scan counts.
@@ -83,8 +80,7 @@ class Scan:
         Extrema of the shooting function that are zero, or nearly.
     """
 
-    prepared: Prepared
-    found: list[Corrected]
+    found: list[Solved]
     roots: int
     grazing: int
 
@@ -110,15 +106,16 @@ class Scan:
         return f"; {counted(lost, 'equilibrium', 'equilibria')} of the scan could not be refined" if lost > 0 else ""
 
 
-def scan(prepared: Prepared, loading: Loading, first: Corrected) -> Scan | None:
+def scan(first: Solved) -> Scan | None:
     """All equilibria under the loads of a known one, by shooting over the angle at the free end.
 
     None where the problem does not have a single unknown, or rounding errors spoil the scan.
     """
-    member = _member(prepared)
+    prepared, loading = first.prepared, first.loading
+    member = _member(prepared.model)
     if member is None:
         return None
-    shooting = _Shooting(prepared, loading, first, member)
+    shooting = _Shooting(first, member)
     brackets = shooting.brackets()
     if brackets is None:
         return None
@@ -131,12 +128,12 @@ def scan(prepared: Prepared, loading: Loading, first: Corrected) -> Scan | None:
         new = all(prepared.distance(there.state, other.state) > tolerances.SAME_STATE for other in found)
         if new and there.converged and prepared.distance(there.state, state) < FROM_THE_ROOT:
             found.append(there)
-    return Scan(prepared, found, len(roots), shooting.grazing)
+    return Scan(found, len(roots), shooting.grazing)
 
 
-def _member(prepared: Prepared) -> str | None:
+def _member(model: Model) -> str | None:
     """The member of a scene that has one, flexible, with a free end and the other one clamped or hinged."""
-    model, scene = prepared.model, prepared.model.scene
+    scene = model.scene
     others = scene.contacts or scene.springs or scene.rotating is not None
     joined = any(not group.kind.is_load for group in model.connections)
     if model.space or others or len(scene.members) != 1 or not model.has_potential or joined:
@@ -152,8 +149,8 @@ def _member(prepared: Prepared) -> str | None:
 class _Shooting:
     """The shape from the free end on, for any number of angles there at once; SI units."""
 
-    def __init__(self, prepared: Prepared, loading: Loading, first: Corrected, name: str) -> None:
-        model = prepared.model
+    def __init__(self, first: Solved, name: str) -> None:
+        model, fields = first.model, first.fields
         scene, self.model, self.name = model.scene, model, name
         member, line = scene.members[name], scene.center_lines[name]
         supports = [scene.nodes[node].support for node in member.nodes]
@@ -164,8 +161,7 @@ class _Shooting:
         self.grazing = 0
         section = scene.sections[str(member.section)]
         axis = 1 if line.bending_axis == 2 else 2
-        fields = Fields(prepared.equations, first.state, loading)
-        moments = loading.moment[model.chain(name)][:, 2] * model.scales.moment
+        moments = first.loading.moment[model.chain(name)][:, 2] * model.scales.moment
         knots = np.unique(np.concatenate([model.mesh.cuts[name], self.places[moments != 0.0], [0.0, 1.0]]))
         middles = 0.5 * (knots[1:] + knots[:-1])
         forces = np.linalg.norm(fields.along(name, np.concatenate([knots, middles]))["force"], axis=1).max(initial=0.0)

@@ -27,8 +27,8 @@ from ..solvers.between_states import free_parts, turned_between
 from ..solvers.continuation import follow
 from ..solvers.deflation import deflated
 from ..solvers.guess import restore
-from ..solvers.newton import Corrected, descend
-from ..solvers.prepared import Prepared
+from ..solvers.newton import descend
+from ..solvers.prepared import Prepared, Solved
 from .mirrors import Mirror, mirrored, mirrors
 from .solution import Equilibrium
 
@@ -82,7 +82,7 @@ class Search:
 
     Attributes
     ----------
-    found : list of Corrected
+    found : list of Solved
         Distinct equilibria; the first is the one that the search was given.
     counts : dict
         Number of Newton runs for each kind of start.
@@ -102,7 +102,7 @@ class Search:
     loading: Loading
     runs: int
     images: tuple[Mirror, ...]
-    found: list[Corrected] = field(default_factory=list)
+    found: list[Solved] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     deflated: int = 0
     arrived: int = 0
@@ -147,7 +147,7 @@ class Search:
         self.found.append(there)
         return True
 
-    def _unwrapped_back(self, there: Corrected) -> Corrected:
+    def _unwrapped_back(self, there: Solved) -> Solved:
         """The same without whole turns of parts that nothing holds."""
         turns = there.state.q.copy()
         parts = () if self.prepared.model.space else free_parts(self.prepared.model)
@@ -171,7 +171,7 @@ class Search:
             return bool((cosine < np.cos(0.5 * KINK)).any())
         return bool((np.abs(np.diff(q[..., 0], axis=1)) > KINK).any())
 
-    def _in_family(self, there: Corrected) -> bool:
+    def _in_family(self, there: Solved) -> bool:
         """Whether an equilibrium is a neighbour of a known one in all but a neutral direction."""
         if not self._neutral(there):
             return False
@@ -187,10 +187,10 @@ class Search:
                 return True
         return False
 
-    def _neutral(self, there: Corrected) -> bool:
+    def _neutral(self, there: Solved) -> bool:
         if self.prepared.equations.rotation_unknowns > LARGE:
-            return self.prepared.stability(there).stable == "neutral"
-        return bool((self.prepared.spectrum(there, 0)[0] == 0.0).any())
+            return there.stability.stable == "neutral"
+        return bool((there.spectrum(0)[0] == 0.0).any())
 
     # -- starts ---------------------------------------------------------------------------------
 
@@ -222,10 +222,10 @@ class Search:
         prepared = self.prepared
         return descend(prepared.equations, self.moved(state, shape), self.loading, prepared.weight, iterations=DESCENT)
 
-    def _shapes(self, found: Corrected, count: int) -> Array:
+    def _shapes(self, found: Solved, count: int) -> Array:
         if self.prepared.equations.rotation_unknowns > LARGE:
-            return self.prepared.stability(found).shape[None, :]
-        return self.prepared.spectrum(found, count)[1]
+            return found.stability.shape[None, :]
+        return found.spectrum(count)[1]
 
     def offer(self, kind: str, *starts: Callable[[], State], deflate: bool) -> None:
         """Add starts of a kind to the queue; each is a function that makes the state when its turn comes."""
@@ -239,13 +239,13 @@ class Search:
         starts = [partial(self.moved, self.begin, size * shape) for size in BENT for shape in shapes]
         self.offer("bent", *starts, deflate=False)
 
-    def offer_around(self, found: Corrected) -> None:
+    def offer_around(self, found: Solved) -> None:
         """Add starts from a new equilibrium: mirror images, steps along its softest modes, midpoints to known ones."""
         equations, state = self.prepared.equations, found.state
         for image in self.images:
             self.offer("mirrored", partial(self._mirrored, state, image), deflate=False)
         shapes = self._shapes(found, SHAPES)
-        if self.prepared.negative(found):
+        if found.negative:
             sides = (partial(self._downhill, state, size * shapes[0]) for size in (DOWN, -DOWN))
             self.offer("downhill", *sides, deflate=False)
         for kind, size in (("nudged", NUDGE), ("farther", FARTHER_NUDGE)):
@@ -286,20 +286,19 @@ class Search:
         return True
 
 
-def search(
-    prepared: Prepared, loading: Loading, first: Corrected, starts: Sequence[State] = (), runs: int | None = None
-) -> Search:
+def search(first: Solved, starts: Sequence[State] = (), runs: int | None = None) -> Search:
     """Look for further equilibria under the loads of a known one.
 
     Parameters
     ----------
-    first : Corrected
-        Equilibrium under ``loading``.
+    first : Solved
+        The known one.
     starts : sequence of State
         Further states to begin with, such as equilibria under other loads.
     runs : int, optional
         Newton runs at most; the default falls with the number of unknowns.
     """
+    prepared, loading = first.prepared, first.loading
     if runs is None:
         effort = max(1, prepared.equations.unknowns * (2 if prepared.model.space else 1))
         runs = max(FEWEST_RUNS, min(RUNS, EFFORT // effort))
@@ -316,7 +315,7 @@ def search(
         carried = _carried(part, loading.scaled(share * FARTHER))
     result = Search(prepared, loading, left, images, [first])
     result.offer_around(first)
-    returned = _returned(prepared, loading, first) if left else []
+    returned = _returned(first) if left else []
     for kind, states in (("carried", carried), ("returned", returned), ("given", starts)):
         result.offer(kind, *(partial(result.closed, state) for state in states), deflate=False)
     result.smaller = runs - left
@@ -337,29 +336,29 @@ def _carried(smaller: Search, loading: Loading) -> list[State]:
     return states
 
 
-def _returned(prepared: Prepared, loading: Loading, first: Corrected) -> list[State]:
+def _returned(first: Solved) -> list[State]:
     """What larger and reversed loads lead to by a jump, as far as it stays when they come back; motions keep."""
-    alone = loading.plus(loading.unloaded().scaled(-1.0))
-    found = (_there_and_back(prepared, loading, alone.scaled(share - 1.0), first.state) for share in BEYOND)
+    alone = first.loading.plus(first.loading.unloaded().scaled(-1.0))
+    found = (_there_and_back(first, alone.scaled(share - 1.0)) for share in BEYOND)
     return [state for state in found if state is not None]
 
 
-def _there_and_back(prepared: Prepared, loading: Loading, more: Loading, state: State) -> State | None:
-    out = follow(prepared, lambda t: loading.plus(more.scaled(t)), state)
+def _there_and_back(first: Solved, more: Loading) -> State | None:
+    out = follow(first.prepared, lambda t: first.loading.plus(more.scaled(t)), first.state)
     if not (out.reached and out.left):
         return None
-    back = follow(prepared, lambda t: loading.plus(more.scaled(1.0 - t)), out.state, switch_branch=False)
+    back = follow(first.prepared, lambda t: first.loading.plus(more.scaled(1.0 - t)), out.state, switch_branch=False)
     return back.state if back.reached else None
 
 
-def long_elements(prepared: Prepared, loading: Loading, found: Corrected) -> dict[str, Array]:
+def long_elements(found: Solved) -> dict[str, Array]:
     """For each member a boolean array (elements,): elements so long that a beam under these loads may fold within one.
 
     These are halved for the search: an unstable straight member has equilibria that are curled anywhere, not just at
     its ends.
     """
-    model, equations = prepared.model, prepared.equations
-    pulls = np.abs(equations.segment_pulls(found.state.lam, loading)).max(initial=0.0)
+    model, loading = found.model, found.loading
+    pulls = np.abs(found.equations.segment_pulls(found.state.lam, loading)).max(initial=0.0)
     force = (pulls + np.abs(loading.pull).max(initial=0.0)) * model.scales.force
     marks = {}
     for name in model.members:

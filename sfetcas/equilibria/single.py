@@ -11,8 +11,7 @@ from ..mathematics.threads import single_threaded
 from ..mechanics.loading import Loading
 from ..solvers.constraints import contradiction
 from ..solvers.continuation import follow
-from ..solvers.newton import Corrected
-from ..solvers.prepared import Prepared
+from ..solvers.prepared import Prepared, Solved
 from ..solvers.stability import Stability
 from .solution import Equilibrium, equilibrium
 
@@ -52,15 +51,15 @@ def solve_model(
     found, iterations = _warm(prepared, start, loading) if start is not None else None, 0
     if found is None:
         found, iterations, _ = cold(prepared, loading, solver)
-    return finished(prepared, found, loading, factor, prepared.stability(found), iterations=iterations)
+    return finished(found, iterations=iterations)
 
 
-def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Corrected | None:
+def _warm(prepared: Prepared, start: Equilibrium, loading: Loading) -> Solved | None:
     found = prepared.correct(start.state, loading, iterations=20, most=2.0)
     return found if found.converged else None
 
 
-def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> tuple[Corrected, int, str]:
+def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> tuple[Solved, int, str]:
     """The equilibrium from the start guess, with the number of iterations and the name of the strategy.
 
     Models whose loads have no potential cannot be minimised: their loads are followed from zero instead.
@@ -96,9 +95,9 @@ UNJUDGED = Stability("not defined", 0, np.nan, np.zeros(0), np.zeros(0))
 """Of a state on the way, whose stability nobody asks for."""
 
 
-def unjudged(prepared: Prepared, found: Corrected, loading: Loading, factor: float) -> Equilibrium:
-    """A state as an :class:`Equilibrium` without a stability test."""
-    return finished(prepared, found, loading, factor, UNJUDGED)
+def unjudged(found: Solved) -> Equilibrium:
+    """What was solved as an :class:`Equilibrium` without a stability test."""
+    return finished(found, UNJUDGED)
 
 
 HIDDEN = (
@@ -109,33 +108,12 @@ HIDDEN = (
 
 
 def finished(
-    prepared: Prepared,
-    found: Corrected,
-    loading: Loading,
-    factor: float,
-    stability: Stability,
-    *,
-    estimate: float | None = None,
-    halved: float | None = None,
-    error_of: str = "",
-    notes: tuple[str, ...] = (),
-    iterations: int = 0,
-    way: tuple[str, ...] = (),
+    found: Solved, stability: Stability | None = None, *, notes: tuple[str, ...] = (), **more: Any
 ) -> Equilibrium:
-    """A corrected state as an :class:`Equilibrium` with its certificate and notes."""
-    notes = (*notes, HIDDEN) if stability.hidden else notes
-    return equilibrium(
-        prepared.equations,
-        found.state,
-        loading,
-        factor,
-        found.point,
-        found.residual,
-        stability,
-        error_estimate=estimate,
-        halved=halved,
-        error_of=error_of,
-        notes=notes,
-        iterations=iterations,
-        way=way,
-    )
+    """What was solved as an :class:`Equilibrium`, with a note where its stability is hidden.
+
+    ``stability`` is the result of another test than its own; ``more`` are as of
+    :func:`~sfetcas.equilibria.solution.equilibrium`.
+    """
+    stability = found.stability if stability is None else stability
+    return equilibrium(found, stability, notes=(*notes, HIDDEN) if stability.hidden else notes, **more)

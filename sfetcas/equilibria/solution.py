@@ -16,10 +16,11 @@ from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
 from ..mechanics.balance import SpringState
-from ..mechanics.equations import Equations, Point, State
+from ..mechanics.equations import State
 from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
+from ..solvers.prepared import Solved
 from ..solvers.stability import Stability
 
 __all__ = [
@@ -385,12 +386,7 @@ def at_factor(
 
 
 def equilibrium(
-    equations: Equations,
-    state: State,
-    loading: Loading,
-    factor: float,
-    point: Point,
-    residual: float,
+    found: Solved,
     stability: Stability,
     *,
     error_estimate: float | None = None,
@@ -400,30 +396,32 @@ def equilibrium(
     iterations: int = 0,
     way: tuple[str, ...] = (),
 ) -> Equilibrium:
-    """The :class:`Equilibrium` of a dimensionless state, with its certificate in SI units.
+    """What was solved as an :class:`Equilibrium`, with its certificate in SI units.
 
     Parameters
     ----------
-    residual, error_estimate, halved : float
-        As in :class:`Certificate`.
-    point : Point
-        The energies, evaluated at the state.
+    found : Solved
     stability : Stability
         Result of the stability test, dimensionless.
+    error_estimate, halved, error_of
+        As in :class:`Certificate`.
+    notes, iterations, way
+        As in :class:`Equilibrium`.
 
     Raises
     ------
     SolveError
         The number of turns in the angle of a spring or a driven joint is not determined by the state.
     """
-    model, notes = equations.model, tuple(dict.fromkeys(notes))
-    doubt = model.unwrapping.doubt(state.q, state.unwrapped, loading)
+    model, state, notes = found.model, found.state, tuple(dict.fromkeys(notes))
+    doubt = model.unwrapping.doubt(state.q, state.unwrapped, found.loading)
     if doubt is not None:
         raise SolveError(Status.FAILED, doubt, state)
-    turn = np.where(equations.number >= 0, stability.shape[equations.number], 0.0) if len(stability.shape) else None
+    number = found.equations.number
+    turn = np.where(number >= 0, stability.shape[number], 0.0) if len(stability.shape) else None
     escape = {} if turn is None else {name: turn[model.chain(name)] for name in model.members}
     certificate = Certificate(
-        residual=residual,
+        residual=found.residual,
         stable=stability.stable,
         negative=stability.negative,
         smallest=stability.smallest * model.scales.force,
@@ -432,19 +430,18 @@ def equilibrium(
         error_of=error_of,
         escape=escape,
     )
-    fields = Fields(equations, state, loading)
     return Equilibrium(
-        factor=factor,
+        factor=float(found.factor),
         model=model,
         state=state,
-        loading=loading,
+        loading=found.loading,
         certificate=certificate,
-        notes=(*notes, *superelement_notes(fields)),
+        notes=(*notes, *superelement_notes(found.fields)),
         iterations=iterations,
-        strain=point.strain,
-        potential=point.potential,
+        strain=found.point.strain,
+        potential=found.point.potential,
         way=way,
-        fields=fields,
+        fields=found.fields,
     )
 
 

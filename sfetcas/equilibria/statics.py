@@ -104,10 +104,10 @@ class LoadSteps:
                     steps.append(contact.answer(pilot, factor))
                     continue
                 found = self.ways.result(pilot, factor, last)
-                last = (factor, found) if found.prepared is pilot else None
-                steps.append(self.refinement.refined(found, factor))
+                last = (factor, found) if found.solved.prepared is pilot else None
+                steps.append(self.refinement.refined(found))
                 if further is not None:
-                    steps[-1:] = further.answers(found, steps[-1], factor)
+                    steps[-1:] = further.answers(found, steps[-1])
             except SolveError as error:
                 self.meshes.seconds["solve"] = time.perf_counter() - begin - self.meshes.seconds["model"]
                 raise at_factor(self.ways.named(pilot, error), self.scene, factor, steps, self.meshes.seconds) from None

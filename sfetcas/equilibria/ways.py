@@ -11,11 +11,10 @@ import numpy as np
 from ..description.records import counted
 from ..errors import SolveError, Status
 from ..mechanics.equations import State
-from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..solvers.continuation import JUMPED, between, follow, near_factor
 from ..solvers.deflation import nearest
-from ..solvers.prepared import BEYOND, Prepared
+from ..solvers.prepared import BEYOND, Prepared, Solved
 from ..solvers.redundancy import loose_rows
 from ..solvers.sharing import SHARED
 from .meshing import PILOT_ELEMENTS, EquilibriumResult, Meshing
@@ -99,8 +98,8 @@ are tried say :meth:`Ways.result`, :meth:`Ways.on_pilot` and, in contact,
 :meth:`~sfetcas.contact.contact_statics.ContactRun.reached`."""
 
 
-Allowed = Callable[[State, Loading, State, Loading], bool]
-"""Whether a step may be taken: from one state and loading to the next."""
+Allowed = Callable[[Solved, Solved], bool]
+"""Whether a step may be taken: from one equilibrium to the next."""
 
 
 class Ways:
@@ -160,16 +159,16 @@ class Ways:
         grown = self._grown(pilot, factor, last) if grows and self.meshes.has_superelements else None
         alone, failure = self._direct(pilot, loading)
         if not grows:
-            return self._accepted(pilot, alone, failure, loading)
+            return self._accepted(alone, failure)
         if not self.meshes.has_superelements:
             grown = self._grown(pilot, factor, last)
         if grown is not None:
             return self._beside(grown, alone)
         zero = self._unloaded(pilot)
-        straight = alone is None or pilot.distance(alone.corrected.state, zero) < STRAIGHT
+        straight = alone is None or pilot.distance(alone.solved.state, zero) < STRAIGHT
         if straight and pilot.lacks_slack and self._stays(pilot, zero, factor):
             raise SolveError(Status.FAILED, CRITICAL, zero)
-        found = self._accepted(pilot, alone, failure, loading)
+        found = self._accepted(alone, failure)
         return replace(found, notes=(NEAREST, *found.notes))
 
     def _without_minimum(
@@ -185,7 +184,7 @@ class Ways:
             detail = "the loads could not be followed from zero, and without a potential there is no other way"
             raise SolveError(Status.FAILED, detail)
         if not pilot.model.conservative:
-            diverged = pilot.diverged(found.corrected)
+            diverged = found.solved.diverged
             regular = diverged == 0 and CARRIED not in found.notes
             found.notes += (NO_POTENTIAL if regular else DIVERGED if diverged else NO_ENERGY,)
         return found
@@ -205,12 +204,12 @@ class Ways:
         """What the loads lead to, with a note where another minimum is nearer to the start guess."""
         if alone is None:
             return grown
-        pilot = grown.prepared
+        pilot = grown.solved.prepared
         grown.iterations = alone.iterations
-        apart = pilot.distance(alone.corrected.state, grown.corrected.state) > 1e-3
+        apart = pilot.distance(alone.solved.state, grown.solved.state) > 1e-3
         # What falls from its start guess is nearest to no minimum.
         held = pilot.diagnosis.mobility == 0
-        told = held and pilot.multipliers(alone.corrected) <= BEYOND and not grown.notes
+        told = held and alone.solved.multipliers <= BEYOND and not grown.notes
         if told and apart and alone.stability.negative == 0:
             grown.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
         return grown
@@ -234,12 +233,12 @@ class Ways:
         """From the start guess at the full load."""
         near = nearest(pilot, loading) if self.started and not self.meshes.switch_branch else None
         if near is not None:
-            return EquilibriumResult(pilot, near, pilot.stability(near), way=("beside",)), None
+            return EquilibriumResult(near, near.stability, way=("beside",)), None
         try:
-            corrected, iterations, way = cold(pilot, loading, self.meshes.settings.solver)
+            solved, iterations, way = cold(pilot, loading, self.meshes.settings.solver)
         except SolveError as error:
             return None, error
-        return EquilibriumResult(pilot, corrected, pilot.stability(corrected), iterations=iterations, way=(way,)), None
+        return EquilibriumResult(solved, solved.stability, iterations=iterations, way=(way,)), None
 
     def _carried(self, pilot: Prepared, factor: float) -> EquilibriumResult | None:
         """Where the loads carry the undeformed state: slack has no place of its own from which to follow them.
@@ -261,19 +260,17 @@ class Ways:
                 return replace(found, notes=(*notes, *found.notes), way=(way, *found.way[1:]))
         return None
 
-    def _accepted(
-        self, pilot: Prepared, alone: EquilibriumResult | None, failure: SolveError | None, loading: Loading
-    ) -> EquilibriumResult:
+    def _accepted(self, alone: EquilibriumResult | None, failure: SolveError | None) -> EquilibriumResult:
         """What IPOPT found, an unstable state left if that is wanted."""
         if alone is None:
             assert failure is not None
             raise failure
         if alone.stability.negative == 0 or not self.meshes.switch_branch:
             return alone
-        corrected, stability = pilot.switch_branch(alone.corrected.state, alone.stability, loading)
+        solved = alone.solved.prepared.switch_branch(alone.solved, alone.solved.loading)
         ways = counted(alone.stability.negative, "way out", "ways out")
         note = f"left an unstable equilibrium with {ways} along its unstable mode"
-        return _by("left", EquilibriumResult(pilot, corrected, stability, (note,), alone.iterations, way=alone.way))
+        return _by("left", EquilibriumResult(solved, solved.stability, (note,), alone.iterations, way=alone.way))
 
     def _grown(
         self, pilot: Prepared, factor: float, last: tuple[float, EquilibriumResult] | None
@@ -287,7 +284,7 @@ class Ways:
         """The state that the loads lead to from the last factor, where that lies on the way from zero."""
         if last is None or last[0] * (factor - last[0]) < 0.0:
             return None
-        return self._through(pilot, last[0], factor, last[1].corrected.state)
+        return self._through(pilot, last[0], factor, last[1].solved.state)
 
     def grown_from_zero(
         self, pilot: Prepared, factor: float, allowed: Allowed | None = None
@@ -300,7 +297,7 @@ class Ways:
             if self._stays(pilot, zero, factor):
                 found = self._through(pilot, 0.0, factor, zero, allowed)
                 # What cannot bend leaves for a whole turn within one element, which only its mesh lets pass.
-                return None if found is None or pilot.multipliers(found.corrected) > BEYOND else found
+                return None if found is None or found.solved.multipliers > BEYOND else found
             return None if self.scene.histories else self._grown_from_bent(pilot, factor, allowed)
         if pilot.model.minimisable and pilot.diagnosis.mobility and not self.scene.histories:
             # A mechanism has no place of its own without loads: the way begins where a small share of them puts it.
@@ -310,7 +307,7 @@ class Ways:
             first = self._followed(pilot, lambda t: model.loading(0.0, t), zero, None, allowed)
             if first is None:
                 return None
-            zero = first.corrected.state
+            zero = first.solved.state
         return self._through(pilot, 0.0, factor, zero, allowed)
 
     @staticmethod
@@ -337,7 +334,7 @@ class Ways:
             part = self._followed(pilot, between(pilot.model, a, b), state, (a, b), allowed)
             if part is None:
                 return None
-            found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.corrected.state
+            found, state = replace(part, notes=(*(found.notes if found else ()), *part.notes)), part.solved.state
         return found
 
     def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> EquilibriumResult | None:
@@ -350,10 +347,10 @@ class Ways:
                 break
         if bent is None:
             return None
-        state = bent.corrected.state
+        state = bent.solved.state
         if bent.stability.negative and self.meshes.switch_branch:
             try:
-                state = pilot.switch_branch(state, bent.stability, pilot.model.loading(begin))[0].state
+                state = pilot.switch_branch(bent.solved, bent.solved.loading).state
             except SolveError:
                 return None
         found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
@@ -370,8 +367,8 @@ class Ways:
         """Where a way leads, from one factor to another or, with None, through the loads of factor 0."""
         switch_branch, energy_known = self.meshes.switch_branch and pilot.switches_branch, pilot.model.minimisable
 
-        def refuse(there: State, loading: Loading) -> None:
-            refuse_large(Fields(pilot.equations, there, loading))
+        def refuse(there: Solved) -> None:
+            refuse_large(there.fields)
 
         result = follow(
             pilot,
@@ -387,16 +384,13 @@ class Ways:
             result = follow(pilot, way, state, switch_branch=False, allowed=allowed)
         if not result.reached:
             return None
-        corrected = pilot.correct(result.state, way(1.0))
-        stability = pilot.stability(corrected)
+        solved = pilot.correct(result.state, way(1.0))
         notes = tuple(f"jumped {_at(part, factors)}: {JUMPED}" for part in result.left)
-        if stability.negative and self.meshes.switch_branch and not energy_known:
+        if solved.stability.negative and self.meshes.switch_branch and not energy_known:
             notes += (KEPT,)
         elif passed:
             notes += (PASSED,)
-        return EquilibriumResult(
-            pilot, corrected, stability, notes, left=result.left, way=("growing", *("left",) * bool(result.left))
-        )
+        return EquilibriumResult(solved, solved.stability, notes, way=("growing", *("left",) * bool(result.left)))
 
 
 def _by(way: str, found: EquilibriumResult) -> EquilibriumResult:
@@ -406,11 +400,11 @@ def _by(way: str, found: EquilibriumResult) -> EquilibriumResult:
 
 def _with_change_point(found: EquilibriumResult) -> EquilibriumResult:
     """The same, with a note where driven links begin in one line, or as good as that."""
-    if not any(motion.rotation is not None for motion in found.prepared.model.scene.motions.values()):
+    if not any(motion.rotation is not None for motion in found.solved.model.scene.motions.values()):
         return found
-    equations, nothing = found.prepared.equations, found.prepared.model.loading(0.0, 0.0)
+    equations, nothing = found.solved.equations, found.solved.model.loading(0.0, 0.0)
     begin = loose_rows(equations, equations.at(equations.start(nothing), nothing), IN_LINE)
-    if begin.shape[-1] <= loose_rows(equations, found.corrected.point, IN_LINE).shape[-1]:
+    if begin.shape[-1] <= loose_rows(equations, found.solved.point, IN_LINE).shape[-1]:
         return found
     return replace(found, notes=(*found.notes, CHANGE_POINT))
 

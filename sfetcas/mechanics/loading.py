@@ -61,6 +61,8 @@ class Loading:
         For each group of connections the data that grow with the load factor, as moments and followers.
     kinds : tuple of Term
         The kinds of these groups.
+    factor : float
+        The load factor at which they are; of sums and multiples the sum and the multiple.
     """
 
     force: Array
@@ -75,10 +77,11 @@ class Loading:
     turn: Array
     loads: tuple[Array, ...]
     kinds: tuple[Term, ...]
+    factor: float
 
     def scaled(self, factor: float) -> Loading:
         """All loads and prescribed motions times a factor."""
-        parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS)}
+        parts = {name: factor * getattr(self, name) for name in (*LOADS, *MOTIONS, "factor")}
         return replace(self, **parts, loads=tuple(factor * load for load in self.loads))
 
     def unloaded(self) -> Loading:
@@ -91,7 +94,7 @@ class Loading:
 
     def plus(self, other: Loading) -> Loading:
         """The sum of two loadings."""
-        parts = {name: getattr(self, name) + getattr(other, name) for name in (*LOADS, *MOTIONS)}
+        parts = {name: getattr(self, name) + getattr(other, name) for name in (*LOADS, *MOTIONS, "factor")}
         return replace(self, **parts, loads=tuple(a + b for a, b in zip(self.loads, other.loads, strict=True)))
 
     def of(self, chosen: Callable[[Term], bool]) -> float:
@@ -143,9 +146,10 @@ class _Sums:
         """A share of what grows in a group of connections."""
         self.loads[group] = plus(self.loads[group], key, value)
 
-    def loading(self, connections: tuple[Group, ...]) -> Loading:
+    def loading(self, connections: tuple[Group, ...], factor: float) -> Loading:
         """The sum of all shares."""
-        return Loading(**self.parts, loads=tuple(self.loads), kinds=tuple(group.kind for group in connections))
+        kinds = tuple(group.kind for group in connections)
+        return Loading(**self.parts, loads=tuple(self.loads), kinds=kinds, factor=factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -388,4 +392,4 @@ def unit_loadings(parts: Parts, connections: tuple[Group, ...]) -> dict[str | No
     for i, terms in enumerate(connections):
         for history, more in terms.loads.items():
             groups.setdefault(history, writer.empty()).load(i, slice(None), more)
-    return {history: sums.loading(connections) for history, sums in groups.items()}
+    return {history: sums.loading(connections, float(history is None)) for history, sums in groups.items()}

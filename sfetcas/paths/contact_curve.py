@@ -23,9 +23,7 @@ from ..mechanics.mesh import Mesh, Touch
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.between_states import turned_between
 from ..solvers.critical import root
-from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
-from ..solvers.residuals import relative_residual
 
 __all__ = ["ContactCurve", "Stood"]
 
@@ -230,11 +228,7 @@ class ContactCurve:
 
 
 def _as_held(standing: Standing) -> Held:
-    prepared = standing.prepared
-    residual = relative_residual(prepared.equations, standing.point)
-    corrected = Corrected(standing.state, standing.point, True, standing.iterations, 0.0, 0.0, residual)
-    touched = Touched(prepared.equations, standing.state, standing.loading)
-    return Held(prepared, corrected, standing.loading, touched)
+    return Held(standing, Touched.of(standing.fields))
 
 
 def _difference(equations: Equations, here: State, there: State) -> Array:

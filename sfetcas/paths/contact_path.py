@@ -208,9 +208,7 @@ class ContactPath:
         refuse_unbalanced(held.touched.fields)
         stability, notes = run.certified(held, point.factor)
         estimate = error if error is not None and np.isfinite(error) else None
-        answer = finished(
-            held.prepared, held.corrected, held.loading, point.factor, stability, estimate=estimate, notes=notes
-        )
+        answer = finished(held.corrected, stability, error_estimate=estimate, notes=notes)
         refuse_lost_forces(held.touched.fields, [answer.contacts[name]["force"] for name in self.scene.contacts])
         return answer
 

@@ -162,7 +162,7 @@ class Tracer:
                 if trace.end == "lost":
                     return trace
                 continue
-            trace.told = self.curve.plain(there.held.prepared).too_large(there.standing.state, there.standing.loading)
+            trace.told = self.curve.plain(there.held.prepared).too_large(there.standing)
             if trace.told:
                 trace.end = "bent"
                 return trace

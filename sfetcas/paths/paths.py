@@ -21,13 +21,12 @@ from ..equilibria.statics import Settings, pilot_of
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
-from ..mechanics.fields import Fields, transferred
+from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.beginning import begin_path, check_slack
 from ..solvers.critical import Event, at_factors, shapes_at
-from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
 from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
@@ -325,7 +324,7 @@ class PathTracing:
                     errors[i, kind, -1] = np.inf
                 for j, (one, other) in enumerate(zip(ours, theirs, strict=False)):
                     factor = abs(one.factor - other.factor) / max(abs(other.factor), tolerances.UNIT * self._widest)
-                    errors[i, kind, j] = max(_apart(coarse.curve, one, fine.curve, other), factor)
+                    errors[i, kind, j] = max(largest_difference(one.fields, other.fields), factor)
             errors[i, "samples", 0] = self._sampled(coarse, a.traced, fine)
         return errors
 
@@ -345,7 +344,7 @@ class PathTracing:
             here = replace(steady[i], state=state, tangent=flat)
             found = fine.curve.at_factor(here, steady[i].factor)
             if found is not None:
-                largest = max(largest, _apart(curve, steady[i], fine.curve, found))
+                largest = max(largest, largest_difference(steady[i].fields, found.fields))
         return largest
 
     # -- answers --------------------------------------------------------------------------------
@@ -361,7 +360,7 @@ class PathTracing:
             status = Status.CUT
         final = level.stretches[-1].traced.points[-1]
         steps = [entry for branch in branches for entry in branch.steps]
-        last = steps[-1] if steps else self._entry(curve, final, None, ())
+        last = steps[-1] if steps else self._entry(final, None, ())
         self.seconds["solve"] = time.perf_counter() - begin - self.seconds["model"]
         return Path(
             scene=self.scene,
@@ -384,7 +383,7 @@ class PathTracing:
 
         def entries(kind: str, standings: list[Standing], notes: list[tuple[str, ...]]) -> tuple[Equilibrium, ...]:
             numbered = zip(standings, notes, strict=True)
-            return tuple(self._entry(curve, s, errors.get((kind, j)), n) for j, (s, n) in enumerate(numbered))
+            return tuple(self._entry(s, errors.get((kind, j)), n) for j, (s, n) in enumerate(numbered))
 
         crossings = stretch.crossings
         bends, limits = ([e for e in traced.events if e.kind == kind] for kind in ("bifurcation", "limit"))
@@ -398,25 +397,12 @@ class PathTracing:
             side=stretch.side,
         )
 
-    def _entry(self, curve: Curve, at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
-        prepared = curve.prepared
-        state, point = with_sharing(
-            curve.equations, at.state, at.loading, at.point, tolerances.BALANCED, reactions=True
-        )
-        residual = relative_residual(curve.equations, point)
-        stability = prepared.stability(Corrected(state, point, True, at.iterations, 0.0, 0.0, residual))
+    @staticmethod
+    def _entry(at: Standing, error: float | None, notes: tuple[str, ...]) -> Equilibrium:
+        state, point = with_sharing(at.equations, at.state, at.loading, at.point, tolerances.BALANCED, reactions=True)
+        found = replace(at, state=state, point=point, residual=relative_residual(at.equations, point))
         finite = error if error is not None and np.isfinite(error) else None
-        return equilibrium(
-            curve.equations,
-            state,
-            at.loading,
-            float(at.factor),
-            point,
-            residual,
-            stability,
-            error_estimate=finite,
-            notes=notes,
-        )
+        return equilibrium(found, found.stability, error_estimate=finite, notes=notes)
 
 
 def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
@@ -432,10 +418,6 @@ def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
         a, b = (len(part.crossings) for part in parts)
         found += [f"{a} and {b} crossings of the factors asked for{where}"] if a != b else []
     return (f"meshes of {sizes} elements do not agree: they have {', '.join(found)}",) if found else ()
-
-
-def _apart(one: Curve, a: Standing, other: Curve, b: Standing) -> float:
-    return largest_difference(Fields(one.equations, a.state, a.loading), Fields(other.equations, b.state, b.loading))
 
 
 def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:

@@ -34,9 +34,7 @@ from ..mechanics.model import Model
 from ..solvers.arclength import Curve, Standing, Tangent
 from ..solvers.between_states import turned_between
 from ..solvers.critical import ONE_EVENT, sought
-from ..solvers.newton import Corrected
 from ..solvers.prepared import Prepared
-from ..solvers.residuals import relative_residual
 from .path import FLUTTER, NO_POTENTIAL, Branch, FlutterPoint, Path, PathPoint
 
 __all__ = ["shaken", "with_modes"]
@@ -152,7 +150,7 @@ class _Level:
         self.curve = Curve(prepared, path.unit)
         self.count = path.scene.analysis.count_of_modes
         self._places: dict[tuple[int, int], _Place] = {}
-        first = self._motion(self.place(0, 0).standing)
+        first = SmallMotion(self.place(0, 0).standing)
         self.time, self.damped = first.masses.time, bool(len(first.damping.value))
         # Energy makes exponents imaginary or real where nothing turns.
         self.steady = prepared.model.conservative and not len(first.gyroscopic.value)
@@ -192,12 +190,9 @@ class _Level:
     def _model(self) -> Model:
         return self.prepared.model
 
-    def _motion(self, standing: Standing) -> SmallMotion:
-        return SmallMotion(self.curve.equations, standing.state, standing.loading, standing.point)
-
     def exponents(self, standing: Standing, negative: int = 0) -> Array:
         """Exponents of the lowest motions at an equilibrium, one more than asked for."""
-        motion, wanted, unstable = self._motion(standing), self.count + 1, negative
+        motion, wanted, unstable = SmallMotion(standing), self.count + 1, negative
         try:
             for _ in range(TRIES):
                 found = motion.eigenmotions(wanted, unstable)
@@ -308,15 +303,10 @@ class _Level:
 
     def _entry(self, point: _Flutter, error: float | None) -> FlutterPoint:
         at = point.standing
-        residual = relative_residual(self.curve.equations, at.point)
-        corrected = Corrected(at.state, at.point, True, at.iterations, 0.0, 0.0, residual)
-        stability = self.prepared.stability(corrected)
         estimate = error if error is not None and np.isfinite(error) else None
         count = point.multiplicity
         notes = (f"{count} motions start to grow at once",) if count > 1 else ()
-        entry = finished(
-            self.prepared, corrected, at.loading, float(at.factor), stability, estimate=estimate, notes=notes
-        )
+        entry = finished(at, error_estimate=estimate, notes=notes)
         parts = {part.name: getattr(entry, part.name) for part in fields(entry)}
         return FlutterPoint(**parts, omega=point.omega / self.time)
 

@@ -19,13 +19,13 @@ import numpy as np
 from .. import tolerances
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.equations import Point, State
-from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from .between_states import turned_between
 from .neutral import Neutral
 from .newton import Balance, Limits, correct
-from .prepared import Prepared
+from .prepared import Prepared, Solved
 from .redundancy import loose_rows, met, redundant, with_sharing
+from .residuals import relative_residual
 from .sharing import shared
 from .stability import LIGHT, Inertia
 
@@ -75,32 +75,21 @@ class Tangent:
     neutral: Neutral | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Standing:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Standing(Solved):
     """A point of the curve.
 
     Attributes
     ----------
-    state, factor, loading, point
-        The equilibrium and the equations there.
     tangent : Tangent
     arc : float
         Arc length from the start of the curve.
-    iterations : int
-        Newton iterations of its correction.
-    prepared : Prepared
     doubtful : bool
         Whether an eigenvalue may vanish here: the response to a probing load exceeds :data:`DOUBT`.
     """
 
-    state: State
-    factor: float
-    loading: Loading
-    point: Point
     tangent: Tangent
     arc: float
-    iterations: int
-    prepared: Prepared
     doubtful: bool
 
     @functools.cached_property
@@ -141,9 +130,9 @@ class Curve:
         self._linear = set(self.model.groups) == {None}
         self._has_superelements = any(member.type == "small" for member in prepared.model.scene.members.values())
 
-    def too_large(self, state: State, loading: Loading) -> str:
+    def too_large(self, standing: Standing) -> str:
         """Message naming a small member that bends beyond the range of its linear model; empty if none does."""
-        return Fields(self.equations, state, loading).too_large() if self._has_superelements else ""
+        return standing.fields.too_large() if self._has_superelements else ""
 
     def within(self, piece: tuple[float, float]) -> Curve:
         """A copy of the curve with another ``piece``, the range of factors without a knot of a history."""
@@ -156,7 +145,7 @@ class Curve:
         values, shapes = self.prepared.around_zero(standing.point)[1:]
         chosen = shapes[:, np.argsort(np.abs(values))[: standing.inertia.zero]]
         along = replace(standing.tangent, neutral=self.neutral(standing.point, chosen))
-        return replace(standing, tangent=self.tangent(standing.state, standing.factor, standing.point, along)[0])
+        return replace(standing, tangent=self._tangent(standing, along)[0])
 
     def neutral(self, point: Point, shapes: Array, primal_factor: float = 1.0) -> Neutral:
         """Motions with the given shapes (rotation unknowns, n), rad, for corrections that leave them alone.
@@ -194,7 +183,9 @@ class Curve:
         """Loads and motions at a factor; outside of the piece extrapolated linearly from its end."""
         within = min(max(factor, self.piece[0]), self.piece[1])
         there = self.model.loading(within)
-        return there if within == factor else there.plus(self.rate(within).scaled(factor - within))
+        if within == factor:
+            return there
+        return replace(there.plus(self.rate(within).scaled(factor - within)), factor=factor)
 
     def rate(self, factor: float) -> Loading:
         """Derivative of loads and motions by the factor; at a knot of a history the one-sided one within the piece."""
@@ -239,12 +230,13 @@ class Curve:
         self.equations.solver.factor(entries)
         return self.equations.solver.solve(right)
 
-    def tangent(self, state: State, factor: float, point: Point, along: Tangent) -> tuple[Tangent, bool]:
-        """Tangent of the curve at a state, signed as ``along``, and whether an eigenvalue may vanish there.
+    def _tangent(self, at: Solved, along: Tangent) -> tuple[Tangent, bool]:
+        """Tangent of the curve at an equilibrium, signed as ``along``, and whether an eigenvalue may vanish there.
 
         ``along`` itself where the regularised matrix is singular.
         """
-        rights = [-self.slope(state, factor, point), self._probe]
+        point = at.point
+        rights = [-self.slope(at.state, at.factor, point), self._probe]
         rights += [] if along.neutral is None else [*along.neutral.weighted.T]
         try:
             both = self.solved(point, np.column_stack(rights))
@@ -261,7 +253,7 @@ class Curve:
         if loose.size:
             # The rule for redundant multipliers is linear in multipliers and loads: it holds for their rates as well.
             first = self.equations.unknowns
-            way = shared(self.equations, replace(state, lam=rate[first:]), self.rate(factor), loose)
+            way = shared(self.equations, replace(at.state, lam=rate[first:]), self.rate(at.factor), loose)
             rate[first:] = way.lam
         found = self.normed(Tangent(rate, 1.0, neutral))
         doubtful = float(answer @ (self.prepared.weight * answer)) > DOUBT**2
@@ -281,8 +273,13 @@ class Curve:
         """The point of the curve at an equilibrium, with its tangent signed as ``along``."""
         loading = self.loading(factor)
         state, point = with_sharing(self.equations, state, loading, self.equations.at(state, loading), PASSING)
-        tangent, doubtful = self.tangent(state, factor, point, along)
-        return Standing(state, factor, loading, point, tangent, arc, iterations, self.prepared, doubtful)
+        residual = relative_residual(self.equations, point)
+        found = Solved(self.prepared, state, loading, point, residual, iterations=iterations)
+        return self._standing(found, along, arc)
+
+    def _standing(self, found: Solved, along: Tangent, arc: float) -> Standing:
+        tangent, doubtful = self._tangent(found, along)
+        return Standing(**vars(found), tangent=tangent, arc=arc, doubtful=doubtful)
 
     def predicted(self, start: Standing, length: float, bend: Tangent | None = None) -> tuple[State, float]:
         """State and factor at an arc length from a point: along its tangent, with the curvature ``bend`` if given."""
@@ -310,13 +307,8 @@ class Curve:
             self, across, primal_factor if across.neutral is None else max(primal_factor, LARGE_PRIMAL_FACTOR), sharp
         )
         limits = Limits(iterations=ITERATIONS, short=SHORT, turned=TURN, near=tolerances.BALANCED, returns=False)
-        found = correct(system, state, factor=factor, limits=limits)
-        if not found.converged:
-            return None
-        loading = self.loading(found.factor)
-        tangent, doubtful = self.tangent(found.state, found.factor, found.point, across)
-        point, count = found.point, found.iterations
-        return Standing(found.state, found.factor, loading, point, tangent, arc, count, self.prepared, doubtful)
+        found = Solved(self.prepared, *correct(system, state, factor=factor, limits=limits))
+        return self._standing(found, across, arc) if found.converged else None
 
     def at_factor(self, near: Standing, factor: float, most: float = TURN) -> Standing | None:
         """The equilibrium at a factor, from a point near it; None if Newton's method does not converge to one near.
@@ -392,7 +384,7 @@ class _Across:
 
     def step(self, here: Balance) -> Array:
         """Newton's step (total + 1,) of all unknowns, multipliers and, last, the factor."""
-        rights = [-here.point.residual, -self.curve.slope(here.state, here.factor, here.point)]
+        rights = [-here.point.residual, -self.curve.slope(here.state, here.loading.factor, here.point)]
         rights += [] if self.neutral is None else [*self.neutral.weighted.T]
         both = self.curve.solved(here.point, np.column_stack(rights), self.primal_factor)
         if self.neutral is not None:

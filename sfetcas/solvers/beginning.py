@@ -11,8 +11,7 @@ from ..mechanics.loading import Loading
 from .arclength import Curve, Standing, Tangent
 from .continuation import follow
 from .deflation import nearest
-from .newton import Corrected
-from .prepared import Prepared
+from .prepared import Prepared, Solved
 from .redundancy import loose_rows, named_in, stretched
 from .sharing import SHARED, SMALLEST, stretches
 from .tracing import Traced
@@ -98,17 +97,14 @@ def _bent(prepared: Prepared, factor: float) -> State:
     return _stable(prepared, prepared.model.loading(factor)).state
 
 
-def _stable(prepared: Prepared, loading: Loading) -> Corrected:
+def _stable(prepared: Prepared, loading: Loading) -> Solved:
     """A stable equilibrium near the start guess."""
     state, gap = prepared.guess(loading)
     if gap > 0.2:
         detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m where the path starts"
         raise SolveError(Status.INFEASIBLE, detail, state)
     found, _ = prepared.minimise(loading, state)
-    stability = prepared.stability(found)
-    if stability.negative:
-        found, _ = prepared.switch_branch(found.state, stability, loading)
-    return found
+    return prepared.switch_branch(found, loading) if found.stability.negative else found
 
 
 def check_slack(curve: Curve, traced: Traced) -> None:

@@ -19,8 +19,7 @@ from ..errors import SolveError
 from ..mechanics.equations import State
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
-from .newton import Corrected
-from .prepared import Prepared
+from .prepared import Prepared, Solved
 
 __all__ = ["JUMPED", "NARROW", "Followed", "advanced", "between", "follow", "near_factor"]
 
@@ -92,8 +91,8 @@ class Followed:
 
 
 def between(model: Model, begin: float, end: float) -> Callable[[float], Loading]:
-    """The way from one factor to another."""
-    return lambda t: model.loading(begin + t * (end - begin))
+    """The way from one factor to another, which at 1 is exactly that one."""
+    return lambda t: model.loading(end if t == 1.0 else begin + t * (end - begin))
 
 
 def near_factor(factor: float) -> str:
@@ -150,16 +149,15 @@ def follow(
     state: State,
     *,
     switch_branch: bool = True,
-    allowed: Callable[[State, Loading, State, Loading], bool] | None = None,
-    refuse: Callable[[State, Loading], None] | None = None,
+    allowed: Callable[[Solved, Solved], bool] | None = None,
+    refuse: Callable[[Solved], None] | None = None,
 ) -> Followed:
     """Natural-parameter continuation from ``way(0)``, where ``state`` is an equilibrium, to ``way(1)``.
 
     Steps are corrected by Newton's method and shortened where its corrections are long or do not shrink; the inertia is
     counted at each point.  With ``switch_branch=False`` a state that becomes unstable is followed on, as far as
-    Newton's method carries.  A step that is not ``allowed`` from one state and loading to the next is too long, and
-    where short ones are not either the way ends.  ``refuse`` is shown each state, and raises where there is no sense in
-    going on.
+    Newton's method carries.  A step that is not ``allowed`` from one equilibrium to the next is too long, and where
+    short ones are not either the way ends.  ``refuse`` is shown each, and raises where there is no sense in going on.
     """
     # What is driven may meet on its way what snaps, and in space a whole turn looks like none.
     whole = way(1.0).plus(way(0.0).scaled(-1.0))
@@ -177,7 +175,7 @@ def follow(
 class _On:
     """An equilibrium on a way of loads, and the part of the way that is done there."""
 
-    found: Corrected
+    found: Solved
     done: float
 
 
@@ -193,8 +191,8 @@ class _Following:
     way: Callable[[float], Loading]
     longest: float
     switch_branch: bool
-    allowed: Callable[[State, Loading, State, Loading], bool] | None
-    refuse: Callable[[State, Loading], None] | None
+    allowed: Callable[[Solved, Solved], bool] | None
+    refuse: Callable[[Solved], None] | None
     left: list[float] = field(default_factory=list)
     crept: int = 0
 
@@ -211,7 +209,7 @@ class _Following:
         )
         far = there.first > HALF_TURN and (self.prepared.model.unwrapping.count > 0 or there.second > LINEAR)
         good = there.converged and not far
-        if good and not self._free(here, there, trial):
+        if good and not self._free(here, there):
             return None, 0.0 if step <= BLOCKED else step * (0.5 if there.first < 2.0 * STEP_ROTATION else 0.25)
         unstable = self._negative(there) if good and self.switch_branch else 0
         if not good or unstable is None:
@@ -224,13 +222,13 @@ class _Following:
         if unstable > 0:
             if trial - here.done > NARROW * here.done:
                 return None, 0.5 * (trial - here.done)
-            switched = self._switched(there, self.way(trial))
-            if switched is None or not self._free(here, switched, trial):
+            switched = self._switched(there, there.loading)
+            if switched is None or not self._free(here, switched):
                 return None, 0.0
             there, following = switched, 0.1 * (4.0 if switched.second < 0.05 else 2.0)
             self.left.append(trial)
         if self.refuse is not None:
-            self.refuse(there.state, self.way(trial))
+            self.refuse(there)
         return _On(there, trial), following
 
     def _snapped(self, here: _On) -> tuple[_On | None, float]:
@@ -240,7 +238,7 @@ class _Following:
             return None, 0.0
         beyond = min(1.0, here.done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
         snapped = self._switched(here.found, self.way(beyond))
-        if snapped is None or not self._free(here, snapped, beyond):
+        if snapped is None or not self._free(here, snapped):
             return None, 0.0
         self.crept += self.prepared.distance(snapped.state, here.found.state) < CREPT
         if self.crept > CREEPS:
@@ -248,19 +246,21 @@ class _Following:
         self.left.append(here.done)
         return _On(snapped, beyond), 0.1
 
-    def _free(self, here: _On, there: Corrected, at: float) -> bool:
+    def _free(self, here: _On, there: Solved) -> bool:
         """Whether the step from one state to another is allowed."""
-        return self.allowed is None or self.allowed(here.found.state, self.way(here.done), there.state, self.way(at))
+        return self.allowed is None or self.allowed(here.found, there)
 
-    def _negative(self, found: Corrected) -> int | None:
+    @staticmethod
+    def _negative(found: Solved) -> int | None:
         """Negative eigenvalues; None where forces without bound meet closings that no unknown changes, by rounding."""
         try:
-            return self.prepared.negative(found)
+            return found.negative
         except SolveError:
             return None
 
-    def _switched(self, found: Corrected, loading: Loading) -> Corrected | None:
+    @staticmethod
+    def _switched(found: Solved, loading: Loading) -> Solved | None:
         try:
-            return self.prepared.switch_branch(found.state, self.prepared.stability(found), loading)[0]
+            return found.prepared.switch_branch(found, loading)
         except SolveError:
             return None

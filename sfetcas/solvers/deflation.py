@@ -18,8 +18,8 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations, State
 from ..mechanics.loading import Loading
 from .between_states import turned_between
-from .newton import Corrected, Iterate, Moving, largest_rotation, newton, newton_step
-from .prepared import Prepared
+from .newton import Iterate, Moving, largest_rotation, newton, newton_step
+from .prepared import Prepared, Solved
 
 __all__ = ["deflated", "nearest"]
 
@@ -36,7 +36,7 @@ ITERATIONS = 40
 """Iterations of a run: those that arrive at something new need 5 to 35 (measured)."""
 
 
-def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence[State]) -> Corrected | None:
+def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence[State]) -> Solved | None:
     """An equilibrium by Newton's method from a state, kept away from the known states; None without convergence."""
     equations = prepared.equations
     moving = Moving(equations, loading)
@@ -61,7 +61,7 @@ def deflated(prepared: Prepared, state: State, loading: Loading, known: Sequence
     return found if found is not None and found.converged else None
 
 
-def nearest(prepared: Prepared, loading: Loading) -> Corrected | None:
+def nearest(prepared: Prepared, loading: Loading) -> Solved | None:
     """The equilibrium beside the ``start`` places of nodes, stable or not; None if Newton's method finds none near.
 
     A minimisation from there would leave an unstable one.

@@ -24,7 +24,6 @@ __all__ = [
     "TURN",
     "AtLoads",
     "Balance",
-    "Corrected",
     "Iterate",
     "Limits",
     "Moving",
@@ -277,27 +276,9 @@ class Limits:
     returns: bool = True
 
 
-@dataclass(frozen=True)
-class Corrected:
-    """Result of :func:`correct`.
-
-    ``point`` are the equations at the state, ``residual`` is relative to their scale.  ``first`` and ``second`` are
-    the largest rotations, rad, of the first two steps: their ratio shows how nonlinear the equations were.
-    """
-
-    state: State
-    point: Point
-    converged: bool
-    iterations: int
-    first: float
-    second: float
-    residual: float
-    factor: float = 1.0
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Balance(Iterate):
-    """An iterate of :func:`correct`, with its loading, factor and relative residual.
+    """An iterate of :func:`correct`, with its loading and relative residual.
 
     ``plain`` are the stationarity equations, ``point`` those that :meth:`System.seen` makes of them; ``over`` says that
     further steps cannot improve it.
@@ -305,12 +286,15 @@ class Balance(Iterate):
 
     plain: Point
     loading: Loading
-    factor: float
     residual: float
     over: bool = False
 
 
-def correct(system: System, state: State, *, factor: float = 1.0, limits: Limits | None = None) -> Corrected:
+Found = tuple[State, Loading, Point, float, bool, int, float, float]
+"""What :func:`correct` finds: what a :class:`~sfetcas.solvers.prepared.Solved` has besides its model, in its order."""
+
+
+def correct(system: System, state: State, *, factor: float = 1.0, limits: Limits | None = None) -> Found:
     """Newton's method from a near state down to rounding: as long as a step reduces the residual to a fourth.
 
     A residual that rounding of the state explains counts as converged, too.  Multipliers of redundant rows follow the
@@ -342,7 +326,7 @@ class _Correction:
         plain = self.equations.at(state, loading)
         seen = self.system.seen(state, plain)
         residual = relative_residual(self.equations, seen)
-        return Balance(state, seen, length, count, plain=plain, loading=loading, factor=factor, residual=residual)
+        return Balance(state, seen, length, count, plain=plain, loading=loading, residual=residual)
 
     def arrived(self, here: Balance) -> bool:
         if here.over or here.residual == 0.0:
@@ -360,9 +344,9 @@ class _Correction:
         if sum(self.lengths) > limits.turned or (here.count and here.residual > self.tolerance and grows):
             self.refused = True
             return None
-        total = self.equations.total
-        moved, factor = self.equations.moved(here.state, step[:total]), here.factor + float(step[total:].sum())
-        if factor != here.factor:
+        total, factor = self.equations.total, here.loading.factor
+        moved, factor = self.equations.moved(here.state, step[:total]), factor + float(step[total:].sum())
+        if factor != here.loading.factor:
             moved = self.system.with_prescribed(moved, self.system.loading(factor))
         there = self.at(moved, factor, length, here.count + 1)
         if not np.isfinite(there.residual):
@@ -377,7 +361,7 @@ class _Correction:
             return here.count > 0 or (self.limits.returns and balanced(self.equations, here.point))
         return here.count > 0 and rounded(self.equations, here.state, here.point)
 
-    def __call__(self, state: State, factor: float) -> Corrected:
+    def __call__(self, state: State, factor: float) -> Found:
         begin = self.at(self.system.with_prescribed(state, self.system.loading(factor)), factor)
         here, _ = newton(begin, self.system.step, self.after, self.arrived, self.limits.iterations)
         tolerance, count = tolerances.CONVERGED, here.count
@@ -392,7 +376,7 @@ class _Correction:
             found, point = with_sharing(self.equations, found, here.loading, point, max(tolerance, residual))
             residual = relative_residual(self.equations, point)
         first, second = (*self.lengths[:2], *(np.inf, 0.0)[len(self.lengths) :])
-        return Corrected(found, point, good, count, first, second, residual, here.factor)
+        return found, here.loading, point, residual, good, count, first, second
 
 
 # -- downhill ------------------------------------------------------------------------------------------------

@@ -1,10 +1,10 @@
-"""A model made ready for any number of solves: IPOPT, Newton's method and the stability test."""
+"""A model made ready for any number of solves by IPOPT and Newton's method, and the equilibria that they find."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,14 @@ from ..mathematics.kernels import Kernels
 from ..mathematics.nlp import Ipopt, NLPResult
 from ..mechanics.equations import Equations, Point, State
 from ..mechanics.expressions import Expressions
+from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from .constraints import Diagnosis, contradiction, diagnose, free_motions
 from .divergence import TangentTest
 from .globalised import Code, Globalised, Rules
 from .guess import first_guess, lacks_slack, restore
-from .newton import AtLoads, Corrected, Limits, correct
+from .newton import AtLoads, Limits, correct
 from .problem import EquilibriumProblem
 from .program import Program
 from .pseudo_transient import Drag, flow
@@ -33,7 +34,7 @@ from .redundancy import loose_rows, stretched
 from .sharing import shared
 from .stability import Inertia, Stability, StabilityTest
 
-__all__ = ["BEYOND", "Prepared"]
+__all__ = ["BEYOND", "Prepared", "Solved"]
 
 MOST_COUNTED = 600
 """Largest number of unknowns for which all eigenvalues of an unsymmetric tangent take less than a second."""
@@ -135,7 +136,7 @@ class Prepared:
         flat: Array | None = None,
         drag: Drag | None = None,
         **limits: Any,
-    ) -> Corrected:
+    ) -> Solved:
         """Newton's method from a near state to the equilibrium under a loading.
 
         Parameters
@@ -148,7 +149,7 @@ class Prepared:
             Fields of :class:`~sfetcas.solvers.newton.Limits`.
         """
         system = AtLoads(self.equations, loading, self._test.weight, tangent, flat, drag)
-        return correct(system, state, limits=Limits(**limits))
+        return Solved(self, *correct(system, state, limits=Limits(**limits)))
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:
@@ -157,10 +158,6 @@ class Prepared:
     @property
     def _tester(self) -> StabilityTest | TangentTest:
         return self._test if self.model.conservative else self._tangent
-
-    def stability(self, found: Corrected) -> Stability:
-        """The stability test at an equilibrium; "not defined" for loads without potential."""
-        return self._tester.test(found.point)
 
     def inertia(self, point: Point, *, doubtful: bool = True) -> Inertia:
         """Numbers of negative and of zero eigenvalues, in large models the latter only if ``doubtful``; for paths.
@@ -180,18 +177,6 @@ class Prepared:
         """Whether the ``count`` eigenvalues nearest to the imaginary axis are real: always with a potential."""
         return self.model.conservative or self._tangent.singular(point, count)
 
-    def negative(self, found: Corrected) -> int:
-        """Number of negative eigenvalues at an equilibrium; 0 if :attr:`switches_branch` is false."""
-        if not self.switches_branch:
-            return 0
-        if self.model.conservative:
-            return self._test.negative(found.point)
-        return self._tangent.inertia(found.point).negative
-
-    def diverged(self, found: Corrected) -> int | None:
-        """Number of negative real eigenvalues of the tangent, for loads without potential; None if not countable."""
-        return self._tangent.below(found.point) if self.countable else None
-
     @property
     def countable(self) -> bool:
         """Whether the model is small enough for all eigenvalues of an unsymmetric tangent."""
@@ -201,10 +186,6 @@ class Prepared:
     def switches_branch(self) -> bool:
         """Whether unstable states can be left: a potential exists, and it is computed or the model is not large."""
         return self.model.minimisable or (self.model.conservative and self.countable)
-
-    def spectrum(self, found: Corrected, count: int) -> tuple[Array, Array]:
-        """All eigenvalues, dimensionless, and lowest shapes at an equilibrium, see :meth:`StabilityTest.spectrum`."""
-        return self._test.spectrum(found.point, count)
 
     @property
     def weight(self) -> Array:
@@ -216,7 +197,7 @@ class Prepared:
         """Ratio of :attr:`weight` to :attr:`Equations.mass`, see :attr:`StabilityTest.softest`."""
         return self._test.softest
 
-    def minimise(self, loading: Loading, state: State) -> tuple[Corrected, int]:
+    def minimise(self, loading: Loading, state: State) -> tuple[Solved, int]:
         """IPOPT from a state, then Newton's method to rounding; the equilibrium and the number of IPOPT's iterations.
 
         Raises
@@ -266,9 +247,9 @@ class Prepared:
                 left = f"{detail}; Newton's method left a residual of {polished.residual:.1e}"
                 status, detail = (Status.STRETCHED, told) if told else (status, left)
             raise SolveError(status, detail, trial)
-        return self._without_prestress(polished, loading), result.iterations
+        return self._without_prestress(polished), result.iterations
 
-    def _without_prestress(self, found: Corrected, loading: Loading) -> Corrected:
+    def _without_prestress(self, found: Solved) -> Solved:
         """The equilibrium with the multipliers of redundant rows by the rule of :mod:`~sfetcas.solvers.sharing`.
 
         IPOPT leaves arbitrary values of these, large enough to buckle members: with such a prestress, which nobody
@@ -278,23 +259,19 @@ class Prepared:
         if not loose.size:
             return found
         self.equations.redundant = True
-        without = shared(self.equations, found.state, loading, loose)
-        if self.multipliers(found) > BEYOND:
+        without = shared(self.equations, found.state, found.loading, loose)
+        if found.multipliers > BEYOND:
             # A state that only unbounded multipliers hold is left for an equilibrium of lower energy.
-            return self.downhill(without, loading) or found
-        least = self.correct(without, loading)
+            return self.downhill(without, found.loading) or found
+        least = self.correct(without, found.loading)
         return least if least.converged and self.distance(least.state, found.state) < PRESTRESSED else found
-
-    def multipliers(self, found: Corrected) -> float:
-        """Largest multiplier over the largest load of factor 1, or over the unit of force if that is larger."""
-        return float(np.abs(found.state.lam).max(initial=0.0)) / max(1.0, self._load_size)
 
     @functools.cached_property
     def _globalised(self) -> Globalised:
         expressions = Expressions(self.equations, self.kernels, self._evaluations)
         return Globalised(Program(expressions), self.weight, Rules(escapes=0))
 
-    def globalised(self, loading: Loading) -> tuple[Corrected | None, int]:
+    def globalised(self, loading: Loading) -> tuple[Solved | None, int]:
         """The equilibrium by the globalised Newton method, stable or not, and its iterations; None if it fails."""
         method = self._globalised
         start = None
@@ -306,7 +283,7 @@ class Prepared:
         found = self.correct(method.program.state(outcome.state), loading)
         return (found if found.residual <= tolerances.BALANCED else None), outcome.iterations
 
-    def downhill(self, state: State, loading: Loading) -> Corrected | None:
+    def downhill(self, state: State, loading: Loading) -> Solved | None:
         """The equilibrium to which pseudo-transient continuation leads from a state; None if it does not converge.
 
         No eigenvalue of its tangent has a negative real part.
@@ -320,8 +297,8 @@ class Prepared:
         found = None if there is None else self.correct(there, loading)
         return found if found is not None and found.converged else None
 
-    def switch_branch(self, state: State, stability: Stability, loading: Loading) -> tuple[Corrected, Stability]:
-        """Leave an unstable equilibrium along its unstable mode to a stable or neutral one.
+    def switch_branch(self, found: Solved, loading: Loading) -> Solved:
+        """Leave an unstable equilibrium along its unstable mode to a stable or neutral one under a loading.
 
         Raises
         ------
@@ -332,7 +309,7 @@ class Prepared:
         for _ in range(MOST_SWITCHES):
             begun = self._spent
             try:
-                found = self._fallen(self.nudged(state, stability, loading, amplitude), loading)
+                there = self._fallen(self.nudged(found, loading, amplitude), loading)
             except SolveError:
                 lost += self._spent - begun
                 # The flow leads downhill from any start: if it finds no equilibrium, a longer step finds none either,
@@ -341,15 +318,14 @@ class Prepared:
                     break
                 amplitude *= 1.7 if self.model.minimisable else -1.0
                 continue
-            there = self.stability(found)
-            if there.negative == 0:
-                return found, there
-            same = self.distance(found.state, state) < tolerances.SAME_STATE
+            if there.stability.negative == 0:
+                return there
+            same = self.distance(there.state, found.state) < tolerances.SAME_STATE
             amplitude = 1.7 * amplitude if same else 0.2
-            state, stability = found.state, there
-        raise SolveError(Status.FAILED, "no stable equilibrium found along the unstable modes", state)
+            found = there
+        raise SolveError(Status.FAILED, "no stable equilibrium found along the unstable modes", found.state)
 
-    def _fallen(self, state: State, loading: Loading) -> Corrected:
+    def _fallen(self, state: State, loading: Loading) -> Solved:
         """The equilibrium downhill from a state, by pseudo-transient continuation or minimisation."""
         # With redundant rows IPOPT may stop at states that only large multipliers hold, or jump to the other side.
         flows = not self.model.minimisable or bool(self.equations.redundant)
@@ -360,12 +336,12 @@ class Prepared:
             return self.minimise(loading, state)[0]
         raise SolveError(Status.FAILED, "the way downhill did not come to rest", state)
 
-    def nudged(self, state: State, stability: Stability, loading: Loading, amplitude: float) -> State:
-        """The state displaced along the unstable mode to the side of lower energy, with its gaps closed again.
+    def nudged(self, found: Solved, loading: Loading, amplitude: float) -> State:
+        """A state displaced along its unstable mode to the side of lower energy, with its gaps closed again.
 
         ``amplitude`` is the largest rotation, rad; its sign chooses the side where energies are equal or not computed.
         """
-        equations = self.equations
+        equations, state, stability = self.equations, found.state, found.stability
         sides = []
         for sign in (1.0, -1.0):
             step = np.zeros(equations.total)
@@ -385,8 +361,8 @@ class Prepared:
         return second if up.potential - down.potential > tolerances.LEVEL * size else first
 
     @functools.cached_property
-    def _load_size(self) -> float:
-        """Largest load, dimensionless."""
+    def load_size(self) -> float:
+        """Largest load of factor 1, dimensionless."""
         loading = self.model.loading(1.0)
         return max(float(np.abs(part).max(initial=0.0)) for part in (loading.force, loading.pull, loading.moment))
 
@@ -396,3 +372,81 @@ class Prepared:
             return float(np.abs(a.q - b.q).max(initial=0.0))
         turns = quaternion.rotation_vector(quaternion.multiply(quaternion.conjugate(a.q), b.q))
         return float(np.linalg.norm(turns, axis=-1).max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """An equilibrium as Newton's method left it; what else is asked of it is computed when asked, and once.
+
+    Attributes
+    ----------
+    prepared : Prepared
+    state, loading, point
+        The state, loads and motions, and the equations there.
+    residual : float
+        Largest out-of-balance entry relative to the scale of the equations, see :mod:`~sfetcas.solvers.residuals`.
+    converged : bool
+        Whether Newton's method came down to rounding.
+    iterations : int
+        Its steps.
+    first, second : float
+        Largest rotations, rad, of its first two steps: their ratio shows how nonlinear the equations were.
+    """
+
+    prepared: Prepared
+    state: State
+    loading: Loading
+    point: Point
+    residual: float
+    converged: bool = True
+    iterations: int = 0
+    first: float = 0.0
+    second: float = 0.0
+
+    @property
+    def equations(self) -> Equations:
+        """The stationarity equations of the model."""
+        return self.prepared.equations
+
+    @property
+    def model(self) -> Model:
+        """The assembled model."""
+        return self.prepared.model
+
+    @property
+    def factor(self) -> float:
+        """Factor of loads and prescribed motions."""
+        return self.loading.factor
+
+    @functools.cached_property
+    def fields(self) -> Fields:
+        """Evaluates positions, rotations and forces."""
+        return Fields(self.equations, self.state, self.loading)
+
+    @functools.cached_property
+    def stability(self) -> Stability:
+        """The stability test; "not defined" for loads without potential."""
+        return self.prepared._tester.test(self.point)
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues, at less cost; 0 if :attr:`Prepared.switches_branch` is false."""
+        if not self.prepared.switches_branch:
+            return 0
+        if self.model.conservative:
+            return self.prepared._test.negative(self.point)
+        return self.prepared._tangent.inertia(self.point).negative
+
+    @property
+    def diverged(self) -> int | None:
+        """Number of negative real eigenvalues of the tangent, for loads without potential; None if not countable."""
+        return self.prepared._tangent.below(self.point) if self.prepared.countable else None
+
+    def spectrum(self, count: int) -> tuple[Array, Array]:
+        """All eigenvalues, dimensionless, and lowest shapes, see :meth:`StabilityTest.spectrum`."""
+        return self.prepared._test.spectrum(self.point, count)
+
+    @property
+    def multipliers(self) -> float:
+        """Largest multiplier over the largest load of factor 1, or over the unit of force if that is larger."""
+        return float(np.abs(self.state.lam).max(initial=0.0)) / max(1.0, self.prepared.load_size)

@@ -229,7 +229,7 @@ class _Piece:
         there, left = _ahead(curve, now, self.before, length, self.span)
         if there is None:
             return None, 0.5 * length
-        self.told = curve.too_large(there.state, there.loading)
+        self.told = curve.too_large(there)
         if self.told:
             self.end = "bent"
             return there, 0.0

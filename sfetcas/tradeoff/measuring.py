@@ -219,10 +219,10 @@ def _own_error(scene: Scene, answer: Solution, quantity: Quantity | None) -> flo
     for step in answer.steps:
         mesh, assembly = step.model.mesh.refined().refined(), cast(Assembly, step.model.assembly)
         prepared = Prepared(assemble(scene, mesh, assembly=assembly))
-        loading = prepared.model.loading(step.factor)
-        found = prepared.correct(transferred(step.model, step.state, prepared.model), loading, iterations=40)
+        state = transferred(step.model, step.state, prepared.model)
+        found = prepared.correct(state, prepared.model.loading(step.factor), iterations=40)
         if not found.converged:
             return None
-        fine.append(unjudged(prepared, found, loading, step.factor))
+        fine.append(unjudged(found))
     reference = Solution(scene, answer.status, tuple(fine), answer.seconds)
     return observe(scene, answer, quantity).error(observe(scene, reference, quantity))
