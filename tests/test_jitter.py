@@ -69,7 +69,9 @@ SCENES = {
 def test_the_same_answer_after_what_nobody_means(name):
     scene = SCENES[name]
     first = answered(scene)
-    assert differences(scene, jittered(scene, 1), first) == []
+    # In the second change IPOPT takes what falls far to another of two places of the same energy.
+    for change in (1, 2) if name == "mechanism that falls far" else (1,):
+        assert differences(scene, jittered(scene, change), first) == []
 
 
 def test_twins_are_chosen_by_a_rule_and_told():

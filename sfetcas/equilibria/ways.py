@@ -342,7 +342,7 @@ class Ways:
         # What cannot be minimised is followed to each, in thousands of steps where it falls.
         for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
             begin = share * factor
-            bent, _ = self._direct(pilot, pilot.model.loading(begin))
+            bent = self._put(pilot, pilot.model.loading(begin))
             if bent is not None:
                 break
         if bent is None:
@@ -355,6 +355,15 @@ class Ways:
                 return None
         found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
         return None if found is None else replace(found, way=("small share", *found.way[1:]))
+
+    def _put(self, pilot: Prepared, loading: Loading) -> EquilibriumResult | None:
+        """Where a small share of the loads puts what has no place without them: downhill, or from the start guess."""
+        if pilot.diagnosis.mobility and pilot.countable:
+            # IPOPT may take any of several places of the same energy, as rounding of its long way decides.
+            there = pilot.downhill(self._unloaded(pilot), loading)
+            if there is not None:
+                return EquilibriumResult(there, there.stability)
+        return self._direct(pilot, loading)[0]
 
     def _followed(
         self,
