@@ -122,7 +122,7 @@ def _against_the_best(scenes: dict[str, Scene], references: dict[str, Measuremen
         ratios[name] = asked.seconds / best.seconds
         times = f"{1e3 * asked.seconds:9.1f} {1e3 * best.seconds:9.1f} ms {ratios[name]:6.2f}"
         print(f"{name:>60} {times}  {best.variant.name}")
-    told = np.array(list(ratios.values()))
-    if len(told):
-        within = int((told <= 3.0).sum())
-        print(f"\nmedian {np.median(told):.2f}, largest {told.max():.2f}, at most 3 in {within} of {len(told)}")
+    known = np.array(list(ratios.values()))
+    if len(known):
+        within = int((known <= 3.0).sum())
+        print(f"\nmedian {np.median(known):.2f}, largest {known.max():.2f}, at most 3 in {within} of {len(known)}")

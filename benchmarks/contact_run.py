@@ -65,7 +65,7 @@ class ContactOutcome:
     seed: int
     kind: str
     seconds: float
-    told: str
+    words: str
     touching: bool = False
     snapped: bool = False
 
@@ -179,7 +179,7 @@ def contact(arguments: Sequence[str] = ()) -> None:
                 outcome = compare_contact(family, seed, worker, asked.seconds)
                 outcomes.append(outcome)
                 if outcome.kind != "right":
-                    print(f"- {family} {seed}: {outcome.kind} ({outcome.seconds:.1f} s): {outcome.told}", flush=True)
+                    print(f"- {family} {seed}: {outcome.kind} ({outcome.seconds:.1f} s): {outcome.words}", flush=True)
                     if asked.save:
                         name = f"{outcome.kind.partition(',')[0].replace(' ', '_')}_{family}_{seed}.toml"
                         dump(Scene.from_dict(contact_scene(family, seed)), asked.save / name)

@@ -89,7 +89,7 @@ class Outcome:
 
     error: float | None
     estimate: float
-    told: str
+    words: str
     solved: bool
 
     @property
@@ -409,11 +409,11 @@ def measured(scene: Scene, error: Callable[[Equilibrium], float], allowed: float
     except (SceneError, SolveError) as refusal:
         return Outcome(None, 0.0, f"refused: {refusal}", False)
     step = solution.last
-    told = [note for note in step.notes if any(word in note for word in DOUBTS)]
-    told += ["neutral"] if step.certificate.stable == "neutral" else []
-    told += [solution.status.value] if solution.status is not Status.SOLVED else []
+    words = [note for note in step.notes if any(word in note for word in DOUBTS)]
+    words += ["neutral"] if step.certificate.stable == "neutral" else []
+    words += [solution.status.value] if solution.status is not Status.SOLVED else []
     estimate = max(step.certificate.error_estimate or 0.0, allowed)
-    return Outcome(error(step), estimate, "; ".join(told) or "solved", not told)
+    return Outcome(error(step), estimate, "; ".join(words) or "solved", not words)
 
 
 def _at(node: str, place: Array) -> Callable[[Equilibrium], float]:
@@ -537,8 +537,8 @@ def fine() -> Iterator[Outcome]:
         seconds = time.perf_counter() - begin
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         where = "space" if space else "plane"
-        told = f"{found.told}, {where}, {count} {element}: {seconds:.1f} s, {memory:.1f} GB"
-        yield Outcome(found.error, found.estimate, told, found.solved)
+        words = f"{found.words}, {where}, {count} {element}: {seconds:.1f} s, {memory:.1f} GB"
+        yield Outcome(found.error, found.estimate, words, found.solved)
 
 
 def graded() -> Iterator[Outcome]:
@@ -614,9 +614,9 @@ def flights() -> Iterator[Outcome]:
         begin = time.perf_counter()
         motion = solve_motion(flight(space, steps))
         seconds = time.perf_counter() - begin
-        told = f"{'space' if space else 'plane'}, {steps} steps: {seconds:.0f} s"
+        words = f"{'space' if space else 'plane'}, {steps} steps: {seconds:.0f} s"
         # An angle that counts its turns is rounded the more the further it is, and these add up as a random walk.
-        yield Outcome(drift(motion), 1e-15 * steps**1.5, told, True)
+        yield Outcome(drift(motion), 1e-15 * steps**1.5, words, True)
 
 
 def solve_motion(scene: Scene) -> Trajectory:
@@ -674,15 +674,15 @@ def row(tried: str, compared: str, outcomes: Iterable[Outcome]) -> str:
     found = list(outcomes)
     silent = [outcome for outcome in found if outcome.solved and outcome.error is not None]
     worst = max(silent, key=lambda outcome: outcome.error or 0.0, default=None)
-    said = Counter(SHORT.sub("", outcome.told) for outcome in found if outcome.told != "solved")
-    told = [f"{count} {words}" if count > 1 else words for words, count in said.most_common()]
+    said = Counter(SHORT.sub("", outcome.words) for outcome in found if outcome.words != "solved")
+    words = [f"{count} {words}" if count > 1 else words for words, count in said.most_common()]
     wrong = sum(outcome.wrong for outcome in found)
     cells = [
         tried,
         compared,
         "-" if worst is None else f"{worst.error:.0e} (estimate {worst.estimate:.0e})",
         f"{len(silent)} of {len(found)}" + (f", {wrong} WRONG" if wrong else ""),
-        "; ".join(told) or "-",
+        "; ".join(words) or "-",
     ]
     return f"| {' | '.join(cells)} |"
 

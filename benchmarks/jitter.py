@@ -126,49 +126,49 @@ class _Outputs:
 
 def _outputs(answer: Answer, how: Jittered) -> _Outputs:
     """An answer in the axes and units of the first scene."""
-    told = _Outputs({"status": answer.status.value})
+    outputs = _Outputs({"status": answer.status.value})
     size = how.scene.size / how.length
     if isinstance(answer, Solution):
         entries = list(answer.steps)
         if how.scene.analysis.equilibria == "all":
             # A family, or the members of equal energy, stand in any order.
-            told.words["count"] = len(entries)
+            outputs.words["count"] = len(entries)
             entries = entries[:1]
         for i, step in enumerate(entries):
-            _equilibrium(told, f"step {i}", step, how, size)
+            _equilibrium(outputs, f"step {i}", step, how, size)
     elif isinstance(answer, Path):
-        told.words["notes"] = said(answer.notes)
+        outputs.words["notes"] = said(answer.notes)
         estimate = max(answer.error_estimate or 0.0, 1e-7)
         for kind in ("limit_points", "bifurcations", "flutter_points"):
             found = getattr(answer, kind)
-            told.words[kind] = len(found)
+            outputs.words[kind] = len(found)
             # The path has a unit of the factors; each is right to the error relative to the largest.
             factors = [entry.factor for entry in found]
-            told.add(kind, factors, 10.0 * estimate * max(map(abs, factors), default=0.0))
-        told.words["crossings"] = len(answer.steps)
+            outputs.add(kind, factors, 10.0 * estimate * max(map(abs, factors), default=0.0))
+        outputs.words["crossings"] = len(answer.steps)
         for i, step in enumerate(answer.steps):
-            _equilibrium(told, f"crossing {i}", step, how, size)
+            _equilibrium(outputs, f"crossing {i}", step, how, size)
     elif isinstance(answer, Modes):
-        told.words["notes"], told.words["rigid"] = said(answer.notes), answer.rigid
+        outputs.words["notes"], outputs.words["rigid"] = said(answer.notes), answer.rigid
         omegas = np.array([mode.omega for mode in answer.modes]) * how.time
-        told.add("omega", omegas, (2.0 * answer.error_estimate + 1e-6) * float(omegas.max(initial=0.0)))
+        outputs.add("omega", omegas, (2.0 * answer.error_estimate + 1e-6) * float(omegas.max(initial=0.0)))
         for i, mode in enumerate(answer.modes):
             # Other axes may turn a shape round, and more a phase.
             moved = np.concatenate([how.back(mode.nodes[name]["position"]) for name in sorted(mode.nodes)])
-            told.add(f"shape {i}", np.outer(moved, moved.conj()).real, ROUGH)
+            outputs.add(f"shape {i}", np.outer(moved, moved.conj()).real, ROUGH)
     elif isinstance(answer, Trajectory):
-        told.words["notes"] = said(answer.notes)
+        outputs.words["notes"] = said(answer.notes)
         reach = (2.0 * (answer.error_estimate or 1e-6) + 1e-9) * size
         for name in how.scene.nodes:
             places = np.array([instant.position(name) for instant in answer.steps])
-            told.add(f"nodes.{name}", how.back(places, 1), reach)
-    return told
+            outputs.add(f"nodes.{name}", how.back(places, 1), reach)
+    return outputs
 
 
-def _equilibrium(told: _Outputs, name: str, step: Equilibrium, how: Jittered, size: float) -> None:
+def _equilibrium(outputs: _Outputs, name: str, step: Equilibrium, how: Jittered, size: float) -> None:
     proof, error = step.certificate, step.certificate.error_estimate or 0.0
-    told.words[f"{name} stable"], told.words[f"{name} negative"] = str(proof.stable), proof.negative
-    told.words[f"{name} notes"] = said(step.notes)
+    outputs.words[f"{name} stable"], outputs.words[f"{name} negative"] = str(proof.stable), proof.negative
+    outputs.words[f"{name} notes"] = said(step.notes)
     if proof.error_of:
         return
     inside = 0.0
@@ -178,20 +178,20 @@ def _equilibrium(told: _Outputs, name: str, step: Equilibrium, how: Jittered, si
         # Each is right to its estimate; rounding leaves less than a millionth.  Of a neutral family any is right: its
         # energy says whether it is the same one, and places stay near as long as rounding alone moves along it.
         near = ROUGH if proof.stable == "neutral" else error + 1e-6
-        told.add(f"{name} members.{member}", places, near * size)
+        outputs.add(f"{name} members.{member}", places, near * size)
     held = [node for node, entry in step.model.scene.nodes.items() if entry.support != "free"]
     forces = {node: how.back(step.reaction(node)[0], 0, 1) for node in held}
     acts = max((float(np.abs(force).max()) for force in forces.values()), default=0.0)
     carried = max(acts, inside / how.force)
     # Forces, those inside members too, work on the places that are changed.
     energies = np.array([step.energy["elastic"], step.energy["loads"]]) / (how.length * how.force)
-    told.add(
+    outputs.add(
         f"{name} energy",
         energies,
         (error + 1e-6) * float(np.abs(energies).sum()) + 10.0 ** (MOST + 1.0) * carried * size,
     )
     for node, force in forces.items():
-        told.add(f"{name} reactions.{node}", force, ROUGH * acts + 1e-6)
+        outputs.add(f"{name} reactions.{node}", force, ROUGH * acts + 1e-6)
 
 
 def said(notes: Sequence[str]) -> tuple[str, ...]:

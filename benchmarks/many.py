@@ -60,8 +60,8 @@ def _cells(found: Sweep, first: Sweep) -> tuple[str, ...]:
     overhead = cores() * found.wall / solves - 1.0
     same = all(np.array_equal(found.values(name), first.values(name)) for name in QUANTITIES)
     each = 1e3 * solves / len(found)
-    told = "the same" if same else "others"
-    return f"{found.wall:.2f}", f"{solves:.2f}", f"{each:.1f}", f"{100.0 * overhead:.1f} %", told
+    answers = "the same" if same else "others"
+    return f"{found.wall:.2f}", f"{solves:.2f}", f"{each:.1f}", f"{100.0 * overhead:.1f} %", answers
 
 
 @contextlib.contextmanager

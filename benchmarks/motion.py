@@ -158,8 +158,8 @@ def motion() -> None:
                         best[target] = min(best[target], solve if error <= target else np.inf)
                     where = f"{name:>12} {mesh[0]} {mesh[1]:2d} {method:>17} {each:.0e}"
                     print(f"{where}   {error:.1e} {build:6.2f} {solve:7.3f} s {steps:6d}")
-        told = ", ".join(f"{target:.0e} {seconds:.3f} s" for target, seconds in best.items() if np.isfinite(seconds))
-        print(f"{name:>12} least seconds to an error of: {told}\n")
+        reached = ", ".join(f"{target:.0e} {seconds:.3f} s" for target, seconds in best.items() if np.isfinite(seconds))
+        print(f"{name:>12} least seconds to an error of: {reached}\n")
 
 
 def step_cost() -> None:

@@ -88,9 +88,9 @@ def wrong(step: Equilibrium) -> list[str]:
         "bends": 1e-3,
     }
     figures = {name: value for name, value in asdict(found).items() if not value <= limits[name]}
-    told = [f"{name} {value:.1e}" for name, value in figures.items()]
-    told += ["unstable"] if proof.stable is False and step.model.scene.analysis.unstable == "leave" else []
-    return told + ([f"residual {proof.residual:.1e}"] if not proof.residual <= 1e-9 else [])
+    words = [f"{name} {value:.1e}" for name, value in figures.items()]
+    words += ["unstable"] if proof.stable is False and step.model.scene.analysis.unstable == "leave" else []
+    return words + ([f"residual {proof.residual:.1e}"] if not proof.residual <= 1e-9 else [])
 
 
 # The same scene otherwise

@@ -42,7 +42,7 @@ class Outcome:
     seed: int
     kind: str
     seconds: float
-    told: str = ""
+    words: str = ""
     others: dict[str, str] = field(default_factory=dict)
 
 
@@ -84,8 +84,8 @@ def _outcomes(worker: Worker, seeds: Sequence[int]) -> Iterator[Outcome]:
         if found is None:
             yield Outcome(seed, failed.partition(":")[0], worker.seconds, failed)
             continue
-        kind, told, seconds = found
-        outcome = Outcome(seed, kind, seconds, told)
+        kind, words, seconds = found
+        outcome = Outcome(seed, kind, seconds, words)
         if kind.startswith(("solved", "WRONG")):
             for name in VARIANTS:
                 said, failed = worker.ask(_asked, seed, name)
@@ -131,7 +131,7 @@ def _kind_of(said: str) -> str:
 def _remarkable(outcome: Outcome) -> Iterator[str]:
     """Lines on a scene that is more than solved and the same every way."""
     if outcome.kind != "solved":
-        yield f"- {outcome.seed}: {outcome.kind} ({outcome.seconds:.1f} s): {outcome.told}"
+        yield f"- {outcome.seed}: {outcome.kind} ({outcome.seconds:.1f} s): {outcome.words}"
     for name, said in outcome.others.items():
         if said != "same":
             yield f"- {outcome.seed}, {name}: {said}"

@@ -259,7 +259,7 @@ def _run(options: argparse.Namespace) -> int:
     scene, settings = load(options.file), _settings(options)
     outputs = outputs_of(options, scene)
 
-    def told(solution: Answer) -> None:
+    def show(solution: Answer) -> None:
         solved = time.perf_counter() - begin
         _give(solution, lambda: report(solution, solved), outputs)
 
@@ -267,16 +267,16 @@ def _run(options: argparse.Namespace) -> int:
         solution, checks = _answered(options.file, scene, settings)
     except SolveError as error:
         if isinstance(error.reached, (Solution, Trajectory)):
-            told(error.reached)
+            show(error.reached)
         raise
-    told(solution)
+    show(solution)
     return _verdict(solution, checks)
 
 
-def _give(answer: object, tell: Callable[[], object], outputs: Sequence[Output]) -> None:
+def _give(answer: object, show: Callable[[], object], outputs: Sequence[Output]) -> None:
     """Print an answer and write its files; what fails of one does not cost the other."""
     try:
-        tell()
+        show()
     finally:
         for output in outputs:
             output.write(answer)
@@ -333,7 +333,7 @@ def _progress(scene: Scene) -> Iterator[Callable[[float], object] | None]:
     look = "{desc}{percentage:3.0f}% |{bar}| {n:.4g} of {total:.4g} s, {elapsed} and {remaining} to go"
     with tqdm(total=end, desc="run 1: ", bar_format=look, leave=False, file=sys.stderr) as bar:
 
-        def told(reached: float) -> None:
+        def show(reached: float) -> None:
             nonlocal runs, last
             if reached <= last:
                 # A finer run checks the one before.
@@ -343,7 +343,7 @@ def _progress(scene: Scene) -> Iterator[Callable[[float], object] | None]:
             last = reached
             bar.update(min(reached, end) - bar.n)
 
-        yield told
+        yield show
 
 
 EVERY = 10.0
@@ -351,13 +351,13 @@ EVERY = 10.0
 
 
 @contextlib.contextmanager
-def _lines(told: Callable[[], str]) -> Iterator[None]:
+def _lines(show: Callable[[], str]) -> Iterator[None]:
     """Now and then a line on the standard error stream that says how far something is."""
     begin, over = time.perf_counter(), threading.Event()
 
     def go_on() -> None:
         while not over.wait(EVERY):
-            print(f"sfetcas: {told()}, {time.perf_counter() - begin:.0f} s so far", file=sys.stderr, flush=True)
+            print(f"sfetcas: {show()}, {time.perf_counter() - begin:.0f} s so far", file=sys.stderr, flush=True)
 
     lines = threading.Thread(target=go_on, daemon=True)
     lines.start()
@@ -510,11 +510,11 @@ def _named_progress() -> Iterator[Callable[[str], object]]:
 
     with tqdm(bar_format="run {n}: {desc} [{elapsed}]", leave=False, file=sys.stderr) as bar:
 
-        def told(name: str) -> None:
+        def show(name: str) -> None:
             bar.set_description_str(name, refresh=False)
             bar.update()
 
-        yield told
+        yield show
 
 
 def _span(text: str) -> tuple[str, tuple[float, float] | None]:

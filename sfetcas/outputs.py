@@ -138,8 +138,8 @@ def outputs_of_sweep(options: argparse.Namespace) -> list[Output]:
     return found
 
 
-def _text(told: Callable[[Trade], str]) -> Writer:
-    return lambda trade, there: there.write_text(told(trade))
+def _text(text_of: Callable[[Trade], str]) -> Writer:
+    return lambda trade, there: there.write_text(text_of(trade))
 
 
 def _front(path: Path) -> Writer:

@@ -222,11 +222,11 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
         units |= {"stop": units.get("moment", "N")}
         print(f"  spring {name}: {', '.join(f'{key} {value:.9g} {units[key]}' for key, value in found.items())}")
     for name in step.model.scene.motions:
-        told = [
+        drives = [
             f"{key} {_effort(value)} {answer_name(f'motions.{name}.{key}').kind.unit}"
             for key, value in step.motion(name).items()
         ]
-        print(f"  motion {name}: {', '.join(told)}")
+        print(f"  motion {name}: {', '.join(drives)}")
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate
@@ -329,9 +329,9 @@ def _report_quantities(found: Sweep) -> None:
         numbers = found.table[name][found.solved]
         numbers = numbers[np.isfinite(numbers)]
         if len(numbers):
-            told = [*np.quantile(numbers, [0.0, 0.25, 0.5, 0.75, 1.0]), numbers.mean()]
+            statistics = [*np.quantile(numbers, [0.0, 0.25, 0.5, 0.75, 1.0]), numbers.mean()]
             spread = f"{numbers.std(ddof=1):.4g}" if len(numbers) > 1 else ""
-            rows.append((name, *(f"{value + 0.0:.9g}" for value in told), spread))
+            rows.append((name, *(f"{value + 0.0:.9g}" for value in statistics), spread))
     widths = [max(len(row[i]) for row in rows) for i in range(len(heads))]
     for row in rows:
         print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())

@@ -135,10 +135,14 @@ def table() -> str:
     """All of them in lines: name, value, unit, meaning."""
     body = ast.parse(inspect.getsource(sys.modules[__name__])).body
     lines = []
-    for entry, told in pairwise(body):
-        if isinstance(entry, ast.Assign) and isinstance(told, ast.Expr) and isinstance(told.value, ast.Constant):
+    for entry, docstring in pairwise(body):
+        if (
+            isinstance(entry, ast.Assign)
+            and isinstance(docstring, ast.Expr)
+            and isinstance(docstring.value, ast.Constant)
+        ):
             name, value = ast.unparse(entry.targets[0]), ast.literal_eval(entry.value)
             if isinstance(value, float):
-                meaning, unit = str(told.value.value).split("\n")[0].rstrip(".").split("; ")
+                meaning, unit = str(docstring.value.value).split("\n")[0].rstrip(".").split("; ")
                 lines.append(f"{name:12}{value:<8g}{unit:52}{meaning}")
     return "\n".join(lines)

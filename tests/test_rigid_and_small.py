@@ -124,8 +124,8 @@ def test_free_motions_in_the_same_words_are_told_once():
     found = sfetcas.Prepared(model_of(chain(100), 4, 4)).diagnosis
     distinct = list(dict.fromkeys(found.motions))
     assert len(distinct) < found.mobility
-    assert found.told(found.mobility).split("; ") == distinct
-    *said, more = found.told(4).split("; ")
+    assert found.described(found.mobility).split("; ") == distinct
+    *said, more = found.described(4).split("; ")
     assert said == distinct[:4]
     assert more == f"and {sum(motion not in said for motion in found.motions)} more"
 

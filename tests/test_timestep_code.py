@@ -59,7 +59,7 @@ def test_steps_are_those_of_the_simulation(integrator):
     state = made.begin
     for _ in range(50):
         state = made.step(state, 0.01)
-    found = dict(zip([r.name for r in made.results.results], np.split(made.told(state), splits(made)), strict=True))
+    found = dict(zip([r.name for r in made.results.results], np.split(made.outputs(state), splits(made)), strict=True))
     last = solve(scene).last
     # Elements are given: both have the same mesh; the prediction of a step does not change where Newton's method ends.
     assert found["nodes.B.position"] == pytest.approx(last.position("B"), abs=1e-9)
@@ -78,11 +78,11 @@ def test_loads_in_the_step_are_arguments():
     for _ in range(20):
         state = made.step(state, 0.005, [0.0, 1.0])
     # Without load it stays where it is.
-    assert made.told(state, [0.0, 1.0])[:4] == pytest.approx(made.told(made.begin, [0.0, 1.0])[:4], abs=1e-14)
+    assert made.outputs(state, [0.0, 1.0])[:4] == pytest.approx(made.outputs(made.begin, [0.0, 1.0])[:4], abs=1e-14)
     soft, stiff = made.begin, made.begin
     for _ in range(60):
         soft, stiff = made.step(soft, 0.005, [2.0, 0.5]), made.step(stiff, 0.005, [2.0, 40.0])
-    y = [made.told(one)[5] for one in (soft, stiff)]
+    y = [made.outputs(one)[5] for one in (soft, stiff)]
     assert y[0] > 1.5 * y[1] > 0.0
 
 
@@ -168,7 +168,7 @@ def test_unit_for_cosimulation(tmp_path):
     for _ in range(50):
         state = made.step(state, 0.01, loads)
     told = dict(
-        zip([r.name for r in made.results.results], np.split(made.told(state, loads), splits(made)), strict=True)
+        zip([r.name for r in made.results.results], np.split(made.outputs(state, loads), splits(made)), strict=True)
     )
     assert time == pytest.approx(0.5)
     # The clock of the co-simulation sums up its steps: their lengths differ by rounding.

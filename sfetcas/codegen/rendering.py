@@ -201,7 +201,7 @@ class Writer(abc.ABC):
     def _values(self) -> dict[str, object]:
         name, upper = self.name, self.name.upper()
         title = self.scene.title.strip() or "an untitled scene"
-        known, told = self.arguments.arguments, self.results.results
+        known, outputs = self.arguments.arguments, self.results.results
         sizes = sizes_of(self.functions)
         sizes["w"] = max(sizes["w"], self.arguments.expressions.total)
         statuses = [(f"{upper}_{key}", value, meaning) for key, value, meaning in self.statuses]
@@ -217,7 +217,7 @@ class Writer(abc.ABC):
             "n_results": self.results.size,
             "n_states": self.states,
             "argument_places": _places(f"{upper}_ARG", [(a.name, len(a.default), a.unit) for a in known]),
-            "result_places": _places(f"{upper}_RES", [(r.name, r.size, r.unit) for r in told]),
+            "result_places": _places(f"{upper}_RES", [(r.name, r.size, r.unit) for r in outputs]),
             "statuses": enumerated(statuses),
             "messages": "\n".join(f"    case {key}: return {c_string(meaning)};" for key, _, meaning in statuses),
             "defaults": numbers(self.arguments.defaults),
@@ -236,7 +236,7 @@ class Writer(abc.ABC):
     def _manifest(self) -> dict[str, Any]:
         """The manifest: sizes, and name, place, unit, shape and meaning of every argument and result."""
         arguments, first = [], 0
-        known, told = self.arguments.arguments, self.results.results
+        known, outputs = self.arguments.arguments, self.results.results
         for identifier, one in zip(identifiers(a.name for a in known), known, strict=True):
             entry: dict[str, Any] = {"name": one.name, "constant": f"{self.name.upper()}_ARG_{identifier}"}
             shape = [] if one.components is None else [len(one.default)]
@@ -251,7 +251,7 @@ class Writer(abc.ABC):
             arguments.append(entry)
             first += len(one.default)
         results, first = [], 0
-        for identifier, result in zip(identifiers(r.name for r in told), told, strict=True):
+        for identifier, result in zip(identifiers(r.name for r in outputs), outputs, strict=True):
             entry = {"name": result.name, "constant": f"{self.name.upper()}_RES_{identifier}", "first": first}
             entry |= {"size": result.size, "shape": list(result.shape)}
             entry |= {"unit": result.unit, "meaning": result.meaning}

@@ -108,7 +108,7 @@ class TimeStep:
         return ca.Function(f"{self.name}_advance", [state, h, p], results, ["state", "h", "arguments"], names)
 
     @functools.cached_property
-    def tell(self) -> ca.Function:
+    def output(self) -> ca.Function:
         """(state, arguments) -> results (results,) in their SI units."""
         layout = self.system.layout
         state, p = ca.MX.sym("state", len(self.begin)), ca.MX.sym("arguments", layout.factors)
@@ -116,8 +116,8 @@ class TimeStep:
         parts = dict(zip(self.sizes, ca.vertsplit(state, bounds), strict=True))
         velocity = ca.reshape(parts["rates"], layout.x, self.method.kept)[:, 0]
         still = ca.vertcat(parts["q"], parts["y"], parts["lam"], parts["near"])
-        told = answers_of_motion(self.results, self.arguments, self.system, self.time)
-        as_given = told(still, p, velocity)
+        outputs = answers_of_motion(self.results, self.arguments, self.system, self.time)
+        as_given = outputs(still, p, velocity)
         return ca.Function(
             f"{self.name}_results", [state, p], [ca.densify(as_given)], ["state", "arguments"], ["results"]
         )
@@ -143,10 +143,10 @@ class TimeStep:
         good = size[0] <= LAST_CHANGE and np.isfinite(after).all()
         return after if good else np.full(len(state), np.nan)
 
-    def told(self, state: Array, arguments: Array | None = None) -> Array:
+    def outputs(self, state: Array, arguments: Array | None = None) -> Array:
         """The results (results,) at a state, in their SI units."""
         p = self.arguments.defaults if arguments is None else np.asarray(arguments, dtype=float)
-        return np.array(self.tell(state, p)).ravel()
+        return np.array(self.output(state, p)).ravel()
 
 
 def time_step(
@@ -176,8 +176,8 @@ def time_step(
     mesh = simulation.mesh if simulation.prescribed else simulation.mesh.refined()
     base = assemble(scene, mesh, assembly="nodal")
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
-    told = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
-    known = Arguments(scene, base, asked_for(scene, arguments), told, f"{name}_")
+    outputs = Results(base, results or default_motion_results(base), chosen_places(members, places or {}), motion=True)
+    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_")
     own = StageEquations(Equations(base), masses_of(base), "interpreted")
     system = parametric_stages(known, own.masses)
     begun, _ = simulation.begun(own)
@@ -191,7 +191,7 @@ def time_step(
     stages, layout = method.stages, system.layout
     still = np.zeros(system.turns * layout.rotations * stages + layout.y * stages)
     moved = [memory.q.ravel(), memory.y, memory.lam, still, memory.x, memory.rates.ravel(), memory.unwrapped]
-    return TimeStep(name, scene, known, told, system, method, own.masses.time, np.concatenate([*moved, np.zeros(1)]))
+    return TimeStep(name, scene, known, outputs, system, method, own.masses.time, np.concatenate([*moved, np.zeros(1)]))
 
 
 def _method(simulation: Simulation) -> Method:

@@ -36,7 +36,7 @@ class EquilibriumWriter(Writer):
     def functions(self) -> list[ca.Function]:
         """The functions of the solver and its program, and those that compute the results."""
         solver, program = self.solver, self.arguments.program
-        found = [solver.prepare, solver.tell, program.begin, program.hold, program.move, program.at, program.left]
+        found = [solver.prepare, solver.output, program.begin, program.hold, program.move, program.at, program.left]
         if self.model.minimisable:
             found += [program.merit, program.convex]
         found.append(_pivots() if self.model.has_potential else program.linear)

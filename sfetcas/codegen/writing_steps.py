@@ -42,7 +42,7 @@ class StepWriter(Writer):
     @property
     def functions(self) -> list[ca.Function]:
         """The step, and the results at a state."""
-        return [self.step.advance, self.step.tell]
+        return [self.step.advance, self.step.output]
 
     def more(self, values: dict[str, object]) -> dict[str, str]:
         """The Python script that makes an FMI unit of the step."""
@@ -121,7 +121,7 @@ class StepWriter(Writer):
             p = shares[:, None] * self.arguments.defaults
             state = step.step(state, self.usual, p)
             arguments.append(p.ravel())
-            results.append(step.told(state, p[-1]))
+            results.append(step.outputs(state, p[-1]))
         return {
             "n_cases": CHECKED,
             "case_arguments": rows(arguments),

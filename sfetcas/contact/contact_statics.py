@@ -130,8 +130,8 @@ class ContactRun:
     @property
     def jumped(self) -> tuple[str, ...]:
         """Notes about the last way, and the factors at which it jumped to another state."""
-        told = (self.elsewhere,) if self.elsewhere else ()
-        return told + tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
+        notes = (self.elsewhere,) if self.elsewhere else ()
+        return notes + tuple(dict.fromkeys(f"jumped {near_factor(factor)}: {JUMPED}" for factor in self.jumps))
 
     def retracted(self, base: Mesh, factor: float, free: Held) -> Held | None:
         """The state followed from ``free``, without obstacles, as they move from outside of it to their places."""

@@ -211,9 +211,9 @@ class Toucher:
             elif sudden:
                 self.snapped.append(trial)
             assert there is not None
-            told = there.touched.fields.too_large()
-            if told:
-                raise SolveError(Status.BENT, told)
+            message = there.touched.fields.too_large()
+            if message:
+                raise SolveError(Status.BENT, message)
             jumped = falls or trial in self.snapped or now is None
             rate = np.inf if jumped else turned / (trial - done)
             since = None if jumped or now is None else (done, now)

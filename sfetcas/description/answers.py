@@ -199,9 +199,9 @@ APPLIES: dict[str, Callable[[Any, Any], bool]] = {
 def _kind(row: str) -> AnswerKind:
     name, unit, components, where, meaning = (cell.strip() for cell in row.split(" |"))
     name, _, at = name.partition(" ")
-    told = EVERYWHERE if where == "all" else tuple(where.split(", "))
+    analyses = EVERYWHERE if where == "all" else tuple(where.split(", "))
     applies = APPLIES.get(name, lambda scene, record: True)
-    return AnswerKind(name, unit, meaning, told, tuple(components.split()), bool(at), applies)
+    return AnswerKind(name, unit, meaning, analyses, tuple(components.split()), bool(at), applies)
 
 
 ANSWERS = tuple(_kind(row) for row in TABLE.strip().splitlines())
@@ -373,12 +373,12 @@ def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
         Which names or keys it has.
     """
     kind = name.kind
-    told = [where] if where else ANALYSES.get(scene.analysis.type, [STATICS])
-    if not set(told) & set(kind.where):
-        known = [one for one in ANSWERS if set(told) & set(one.where)]
+    analyses = [where] if where else ANALYSES.get(scene.analysis.type, [STATICS])
+    if not set(analyses) & set(kind.where):
+        known = [one for one in ANSWERS if set(analyses) & set(one.where)]
         same = [f"{one.table}.*.{one.key}" if one.named else one.name for one in known if one.table == kind.table]
         tables = dict.fromkeys(f"{one.table}.*" if one.table else one.name for one in known)
-        message = f"found {name.quantity!r}, told of {', '.join(kind.where)} only, accepted of {told[0]}: "
+        message = f"found {name.quantity!r}, told of {', '.join(kind.where)} only, accepted of {analyses[0]}: "
         raise SceneError(message + ", ".join(filter(None, same) if kind.table and same else tables))
     if not kind.named:
         return

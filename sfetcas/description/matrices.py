@@ -145,11 +145,11 @@ def _from_npy(content: bytes, path: Path) -> Floats:
         raise ValueError(f"the file {path} holds no arrays of numbers of numpy")
     if kind.kind not in "fiu":
         raise ValueError(f"the file {path} holds {kind.name}, accepted: real numbers")
-    told = " x ".join(map(str, shape))[:60]
+    sizes = " x ".join(map(str, shape))[:60]
     if not all(type(size) is int and 0 < size <= LARGEST for size in shape):
-        raise ValueError(f"the file {path} announces {told} numbers, accepted: 1 to {LARGEST} rows and columns")
+        raise ValueError(f"the file {path} announces {sizes} numbers, accepted: 1 to {LARGEST} rows and columns")
     if math.prod(shape) * kind.itemsize > len(content):
-        raise ValueError(f"the file {path} announces {told} numbers and holds fewer, accepted: all of them")
+        raise ValueError(f"the file {path} announces {sizes} numbers and holds fewer, accepted: all of them")
     stream.seek(0)
     try:
         return np.asarray(np.lib.format.read_array(stream, allow_pickle=False), dtype=float)

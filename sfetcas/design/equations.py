@@ -129,8 +129,8 @@ class CaseEquations:
         undeformed = ca.MX.sym("undeformed", self.arguments.undeformed(self._numbers).numel())
         program = self.program
         symbols = [program.state_symbol, program.symbol, undeformed]
-        told = ca.Function("outputs", symbols, [ca.densify(self.results.expression(program, undeformed))])
-        return told(self._there, self._given, self.arguments.undeformed(self._numbers))
+        outputs = ca.Function("outputs", symbols, [ca.densify(self.results.expression(program, undeformed))])
+        return outputs(self._there, self._given, self.arguments.undeformed(self._numbers))
 
     @functools.cached_property
     def outputs(self) -> ca.Function:

@@ -349,13 +349,13 @@ class Solving:
     # -- the answer -----------------------------------------------------------------------------------
 
     def _iterate(self, program: Assembled, result: NLPResult) -> Iterate:
-        told = {
+        answers = {
             key: program.pieces.value(program.pieces.blocks[f"answer {i}"], result.x)
             for i, key in enumerate(self.formulation.asked)
         }
         return Iterate(
             values=program.values(result.x),
-            asked=told,
+            asked=answers,
             states=program.arrived(result.x),
             objective=result.f / program.weight,
             message=result.message,
@@ -371,8 +371,8 @@ class Solving:
             found[kept] = result.lam[pieces == REQUIRED + one.name] / unit / program.weight
             multipliers[one.name] = found
         unstable = [self.formulation.cases[i] for i, c in enumerate(cases) if c.equilibrium.certificate.stable is False]
-        told = [*unstable[:3], *([counted(len(unstable) - 3, "other", "others")] if unstable[3:] else [])]
-        notes = [labelled(", ".join(told), "unstable")] if unstable else []
+        listed = [*unstable[:3], *([counted(len(unstable) - 3, "other", "others")] if unstable[3:] else [])]
+        notes = [labelled(", ".join(listed), "unstable")] if unstable else []
         return Optimum(
             iterate=self._iterate(program, result),
             cases=tuple(cases),

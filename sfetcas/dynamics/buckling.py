@@ -69,8 +69,8 @@ def buckling_factors(prepared: Prepared, count: int) -> Array:
     inverse, _ = largest(apply, equations.total, BOTH_SIDES * count)
     sizes = np.abs(inverse)
     turned = largest_rotation(equations, start.tangent.z) / abs(start.tangent.factor)
-    told = sizes > FAR * max(turned, sizes.max(initial=0.0))
-    real = inverse[(np.abs(inverse.imag) <= IMAGINARY * sizes) & told].real
+    certain = sizes > FAR * max(turned, sizes.max(initial=0.0))
+    real = inverse[(np.abs(inverse.imag) <= IMAGINARY * sizes) & certain].real
     factors = 1.0 / real
     return np.asarray(factors[np.lexsort((np.abs(factors), factors < 0.0))][:count])
 

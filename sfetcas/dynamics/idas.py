@@ -139,7 +139,7 @@ class Idas(Integrator):
                 self.norm, self.gap = projection.norm, projection.gap
                 if t in wanted:
                     yield sample
-                self.told(t)
+                self.proceed(t)
 
     def _pieces(self, course: TimeGrid) -> list[_Piece]:
         """Pieces up to the end."""

@@ -118,7 +118,7 @@ class Integrator(abc.ABC):
         """Further states that are known where the motion was ended early."""
         return iter(())
 
-    def told(self, t: float) -> None:
+    def proceed(self, t: float) -> None:
         """Report to ``progress`` that a dimensionless time has been reached."""
         if self._progress is not None:
             self._progress(t * self.system.masses.time)
@@ -156,7 +156,7 @@ class Stages(Integrator):
                 self._judge(taken)
             yield from self._sampler.feed(taken)
             if within:
-                self.told(taken.after.t)
+                self.proceed(taken.after.t)
         yield from self.rest()
 
     def rest(self) -> Iterator[Sample]:

@@ -199,15 +199,15 @@ class Simulation:
             run.instants += [mover.instant(sample) for sample in integrator.rest()]
         if watch is not None:
             run.instants = watch.up_to_end(run.instants, self.times)
-            run.notes = (*run.notes, watch.told(run.instants))
+            run.notes = (*run.notes, watch.note(run.instants))
         run.count, run.gap, run.norm = integrator.count, integrator.gap, integrator.norm
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
     def _refuse_large(self, instant: MotionState) -> None:
-        told = instant.fields.too_large() if self.superelements else ""
-        if told:
-            raise SolveError(Status.BENT, f"at {instant.time:.6g} s: {told}")
+        message = instant.fields.too_large() if self.superelements else ""
+        if message:
+            raise SolveError(Status.BENT, f"at {instant.time:.6g} s: {message}")
 
     def begun(self, system: StageEquations) -> tuple[InitialState, tuple[str, ...]]:
         """Where the motion begins, and what is to be said of it."""
@@ -220,8 +220,8 @@ class Simulation:
         equations, factors = system.equations, system.factors(0.0)
         loading = system.loading(factors)
         state = equations.holding(state, loading)
-        rates, told = velocities(system, equations, state)
-        return InitialState(state, rates, *system.rates(state, factors, rates)), (*notes, *told)
+        rates, more = velocities(system, equations, state)
+        return InitialState(state, rates, *system.rates(state, factors, rates)), (*notes, *more)
 
     @property
     def before(self) -> Equilibrium:

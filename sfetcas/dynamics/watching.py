@@ -57,7 +57,7 @@ class Watch:
         end = self._end(instants)
         return [*(instant for instant in wanted if instant.time < end.time), end]
 
-    def told(self, instants: Sequence[MotionState]) -> str:
+    def note(self, instants: Sequence[MotionState]) -> str:
         """A sentence on how the motion ended."""
         until = self._until
         beyond = f"above {until.above:g}" if until.above is not None else f"below {until.below:g}"

@@ -373,9 +373,9 @@ def _with_unique_reactions(found: EquilibriumResult) -> EquilibriumResult:
     solved, equations, loading = found.solved, found.solved.equations, found.solved.loading
     loose = loose_rows(equations, solved.point)
     if not loose.size:
-        told = stretched(equations, solved.point) if solved.multipliers > LARGE else ""
-        if told:
-            raise SolveError(Status.STRETCHED, told, solved.state)
+        message = stretched(equations, solved.point) if solved.multipliers > LARGE else ""
+        if message:
+            raise SolveError(Status.STRETCHED, message, solved.state)
         return found
     state = shared(equations, solved.state, loading, loose, reactions=True)
     point = equations.at(state, loading)

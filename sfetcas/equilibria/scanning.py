@@ -86,8 +86,8 @@ class Scan:
 
     def sentence(self) -> str:
         """A sentence on how complete the scan is, for the notes of the answer."""
-        told = counted(self.roots, "equilibrium", "equilibria")
-        text = f"a scan of the angle at the free end over one turn has {told}, and there are no others"
+        count = counted(self.roots, "equilibrium", "equilibria")
+        text = f"a scan of the angle at the free end over one turn has {count}, and there are no others"
         if self.grazing:
             text += (
                 f", but for {counted(self.grazing, 'pair')} that nearly meet, of which one, both or none may be listed"
@@ -174,11 +174,14 @@ class _Shooting:
         )
         lengths = np.repeat(np.diff(knots) / count, count)
         inside = begins[:, None] + lengths[:, None] * np.array([WITHIN, 0.5, 1.0 - WITHIN])
-        told = fields.along(name, inside.ravel())["force"].reshape(*inside.shape, 3)
+        section_forces = fields.along(name, inside.ravel())["force"].reshape(*inside.shape, 3)
         tangents = line.tangents(inside.ravel()).reshape(*inside.shape, 3)
         rest, stiffness = np.arctan2(tangents[..., 1], tangents[..., 0]), section.stiffness(inside.ravel())[:, axis]
         soft = line.length / stiffness.reshape(inside.shape)
-        pull = line.length * np.hypot(told[..., 0], told[..., 1]), np.arctan2(told[..., 1], told[..., 0])
+        pull = (
+            line.length * np.hypot(section_forces[..., 0], section_forces[..., 1]),
+            np.arctan2(section_forces[..., 1], section_forces[..., 0]),
+        )
         # Of the moment of a place the end of the step before it and the begin of the one after differ.
         jump = np.zeros(len(begins) + 1)
         jump[np.searchsorted(begins, self.places[moments != 0.0] - tolerances.DECIMAL)] = moments[moments != 0.0]

@@ -85,8 +85,8 @@ def cold(prepared: Prepared, loading: Loading, solver: SolverName = "ipopt") -> 
         rows = np.abs(equations.at(state, loading).residual[equations.unknowns :])
         worst = ", ".join(equations.row_names[i] for i in np.flatnonzero(rows > 0.3 * rows.max())[:4])
         detail = f"the closings miss by {gap * prepared.model.scales.length:.3g} m at {worst}"
-        told = contradiction(equations, state, loading)
-        detail += f"; {told}" if told else ""
+        message = contradiction(equations, state, loading)
+        detail += f"; {message}" if message else ""
         raise SolveError(Status.INFEASIBLE, detail, state)
     return *prepared.minimise(loading, state), "minimum"
 

@@ -269,8 +269,8 @@ class Configuration:
     @staticmethod
     def _known(name: str, names: tuple[str, ...], kind: str) -> str:
         if name not in names:
-            told = nearest(name, names) if names else f"the scene has no {kind}"
-            raise SceneError(f"found {kind} {name!r}; {told}")
+            message = nearest(name, names) if names else f"the scene has no {kind}"
+            raise SceneError(f"found {kind} {name!r}; {message}")
         return name
 
 
@@ -460,26 +460,26 @@ def refuse_large(fields: Fields) -> None:
     SolveError
         Names the small member with the largest deformation.
     """
-    told = fields.too_large()
-    if told:
-        raise SolveError(Status.BENT, told)
+    message = fields.too_large()
+    if message:
+        raise SolveError(Status.BENT, message)
 
 
 def superelement_notes(fields: Fields) -> tuple[str, ...]:
     """Notes on small members beyond linear elasticity by deformation or axial force; error estimates do not see it."""
     superelements = [name for name, member in fields.model.scene.members.items() if member.type == "small"]
-    told = "the error estimate does not tell"
+    message = "the error estimate does not tell"
     notes = []
     for measure, limit, words in (
         (
             fields.bent,
             LARGEST_DEFORMATION,
-            f"bends by {{:.2g}} of its length or rad{{}}: its linear elasticity is for a few percent, and {told}",
+            f"bends by {{:.2g}} of its length or rad{{}}: its linear elasticity is for a few percent, and {message}",
         ),
         (
             fields.pulled,
             LARGEST_AXIAL_FORCE,
-            f"carries {{:.2g}} of 12 EI / L^2 along it{{}}: what that does across it is left out, and {told}",
+            f"carries {{:.2g}} of 12 EI / L^2 along it{{}}: what that does across it is left out, and {message}",
         ),
     ):
         found = {name: measure(name) for name in superelements}

@@ -209,8 +209,8 @@ class Ways:
         apart = pilot.distance(alone.solved.state, grown.solved.state) > 1e-3
         # What falls from its start guess is nearest to no minimum.
         held = pilot.diagnosis.mobility == 0
-        told = held and alone.solved.multipliers <= BEYOND and not grown.notes
-        if told and apart and alone.stability.negative == 0:
+        notable = held and alone.solved.multipliers <= BEYOND and not grown.notes
+        if notable and apart and alone.stability.negative == 0:
             grown.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
         return grown
 
@@ -220,7 +220,7 @@ class Ways:
             free, taut = pilot.diagnosis, pilot.lacks_slack
         except np.linalg.LinAlgError:
             return error
-        details = [f"free to move: {free.told(3)}"] if free.mobility else []
+        details = [f"free to move: {free.described(3)}"] if free.mobility else []
         details += [error.detail] if error.detail else []
         if taut and error.status not in (Status.INFEASIBLE, Status.STRETCHED):
             rows = ", ".join(dict.fromkeys(free.redundant))

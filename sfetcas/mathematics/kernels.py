@@ -111,9 +111,9 @@ def _private(folder: Path) -> bool:
     foreign = found.st_uid not in (os.geteuid(), RULER)
     if foreign or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         why = "it belongs to somebody else" if foreign else "others may write to it"
-        told = f"{folder}: no kernels are taken from this folder or compiled, which costs time only, as {why}"
+        message = f"{folder}: no kernels are taken from this folder or compiled, which costs time only, as {why}"
         warnings.warn(
-            f"{told}; accepted: a folder of your own of mode 700, or another one as SFETCAS_CACHE", stacklevel=1
+            f"{message}; accepted: a folder of your own of mode 700, or another one as SFETCAS_CACHE", stacklevel=1
         )
         return False
     return True

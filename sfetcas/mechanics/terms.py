@@ -332,9 +332,11 @@ def _symbols(kind: Term) -> tuple[list[ca.SX], tuple[list[Side], list[Side]]]:
     return arguments, ([ca.vertsplit(q[:, i]) for i in range(turns)], [ca.vertsplit(u[:, i]) for i in range(places)])
 
 
-def _shared(name: str, arguments: list[ca.SX], results: list[ca.SX], given: list[str], told: list[str]) -> ca.Function:
+def _shared(
+    name: str, arguments: list[ca.SX], results: list[ca.SX], given: list[str], outputs: list[str]
+) -> ca.Function:
     """A function that evaluates each common subexpression once: derivatives repeat sines and cosines many times."""
-    return ca.Function(name, arguments, results, given, told, {"cse": True})
+    return ca.Function(name, arguments, results, given, outputs, {"cse": True})
 
 
 def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:

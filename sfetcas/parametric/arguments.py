@@ -387,9 +387,9 @@ class Arguments:
         self.expressions = Expressions(Equations(self.model, kernels="interpreted"), "interpreted")
         everything = Program(self.expressions, self._every())
         self._layout, self._groups = everything.sizes, list(self.model.groups)
-        told, data = Active.of(results.rest(symbolic)), self._data(symbolic, everything)
+        undeformed, data = Active.of(results.rest(symbolic)), self._data(symbolic, everything)
         self._undeformed, self._given = (
-            _Part(part, self._symbols, name) for part, name in ((told, "rest"), (data, "data"))
+            _Part(part, self._symbols, name) for part, name in ((undeformed, "rest"), (data, "data"))
         )
         self._check(symbolic)
         self.program = Program(self.expressions, self._varying(), prefix=prefix)
@@ -664,8 +664,8 @@ def _carry_ends(scene: Scene, tree: dict[str, Any], numbers: Mapping[str, Any]) 
         first, last = member.nodes[0], member.nodes[-1]
         moved = any(n.startswith((f"members.{name}.shape.", f"nodes.{first}.position.")) for n in numbers)
         others = [n for n, other in scene.members.items() if last in other.nodes and n != name]
-        told = any(n.startswith(f"nodes.{last}.position.") for n in numbers)
-        if not moved or told or others or scene.nodes[last].support != "free":
+        listed = any(n.startswith(f"nodes.{last}.position.") for n in numbers)
+        if not moved or listed or others or scene.nodes[last].support != "free":
             continue
         make = _unchecked if any(isinstance(value, Active) for value in numbers.values()) else _checked
         shape = _with(member.shape, tree.get("members", {}).get(name, {}).get("shape", {}), make)

@@ -80,14 +80,14 @@ class EquilibriumSolver:
         return self.arguments.prepare(f"{self.name}_prepare")
 
     @functools.cached_property
-    def tell(self) -> ca.Function:
+    def output(self) -> ca.Function:
         """``(arguments, state, given) -> results``."""
         program = self.arguments.program
         p = ca.MX.sym("arguments", len(self.arguments.defaults))
-        told = self.results.expression(program, self.arguments.undeformed(p))
+        outputs = self.results.expression(program, self.arguments.undeformed(p))
         names = ["arguments", "state", "given"]
         symbols = [p, program.state_symbol, program.symbol]
-        return ca.Function(f"{self.name}_results", symbols, [ca.densify(told)], names, ["results"])
+        return ca.Function(f"{self.name}_results", symbols, [ca.densify(outputs)], names, ["results"])
 
     @functools.cached_property
     def sensitivities(self) -> ca.Function:
@@ -97,7 +97,7 @@ class EquilibriumSolver:
         """
         program = self.arguments.program
         p, state, given = ca.MX.sym("arguments", len(self.arguments.defaults)), program.state_symbol, program.symbol
-        told = self.results.expression(program, self.arguments.undeformed(p))
+        outputs = self.results.expression(program, self.arguments.undeformed(p))
         # Along the arguments only: whole derivatives by states would be a hundred times the code.
         given_by_p = ca.densify(ca.jacobian(self.arguments.given(p), p))
         residual = program.stationarity.residual
@@ -106,7 +106,7 @@ class EquilibriumSolver:
         out = ca.jtimes(residual, given, given_by_p) + ca.jtimes(residual, state, held_by_p)
         step = -ca.solve(program.matrix, ca.densify(out), "qr", {"eps": 1e-300})
         changed = ca.densify(held_by_p + ca.mtimes(program.moving, step))
-        found = ca.jacobian(told, p) + ca.jtimes(told, given, given_by_p) + ca.jtimes(told, state, changed)
+        found = ca.jacobian(outputs, p) + ca.jtimes(outputs, given, given_by_p) + ca.jtimes(outputs, state, changed)
         names = ["arguments", "state", "given"]
         flat = ca.vec(ca.densify(found).T)
         return ca.Function(f"{self.name}_sensitivity", [p, state, given], [flat], names, ["sensitivities"])
@@ -127,11 +127,11 @@ class EquilibriumSolver:
         if outcome.code not in (Code.SOLVED, Code.UNSTABLE):
             return outcome, nothing
         try:
-            told = np.array(self.tell(p, outcome.state, given)).ravel()
+            outputs = np.array(self.output(p, outcome.state, given)).ravel()
         except RuntimeError:
             # A stiffness of what is singular.
-            told = nothing
-        return (outcome, told) if np.isfinite(told).all() else (replace(outcome, code=Code.NOT_FINITE), nothing)
+            outputs = nothing
+        return (outcome, outputs) if np.isfinite(outputs).all() else (replace(outcome, code=Code.NOT_FINITE), nothing)
 
     @property
     def unique(self) -> bool:
@@ -140,8 +140,8 @@ class EquilibriumSolver:
 
     def with_results(self, names: Sequence[str]) -> EquilibriumSolver:
         """This solver with other results, given by their names."""
-        told = Results(self.model, names, self.results.places, unique=self.unique)
-        return replace(self, results=told)
+        outputs = Results(self.model, names, self.results.places, unique=self.unique)
+        return replace(self, results=outputs)
 
     def by_name(self, results: Array) -> dict[str, Array]:
         """The results (results,) by their names, each in its shape and unit."""
@@ -186,14 +186,14 @@ def equilibrium_solver(
     members = [n for n, member in scene.members.items() if member.type == "flexible"]
     unique = not any(note.startswith(NOT_UNIQUE) for note in answer.notes)
     names = results or default_results(base, unique=unique)
-    told = Results(base, names, chosen_places(members, places or {}), unique=unique)
-    known = Arguments(scene, base, asked_for(scene, arguments), told, f"{name}_")
+    outputs = Results(base, names, chosen_places(members, places or {}), unique=unique)
+    known = Arguments(scene, base, asked_for(scene, arguments), outputs, f"{name}_")
     start = None
     if prepared.lacks_slack or any(node.start is not None for node in scene.nodes.values()):
         # Straight members without slack bend to no side by themselves; a start chooses one.
         start = known.program.flat(prepared.guess(base.loading(scene.analysis.steps[-1]))[0])
     rules = Rules() if scene.analysis.unstable == "leave" else replace(Rules(), escapes=0)
-    solver = EquilibriumSolver(name, scene, known, told, rules, start, answer)
+    solver = EquilibriumSolver(name, scene, known, outputs, rules, start, answer)
     return solver if start is not None or _same(solver) else replace(solver, start=_answered(solver))
 
 

@@ -333,13 +333,13 @@ class _Search:
         starts: Sequence[ParametricAnswer | None] = self.reached or [None] * len(self._of.cases)
         try:
             found = [self._solved(x, case, start) for case, start in zip(self._of.cases, starts, strict=True)]
-            told = np.stack([np.concatenate([np.ravel(a) for a in one.answers.values()]) for one in found])
+            outputs = np.stack([np.concatenate([np.ravel(a) for a in one.answers.values()]) for one in found])
         except SolveError:
             if not self.reached:
                 raise
             return nothing
         self._tried = found
-        return np.asarray((told[self._of._cases, self._of._row] - self._measured) / self._of.deviations)
+        return np.asarray((outputs[self._of._cases, self._of._row] - self._measured) / self._of.deviations)
 
     def _solved(self, x: Array, case: Values, start: ParametricAnswer | None) -> ParametricAnswer:
         equilibrium = self._of.equilibrium

@@ -171,9 +171,11 @@ class Implicit:
         found = self._expanded(self._outputs)
         if found is None:
             return None
-        x, state, seeds, (told,) = found
-        by_data = ca.jtimes(told, x, ca.vertcat(ca.DM(self.total, self._count), seeds))
-        return ca.Function("by_all", [x, state, seeds], [told, ca.jacobian(told, x[: self.total]), ca.densify(by_data)])
+        x, state, seeds, (outputs,) = found
+        by_data = ca.jtimes(outputs, x, ca.vertcat(ca.DM(self.total, self._count), seeds))
+        return ca.Function(
+            "by_all", [x, state, seeds], [outputs, ca.jacobian(outputs, x[: self.total]), ca.densify(by_data)]
+        )
 
     @functools.cached_property
     def _along(self) -> ca.Function:

@@ -71,8 +71,8 @@ def answers_of_motion(results: Results, arguments: Arguments, system: Parametric
     state, p, rates = ca.MX.sym("state", program.states), ca.MX.sym("numbers", layout.factors), ca.MX.sym("v", layout.x)
     places = ca.reshape(rates[: system.axes * system.places], system.axes, system.places)
     speeds = places * (arguments.model.scales.length / time)
-    told = results.expression(program, arguments.undeformed(p), speeds)
-    as_given = ca.substitute([told], [program.state_symbol, program.symbol], [state, arguments.given(p)])[0]
+    outputs = results.expression(program, arguments.undeformed(p), speeds)
+    as_given = ca.substitute([outputs], [program.state_symbol, program.symbol], [state, arguments.given(p)])[0]
     return ca.Function("answers", [state, p, rates], [ca.densify(as_given)], ["state", "numbers", "v"], ["results"])
 
 

@@ -310,8 +310,8 @@ class _Outputs:
         found = self._whole(name)
         if name.kind.along:
             places = self._results.every[name.record]
-            told = self._results.places[name.record] if name.at is None else [name.at]
-            found = found[[places.index(x) for x in told], :]
+            fractions = self._results.places[name.record] if name.at is None else [name.at]
+            found = found[[places.index(x) for x in fractions], :]
         return found if name.component is None else found[:, name.component]
 
     def _whole(self, name: AnswerName) -> ca.MX:

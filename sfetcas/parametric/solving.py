@@ -267,7 +267,7 @@ class ParametricAnswer:
         solver = self.of.solver
         given = np.array(solver.prepare(self.numbers)).ravel()
         try:
-            return solver.by_name(np.array(solver.tell(self.numbers, self.outcome.state, given)).ravel())
+            return solver.by_name(np.array(solver.output(self.numbers, self.outcome.state, given)).ravel())
         except RuntimeError:
             detail = "a stiffness or compliance that was asked for has no value"
             raise SolveError(Status.SINGULAR, detail) from None
@@ -386,8 +386,8 @@ class ParametricAnswer:
         if outcome.code not in SOLVED:
             raise SolveError(Status.FAILED, f"on half the elements: {MEANINGS[outcome.code]}", outcome)
         results = Results(finer, [one.name for one in self.of.answers], solver.results.places, unique=solver.unique)
-        told = results.expression(program, ca.MX(ca.DM(results.rest(finer))))
-        function = ca.Function("told", [program.state_symbol, program.symbol], [told])
+        outputs = results.expression(program, ca.MX(ca.DM(results.rest(finer))))
+        function = ca.Function("outputs", [program.state_symbol, program.symbol], [outputs])
         there = solver.by_name(np.array(function(outcome.state, given)).ravel())
         return {name: float(np.abs(there[name] - own).max(initial=0.0)) for name, own in self.answers.items()}
 

@@ -82,7 +82,7 @@ class Trace:
     limits: set[int] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
     end: str = "points"
-    told: str = ""
+    message: str = ""
     corners: set[int] = field(default_factory=set)
 
 
@@ -162,8 +162,8 @@ class Tracer:
                 if trace.end == "lost":
                     return trace
                 continue
-            trace.told = self.curve.plain(there.held.prepared).too_large(there.standing)
-            if trace.told:
+            trace.message = self.curve.plain(there.held.prepared).too_large(there.standing)
+            if trace.message:
                 trace.end = "bent"
                 return trace
             end = there.factor if there.factor in self.stops else None
@@ -258,8 +258,8 @@ class Tracer:
         found = self._beyond(now)
         if found is None:
             trace.end = "lost"
-            told = "what touches beyond it was not found, or the path cannot be followed further"
-            trace.notes.append(f"the path ends at factor {now.factor:.6g}: {told}")
+            reason = "what touches beyond it was not found, or the path cannot be followed further"
+            trace.notes.append(f"the path ends at factor {now.factor:.6g}: {reason}")
             return None
         after, turned = found
         if turned:

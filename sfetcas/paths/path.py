@@ -268,12 +268,12 @@ class Path:
         }
 
 
-def ending(end: str, factor: float, count: int, told: str) -> str:
+def ending(end: str, factor: float, count: int, message: str) -> str:
     """A sentence on why a branch of ``count`` points ends at a factor; ``told`` names a small member bent too far."""
     return {
         "range": f"the factor leaves the range at {factor:g}",
         "points": f"{count} points",
         "closed": "it closes on itself",
         "lost": f"it could not be followed beyond factor {factor:.6g}",
-        "bent": f"beyond factor {factor:.6g} a small member bends beyond linear elasticity ({told})",
+        "bent": f"beyond factor {factor:.6g} a small member bends beyond linear elasticity ({message})",
     }[end]

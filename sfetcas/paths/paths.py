@@ -261,7 +261,7 @@ class PathTracing:
         main = _Stretch(trace(curve, start, self.span, self.analysis.points, self.knots))
         way = max(abs(point.factor - start.factor) for point in main.traced.points)
         if main.traced.end == "bent" and way < LEAST_WAY * self._widest:
-            raise SolveError(Status.BENT, main.traced.told, start.state)
+            raise SolveError(Status.BENT, main.traced.message, start.state)
         if main.traced.end == "lost" and way < LEAST_WAY * self._widest:
             detail = f"the path cannot be followed beyond factor {main.traced.points[-1].factor:.3g}"
             raise SolveError(Status.FAILED, detail, start.state)
@@ -285,8 +285,8 @@ class PathTracing:
             return
         along = next((part for part in level.stretches if passes(level.curve, part.traced, first)), None)
         if along is not None:
-            told = f"branch {level.stretches.index(along)}" if along.bifurcation else "the path itself"
-            level.notes += (f"bifurcation {number} to the side {side}: {told} leads along there and is listed once",)
+            which = f"branch {level.stretches.index(along)}" if along.bifurcation else "the path itself"
+            level.notes += (f"bifurcation {number} to the side {side}: {which} leads along there and is listed once",)
             return
         known = [standing for part in level.stretches for standing in part.of_kind("bifurcation")]
         traced = trace(level.curve, first, self.span, self.analysis.points, self.knots)
@@ -392,7 +392,7 @@ class PathTracing:
             steps=entries("step", crossings, [()] * len(crossings)),
             limit_points=entries("limit", [e.standing for e in limits], [_said(e, energy) for e in limits]),
             bifurcations=entries("bifurcation", [e.standing for e in bends], [_said(e, energy) for e in bends]),
-            end=ending(traced.end, traced.points[-1].factor, len(traced.points) - len(traced.events), traced.told),
+            end=ending(traced.end, traced.points[-1].factor, len(traced.points) - len(traced.events), traced.message),
             bifurcation=stretch.bifurcation,
             side=stretch.side,
         )

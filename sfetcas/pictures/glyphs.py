@@ -289,7 +289,7 @@ def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
         assert node.direction is not None
         along = np.array(unit(node.direction))
         travel = factor * float(along @ np.array(motion.displacement))
-        sketch.tell(travel, "m", sketch.at(motion.node), np.array([0.0, 1.0]), ink)
+        sketch.write_value(travel, "m", sketch.at(motion.node), np.array([0.0, 1.0]), ink)
     elif motion.displacement is not None:
         # As given: a guide that is moved leaves its node to slide somewhere else.
         shift = factor * np.array(motion.displacement) / sketch.course.unit
@@ -298,7 +298,7 @@ def _sketch_motion(sketch: Sketch, name: str, motion: Motion) -> None:
             sketch.arrow(way, ink)
         if length > 0.0:
             away = flat_unit(left_of(sketch.view.flat(shift) / length), (0.0, 1.0))
-            sketch.tell(length * sketch.course.unit, "m", way.mean(axis=0), away, ink)
+            sketch.write_value(length * sketch.course.unit, "m", way.mean(axis=0), away, ink)
     if motion.rotation is not None:
         turn = motion.rotation
         about = np.array(unit(turned_about(motion, node, sketch.scene.members)))
@@ -365,7 +365,7 @@ def _sketch_force(sketch: Sketch, point: Array, value: Array, ink: Ink, *, pushi
     points, free = min(ways, key=lambda way: _hidden(sketch, way[0], point))
     sketch.arrow(points, ink)
     away = flat_unit(sketch.view.flat(points[free] - point) / length, (0.0, 1.0))
-    sketch.tell(norm(value), "N", points[free], away, ink)
+    sketch.write_value(norm(value), "N", points[free], away, ink)
 
 
 def _hidden(sketch: Sketch, points: Array, point: Array) -> int:
@@ -387,7 +387,7 @@ def _sketch_turn(sketch: Sketch, point: Array, along: Array, vector: Array, lett
     angle = np.radians(np.linspace(50.0, 310.0, 60))[:, None]
     sketch.arrow(point + radius * sketch.size * (np.cos(angle) * one + np.sin(angle) * two), ink)
     away = flat_unit(-sketch.view.flat(one), (0.0, 1.0))
-    sketch.tell(size, letters, point, away, ink, gap=radius)
+    sketch.write_value(size, letters, point, away, ink, gap=radius)
 
 
 def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> None:
@@ -412,7 +412,7 @@ def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> 
             sketch.arrow(np.array([ends[i], places[i]]), ink)
     top = _label_place(np.abs(profile))
     away = flat_unit(sketch.view.flat(ends[top] - places[top]) / (0.6 * ARROW * sketch.size), (0.0, 1.0))
-    sketch.tell(peak * norm(value), "N/m", ends[top], away, ink)
+    sketch.write_value(peak * norm(value), "N/m", ends[top], away, ink)
 
 
 def _label_place(profile: Array) -> int:

@@ -325,7 +325,7 @@ class Sketch:
         label = Label(anchor=anchor, away=away, text=text, colour=ink.colour, name=ink.name, gap=gap)
         self.labels.append(label)
 
-    def tell(self, value: float, unit: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
+    def write_value(self, value: float, unit: str, anchor: Array, away: Array, ink: Ink, gap: float = 0.0) -> None:
         """Add a value with its unit beside an anchor (3,); it may be left out where larger ones need the space."""
         self.label(amount(value, unit), anchor, away, ink, gap)
         self.labels[-1] = replace(self.labels[-1], value=abs(value), unit=unit)

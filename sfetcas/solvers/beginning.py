@@ -57,8 +57,8 @@ def begin_path(prepared: Prepared, span: tuple[float, float]) -> tuple[Curve, St
     start = curve.standing(state, factor, along)
     loose = loose_rows(curve.equations, start.point)
     if loose.size:
-        told = SHARED if stretches(curve.equations, start.state, start.loading, loose) else SMALLEST
-        notes += (f"{told}; redundant: {named_in(curve.equations, loose)}",)
+        reactions = SHARED if stretches(curve.equations, start.state, start.loading, loose) else SMALLEST
+        notes += (f"{reactions}; redundant: {named_in(curve.equations, loose)}",)
     return curve, start, notes
 
 

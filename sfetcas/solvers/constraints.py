@@ -64,13 +64,13 @@ class Diagnosis:
     def sentence(self) -> str:
         """Mobility and redundancy in one sentence for a report."""
         least = " or more" if self.mobility == MOST else ""
-        free = f"mobility {self.mobility}{least}" + (f": {self.told(4)}" if self.motions else "")
+        free = f"mobility {self.mobility}{least}" + (f": {self.described(4)}" if self.motions else "")
         if not self.excess:
             return free
         held = ", ".join(dict.fromkeys(self.redundant))
         return f"{free}; {self.excess} redundant among {held}"
 
-    def told(self, most: int) -> str:
+    def described(self, most: int) -> str:
         """Up to ``most`` motions in words, each sentence once, and how many more there are."""
         said = list(dict.fromkeys(self.motions))[:most]
         more = len(self.motions) - sum(motion in said for motion in self.motions)

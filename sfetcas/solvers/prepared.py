@@ -214,8 +214,8 @@ class Prepared:
             found = self.downhill(state, loading) or self.correct(state, loading, iterations=50)
             if not found.converged:
                 detail = f"Newton's method on redundant closings left a residual of {found.residual:.1e}"
-                told = contradiction(self.equations, state, loading)
-                raise SolveError(Status.INFEASIBLE if told else Status.FAILED, told or detail, state)
+                message = contradiction(self.equations, state, loading)
+                raise SolveError(Status.INFEASIBLE if message else Status.FAILED, message or detail, state)
             return found, 0
         problem = self._problem
         scale = max(1.0, float(np.abs(loading.force).max(initial=0.0)), float(np.abs(loading.pull).max(initial=0.0)))
@@ -239,13 +239,13 @@ class Prepared:
             if result.status is Status.SOLVED:
                 detail = f"IPOPT came to rest after {counted(result.iterations, 'iteration')}"
             # Whether IPOPT detects closings that are infeasible, or need stretched members, depends on rounding.
-            told = contradiction(self.equations, state, loading)
-            if told:
-                status, detail = Status.INFEASIBLE, told
+            message = contradiction(self.equations, state, loading)
+            if message:
+                status, detail = Status.INFEASIBLE, message
             elif status is Status.FAILED:
-                told = stretched(self.equations, polished.point)
+                message = stretched(self.equations, polished.point)
                 left = f"{detail}; Newton's method left a residual of {polished.residual:.1e}"
-                status, detail = (Status.STRETCHED, told) if told else (status, left)
+                status, detail = (Status.STRETCHED, message) if message else (status, left)
             raise SolveError(status, detail, trial)
         return self._without_prestress(polished), result.iterations
 

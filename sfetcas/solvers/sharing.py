@@ -75,12 +75,12 @@ def _with_least_reactions(equations: Equations, state: State, loading: Loading, 
     if not supported or loose.shape[1] > MOST_LOOSE:
         return state
 
-    def told(lam: Array) -> Array:
+    def strain(lam: Array) -> Array:
         fields = Fields(equations, replace(state, lam=lam), loading)
         return np.concatenate([np.concatenate(fields.reaction(name)) / units for name in supported])
 
-    own = told(state.lam)
-    gains = np.column_stack([told(state.lam + way) - own for way in loose.T])
+    own = strain(state.lam)
+    gains = np.column_stack([strain(state.lam + way) - own for way in loose.T])
     return replace(state, lam=state.lam - loose @ _least_squares(gains, own)[0])
 
 

@@ -94,7 +94,7 @@ class Traced:
     points: list[Standing]
     events: list[Event]
     end: str
-    told: str = ""
+    message: str = ""
 
 
 def trace(
@@ -125,7 +125,7 @@ def trace(
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
         points = [point for point in part.points[1:] if id(point) not in outside]
-        traced = Traced(traced.points + points, traced.events + events, part.end, part.told)
+        traced = Traced(traced.points + points, traced.events + events, part.end, part.message)
     return _with_crossed_folds(traced, usual)
 
 
@@ -152,7 +152,7 @@ def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
         points += [*between, point]
         firm = i
     order = [events[id(point)] for point in points if id(point) in events]
-    return Traced(points, order, traced.end, traced.told)
+    return Traced(points, order, traced.end, traced.message)
 
 
 def without(traced: Traced, known: Sequence[Standing]) -> Traced:
@@ -207,12 +207,12 @@ class _Piece:
     events: list[Event] = field(default_factory=list)
     before: Standing | None = None
     end: str = ""
-    told: str = ""
+    message: str = ""
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
         _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended, shortest=SHORTEST)
-        return Traced(self.points, self.events, self.end if arrived else "lost", self.told)
+        return Traced(self.points, self.events, self.end if arrived else "lost", self.message)
 
     @property
     def ended(self) -> bool:
@@ -229,8 +229,8 @@ class _Piece:
         there, left = _ahead(curve, now, self.before, length, self.span)
         if there is None:
             return None, 0.5 * length
-        self.told = curve.too_large(there)
-        if self.told:
+        self.message = curve.too_large(there)
+        if self.message:
             self.end = "bent"
             return there, 0.0
         start = self.points[0]

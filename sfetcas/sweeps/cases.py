@@ -61,8 +61,8 @@ class Cases:
         (first, length), *others = lengths.items()
         for name, other in others:
             if other != length:
-                told = f"found {other} in {name} and {length} in {first}"
-                raise SceneError(f"{told}, accepted: columns of the same length", ("cases",))
+                message = f"found {other} in {name} and {length} in {first}"
+                raise SceneError(f"{message}, accepted: columns of the same length", ("cases",))
         object.__setattr__(self, "columns", MappingProxyType(found))
 
     def __len__(self) -> int:
@@ -86,8 +86,8 @@ class Cases:
                 raise SceneError(error.bare, ("cases", name)) from None
             rows = column.reshape(len(column), -1)
             if rows.shape[1] != len(known.names):
-                told = f"found {counted(rows.shape[1], 'number')} a case"
-                raise SceneError(f"{told}, accepted: {len(known.names)}, {', '.join(known.names)}", ("cases", name))
+                message = f"found {counted(rows.shape[1], 'number')} a case"
+                raise SceneError(f"{message}, accepted: {len(known.names)}, {', '.join(known.names)}", ("cases", name))
             for single, values in zip(known.names, rows.T, strict=True):
                 if single in found:
                     raise SceneError(f"found {single} more than once, accepted: each number once", ("cases",))
@@ -200,8 +200,8 @@ def read_cases(path: Path) -> Cases:
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, line in enumerate(lines[1:], start=1):
         if len(line) != len(names):
-            told = f"found {counted(len(line), 'cell')} in case {number} and {len(names)} in the first line"
-            raise SceneError(f"{told}, accepted: as many", where)
+            message = f"found {counted(len(line), 'cell')} in case {number} and {len(names)} in the first line"
+            raise SceneError(f"{message}, accepted: as many", where)
         for name, cell in zip(names, line, strict=True):
             columns[name].append(_cell(cell, (*where, f"case {number}", name)))
     try:

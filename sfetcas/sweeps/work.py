@@ -116,8 +116,8 @@ def _outcome(job: Job, values: Sequence[float]) -> Outcome:
     except SolveError as error:
         return Outcome(FAILED, str(error), seconds=time.perf_counter() - begin)
     except (FloatingPointError, OverflowError, np.linalg.LinAlgError) as error:
-        told = f"the numbers of this case leave what can be computed ({error})"
-        return Outcome(FAILED, told, seconds=time.perf_counter() - begin)
+        message = f"the numbers of this case leave what can be computed ({error})"
+        return Outcome(FAILED, message, seconds=time.perf_counter() - begin)
     except MemoryError:
         return Outcome(FAILED, "the case needs more memory than there is", seconds=time.perf_counter() - begin)
     return _answered(job, answer, seconds)

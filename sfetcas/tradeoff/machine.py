@@ -59,5 +59,5 @@ def _compiler() -> str:
     program = shutil.which(os.environ.get("CC") or "cc") or shutil.which("gcc")
     if program is None:
         return ""
-    told = subprocess.run([program, "--version"], capture_output=True, text=True, check=False).stdout
-    return told.splitlines()[0] if told else ""
+    output = subprocess.run([program, "--version"], capture_output=True, text=True, check=False).stdout
+    return output.splitlines()[0] if output else ""

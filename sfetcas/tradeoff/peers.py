@@ -63,16 +63,16 @@ def run_peer(command: str, file: Path, reference: Solution, longest: float) -> l
         raise SceneError("--peer: found nothing, accepted: a command")
     begin = time.perf_counter()
     try:
-        told = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=longest, check=False)
+        ran = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=longest, check=False)
     except (OSError, ValueError) as error:
         raise SceneError(f"--peer: found {command!r}, which cannot be run: {error}") from None
     except subprocess.TimeoutExpired:
         raise SceneError(f"--peer: found {command!r}, which took more than {longest:g} s") from None
     seconds = time.perf_counter() - begin
-    lines = [line for line in told.stdout.splitlines() if line.strip()]
-    if told.returncode or not lines:
-        last = (told.stderr.strip().splitlines() or ["nothing on its standard output"])[-1]
-        raise SceneError(f"--peer: found {command!r}, which ended with {told.returncode}: {last}")
+    lines = [line for line in ran.stdout.splitlines() if line.strip()]
+    if ran.returncode or not lines:
+        last = (ran.stderr.strip().splitlines() or ["nothing on its standard output"])[-1]
+        raise SceneError(f"--peer: found {command!r}, which ended with {ran.returncode}: {last}")
     return [_peer(command, number, line, seconds, reference) for number, line in enumerate(lines, start=1)]
 
 

@@ -146,8 +146,8 @@ def as_markdown(trade: Trade, *, every: bool = True) -> str:
 
 
 def _reference(trade: Trade, estimate: float | None) -> str:
-    told = "not estimated" if estimate is None else f"estimated error {estimate:.1e}"
-    return f"an own solution with {trade.reference.variant.name} ({told})"
+    estimated = "not estimated" if estimate is None else f"estimated error {estimate:.1e}"
+    return f"an own solution with {trade.reference.variant.name} ({estimated})"
 
 
 def markdown_table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:

@@ -181,11 +181,11 @@ class Trade:
             best = asked
         if best is None:
             return f"{target:.0e} was not reached"
-        told = f"for {target:.0e} take {best.name} ({_time(best.seconds)}"
+        sentence = f"for {target:.0e} take {best.name} ({_time(best.seconds)}"
         repeated = self.cheapest(target, again, chosen=False)
         if repeated is not None and repeated.again < best.again / LITTLE:
-            return f"{told}), to solve again and again {repeated.name} ({_time(repeated.again)})"
-        return f"{told}, solved again {_time(best.again)})" if np.isfinite(best.again) else f"{told})"
+            return f"{sentence}), to solve again and again {repeated.name} ({_time(repeated.again)})"
+        return f"{sentence}, solved again {_time(best.again)})" if np.isfinite(best.again) else f"{sentence})"
 
     def verdict(self, accuracy: float) -> str:
         """What asking for an accuracy gives, against the best mesh by hand; empty where it was not run."""
@@ -194,8 +194,8 @@ class Trade:
             return ""
         if not np.isfinite(row.error):
             return f"accuracy = {accuracy:.0e}: {row.remark}"
-        told = f"accuracy = {accuracy:.0e}: error {row.error:.1e} in {_time(row.seconds)}"
-        return told if best is None else f"{told}, {row.seconds / best.seconds:.1f} times the best mesh by hand"
+        sentence = f"accuracy = {accuracy:.0e}: error {row.error:.1e} in {_time(row.seconds)}"
+        return sentence if best is None else f"{sentence}, {row.seconds / best.seconds:.1f} times the best mesh by hand"
 
 
 def whole(row: Row) -> float:
@@ -410,8 +410,8 @@ class _Trading:
         notes = []
         if self.reference.expected is not None:
             worst, met, count = self.reference.expected
-            told = f"the reference meets {met} of {count} expectations of the file"
-            notes.append(f"{told}; largest relative difference {worst:.1e}")
+            sentence = f"the reference meets {met} of {count} expectations of the file"
+            notes.append(f"{sentence}; largest relative difference {worst:.1e}")
         if self.left_out:
             notes.append(f"after {self.limits.budget:g} s {self.left_out} families or variants were left out")
         elsewhere = sum(row.remark == "another equilibrium" for row in self.rows)

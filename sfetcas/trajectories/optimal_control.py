@@ -415,10 +415,10 @@ def _why(transcription: Transcription, nlp: NLP, result: NLPResult, statement: M
     # What was asked for first: equations are missed along with it.
     own = {one.name for one in statement.required} | {"rest at the end"}
     worst.sort(key=lambda item: item[0] not in own)
-    told = "; ".join(f"{name} by {amount:.3g}" for name, amount in worst[:3])
+    message = "; ".join(f"{name} by {amount:.3g}" for name, amount in worst[:3])
     parts = [f"IPOPT: {result.message.replace('_', ' ')} after {result.iterations} iterations"]
-    if told:
-        parts.append(f"violated most, over their units: {told}")
+    if message:
+        parts.append(f"violated most, over their units: {message}")
     if statement.duration[0] == statement.duration[1] or result.status is Status.INFEASIBLE:
         high = statement.duration[1]
         parts.append(

@@ -190,11 +190,11 @@ class Transcription:
         system, shape = self.system, (self.intervals, self.stages)
         numbers = [*self.at_stages, *(np.broadcast_to(block.index, shape) for block in self.variables)]
         self.numbers = np.stack(numbers, axis=-1) if numbers else np.zeros((*shape, 0), np.intp)
-        told, first, parts, chosen, units = self._guessed(), 0, [], [], []
+        outputs, first, parts, chosen, units = self._guessed(), 0, [], [], []
         for one in system.results.results:
             own = first + system.picked[one.name]
             unit = system.unit(one.name)
-            block = self.pieces.unknowns(one.name, told[:, own].reshape(*shape, -1), unit=unit)
+            block = self.pieces.unknowns(one.name, outputs[:, own].reshape(*shape, -1), unit=unit)
             self._lifted[one.name] = block
             parts.append(block.index)
             chosen.append(own)
@@ -211,9 +211,9 @@ class Transcription:
         system, stage = self.system, self.system.stage
         sizes = [system.total, *[system.quantities] * 3, len(system.arguments.defaults), len(chosen)]
         w, reference = ca.MX.sym("w", sum(sizes)), ca.MX.sym("reference", stage.size1_in("reference"))
-        d, x, v, a, numbers, told = ca.vertsplit(w, np.cumsum([0, *sizes]).tolist())
+        d, x, v, a, numbers, outputs = ca.vertsplit(w, np.cumsum([0, *sizes]).tolist())
         balance, quantities, answers = stage(d, v, a, numbers, reference)
-        rows = [balance, quantities - x, answers[chosen.tolist()] - told]
+        rows = [balance, quantities - x, answers[chosen.tolist()] - outputs]
         return ca.Function("stage_rows", [w, reference], [ca.vertcat(*rows)])
 
     def _guessed(self) -> Array:
@@ -427,8 +427,8 @@ class Transcription:
         first = int(np.sum([one.size for one in results[: [one.name for one in results].index(name)]], dtype=int))
         size = next(one.size for one in results if one.name == name)
         zeros = np.zeros(system.quantities)
-        told = system.stage(system.start, system.begin.v, zeros, system.arguments.defaults, system.reference)[2]
-        return np.array(told).ravel()[first : first + size]
+        outputs = system.stage(system.start, system.begin.v, zeros, system.arguments.defaults, system.reference)[2]
+        return np.array(outputs).ravel()[first : first + size]
 
     def expression(self, name: str, expression: ca.MX) -> tuple[ca.Function, Index]:
         """An expression as a function of its unknowns, and the indices of these (instances, w)."""

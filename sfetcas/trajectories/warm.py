@@ -119,9 +119,9 @@ def _end_shape(statement: MotionStatement, system: ControlledSystem) -> Array | 
     d = pieces.unknowns("d", system.start[:free])
     still = ca.DM.zeros(n)
     whole = ca.vertcat(d.symbol, ca.DM(system.start[free:]))
-    balance, _, told = system.stage(whole, still, still, system.arguments.defaults, system.reference)
+    balance, _, outputs = system.stage(whole, still, still, system.arguments.defaults, system.reference)
     bounds = np.cumsum([0, *(one.size for one in system.results.results)]).tolist()
-    parts = dict(zip([one.name for one in system.results.results], ca.vertsplit(told, bounds), strict=True))
+    parts = dict(zip([one.name for one in system.results.results], ca.vertsplit(outputs, bounds), strict=True))
     symbols = list(ends.values())
     values = [parts[s.name][system.picked[s.name].tolist()] for s in symbols]
     if free < system.total:

@@ -24,13 +24,13 @@ def test_wrong_is_what_is_off_and_says_nothing(outcome, wrong):
 def test_outcome_of_a_scene():
     tip = extremes.elastica_tip(1.0)
     right = extremes.measured(extremes.cantilever(1.0), lambda s: float(np.linalg.norm(s.position("B") - tip)))
-    assert (right.told, right.solved, right.wrong) == ("solved", True, False)
+    assert (right.words, right.solved, right.wrong) == ("solved", True, False)
     assert extremes.measured(extremes.cantilever(1.0), lambda s: 1.0).wrong
     refused = extremes.measured(extremes.bars(1e-9, "flexible"), lambda s: 0.0)
     assert refused.error is None
-    assert refused.told.startswith("refused: no finite force holds the members (")
+    assert refused.words.startswith("refused: no finite force holds the members (")
     short = extremes.measured(extremes.cantilever(10.0, element="SFET2", elements=1), lambda s: 0.0, accuracy=1e-6)
-    assert "not to the accuracy asked for" in short.told
+    assert "not to the accuracy asked for" in short.words
 
 
 def test_table_is_markdown(monkeypatch, capsys):
