@@ -209,8 +209,8 @@ class Chain:
             node_body[name] = new() if node.get("joint", "rigid") == "rigid" else None
         driven = {m["node"]: m for m in scene.get("motions", {}).values() if "rotation" in m}
         for name, node in scene["nodes"].items():
-            held = node.get("support", "free")
-            fixed = held == "clamped" or (held == "slider" and node.get("rotation", "fixed") == "fixed")
+            support = node.get("support", "free")
+            fixed = support == "clamped" or (support == "slider" and node.get("rotation", "fixed") == "fixed")
             if fixed and name not in driven:
                 if node_body[name] is None:
                     continue
@@ -367,13 +367,13 @@ class Chain:
             for e in eye:
                 add(at, e, 0.0, 0.0)
         for k, (name, node) in enumerate(scene["nodes"].items()):
-            held = node.get("support", "free")
-            if held == "free":
+            support = node.get("support", "free")
+            if support == "free":
                 continue
             at = np.zeros(links + nodes)
             at[links + k] = 1.0
             across = eye
-            if held == "slider":
+            if support == "slider":
                 u = _vector(node["direction"])[: self.dim]
                 across = np.linalg.svd((u / np.linalg.norm(u))[None])[2][1:]
             by = moved.get(name, np.zeros(3))[: self.dim] / self.size

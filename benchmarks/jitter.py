@@ -179,8 +179,8 @@ def _equilibrium(outputs: _Outputs, name: str, step: Equilibrium, how: Jittered,
         # energy says whether it is the same one, and places stay near as long as rounding alone moves along it.
         near = ROUGH if proof.stable == "neutral" else error + 1e-6
         outputs.add(f"{name} members.{member}", places, near * size)
-    held = [node for node, entry in step.model.scene.nodes.items() if entry.support != "free"]
-    forces = {node: how.back(step.reaction(node)[0], 0, 1) for node in held}
+    supported = [node for node, entry in step.model.scene.nodes.items() if entry.support != "free"]
+    forces = {node: how.back(step.reaction(node)[0], 0, 1) for node in supported}
     acts = max((float(np.abs(force).max()) for force in forces.values()), default=0.0)
     carried = max(acts, inside / how.force)
     # Forces, those inside members too, work on the places that are changed.

@@ -127,9 +127,9 @@ def _report_largest(motion: Trajectory) -> None:
     away = [np.linalg.norm(motion.positions(name) - motion.positions(name)[0], axis=1) for name in nodes]
     speed = [np.linalg.norm(motion.velocities(name), axis=1) for name in nodes]
     kinds = [("farthest from where it began", "node", nodes, away, "m"), ("fastest", "node", nodes, speed, "m/s")]
-    held = [name for name, node in motion.last.model.scene.nodes.items() if node.support != "free"]
-    forces = [np.array([np.linalg.norm(step.reaction(name)[0]) for step in motion.steps]) for name in held]
-    kinds += [("largest reaction", "at", tuple(held), forces, "N")] if held else []
+    supported = [name for name, node in motion.last.model.scene.nodes.items() if node.support != "free"]
+    forces = [np.array([np.linalg.norm(step.reaction(name)[0]) for step in motion.steps]) for name in supported]
+    kinds += [("largest reaction", "at", tuple(supported), forces, "N")] if supported else []
     for what, kind, names, values, unit in kinds:
         table = np.array(values)
         i, k = np.unravel_index(first_of_largest(table.ravel()), table.shape)

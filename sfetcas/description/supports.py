@@ -68,12 +68,12 @@ def components(
         yield part
 
 
-def free_directions(held: Floats, dimension: str) -> Floats:
+def free_directions(fixed: Floats, dimension: str) -> Floats:
     """Unit directions (k, 3) normal to all restrained ones (m, 3), within x-y in a plane scene."""
     axes = 2 if dimension == "plane" else 3
-    if not len(held):
+    if not len(fixed):
         return np.eye(3)[:axes]
-    _, values, rows = np.linalg.svd(held[:, :axes], full_matrices=False)
+    _, values, rows = np.linalg.svd(fixed[:, :axes], full_matrices=False)
     return np.pad(rows[values < tolerances.PARALLEL], ((0, 0), (0, 3 - axes)))
 
 
@@ -98,11 +98,11 @@ def check_floating(
             along = spring.direction
             sprung[spring.node].append(np.eye(3) if along is None else np.array([unit(along)]))
     for part in components(nodes, members, springs):
-        held = np.vstack([fixed_directions(nodes[name], moved.get(name)) for name in part])
-        held = np.vstack([held, *(rows for name in part for rows in sprung[name])])
-        free = free_directions(held, dimension)
+        fixed = np.vstack([fixed_directions(nodes[name], moved.get(name)) for name in part])
+        fixed = np.vstack([fixed, *(rows for name in part for rows in sprung[name])])
+        free = free_directions(fixed, dimension)
         if len(free):
-            raise SceneError(_floating(part, held, free[:, : 2 if dimension == "plane" else 3]))
+            raise SceneError(_floating(part, fixed, free[:, : 2 if dimension == "plane" else 3]))
 
 
 def free_to_move(motion: str) -> str:
@@ -120,9 +120,9 @@ def upwards(direction: Floats) -> Floats:
     return np.asarray(direction * np.sign(direction[first_of_largest(direction)]))
 
 
-def _floating(part: list[str], held: Floats, free: Floats) -> str:
+def _floating(part: list[str], fixed: Floats, free: Floats) -> str:
     nodes = enumerated(part, "node")
-    if not len(held):
+    if not len(fixed):
         return free_to_move(f"{nodes} moving along {', '.join('xyz'[: len(free)])} and turning")
     return free_to_move(f"{nodes} moving along {' and '.join(along(upwards(direction)) for direction in free)}")
 

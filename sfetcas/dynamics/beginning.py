@@ -183,8 +183,8 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
     values, vectors = np.linalg.eigh(stiffness)
     small = np.where(np.arange(n) < equations.rotation_unknowns, TURNING, MOVING)
     root = np.vstack([np.sqrt(np.abs(values))[:, None] * vectors.T, np.diag(small)])
-    held = full[n:, :n]
-    both = np.vstack([held, rows])
+    constrained = full[n:, :n]
+    both = np.vstack([constrained, rows])
     right = np.concatenate([np.zeros(closings), wanted])
     # What cannot be met is missed as little as possible; then the least energy on what is given.
     u, sizes, axes = np.linalg.svd(both)
@@ -198,9 +198,9 @@ def velocities(system: StageEquations, equations: Equations, state: State) -> tu
     alike = np.flatnonzero(np.abs(missed) >= (1.0 - tolerances.ALIKE) * np.abs(missed).max())
     worst = int(alike[first_of_largest(wanted[alike])])
     share = float(np.abs(missed[worst])) / largest
-    joints = float(np.abs(held @ rates).max(initial=0.0)) / largest
+    joints = float(np.abs(constrained @ rates).max(initial=0.0)) / largest
     if max(share, joints) > CONTRADICTION:
-        other = _open_row(model, held @ rates) if joints > share else ""
+        other = _open_row(model, constrained @ rates) if joints > share else ""
         raise SceneError(
             f"contradicts the joints{other}: {max(share, joints):.2g} of the largest velocity cannot be met",
             names[worst],

@@ -106,9 +106,9 @@ def _names(motion: SmallMotion) -> tuple[str, ...]:
             places.setdefault(turn, f"{name} at end {i + 1}")
     names = [""] * equations.rotation_unknowns
     for turn, place in places.items():
-        held = model.space and model.rotations.kind[turn] == RotationFreedom.AXIS
+        hinged = model.space and model.rotations.kind[turn] == RotationFreedom.AXIS
         for axis, number in enumerate(equations.number[turn]):
             if number >= 0:
-                about = "its axis" if held else "xyz"[axis + 3 - equations.number.shape[1]]
+                about = "its axis" if hinged else "xyz"[axis + 3 - equations.number.shape[1]]
                 names[number] = f"{place} about {about}"
     return (*names, *model.positions.unknowns)

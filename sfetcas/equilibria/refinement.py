@@ -143,8 +143,8 @@ class Refinement:
             return near
         _, values, shapes = prepared.around_zero(near.point)
         still = shapes[:, np.abs(values) <= near.stability.limit]
-        held = prepared.correct(state, loading, iterations=25, most=1.5, flat=still)
-        return held if held.converged else near
+        across = prepared.correct(state, loading, iterations=25, most=1.5, flat=still)
+        return across if across.converged else near
 
     def refined(self, pilot: EquilibriumResult) -> Equilibrium:
         """The answer that is found on a pilot mesh, on one that is fine enough.

@@ -142,8 +142,8 @@ def _member(model: Model) -> str | None:
     if member.type != "flexible" or set(member.release) != {"rigid"}:
         return None
     supports = [scene.nodes[node].support for node in member.nodes]
-    held = [support for support in supports if support != "free"]
-    return name if len(held) == 1 and held[0] in ("clamped", "hinge") and len(supports) == 2 else None
+    supported = [support for support in supports if support != "free"]
+    return name if len(supported) == 1 and supported[0] in ("clamped", "hinge") and len(supports) == 2 else None
 
 
 class _Shooting:

@@ -69,14 +69,14 @@ def _at_stops(scene: Scene, settings: Settings, factor: float, stops: Stops) -> 
 
 def _next_stops(answer: Equilibrium, stops: Stops) -> Stops:
     """The stops without the one that pulls most or, where none does, with the one that is passed most."""
-    scene, held = answer.model.scene, dict(stops)
+    scene, known = answer.model.scene, dict(stops)
     pulls = {name: _pull(answer.spring(name).stop or 0.0, side) for name, side in stops}
     if pulls and max(pulls.values()) > 0.0:
         worst = _first_of_most(pulls)
         return tuple(stop for stop in stops if stop[0] != worst)
     passed: dict[tuple[str, str], float] = {}
     for name, spring in scene.springs.items():
-        if spring.stop is not None and name not in held:
+        if spring.stop is not None and name not in known:
             travel, (low, high) = answer.spring(name).travel, spring.stop
             passed[name, "low"], passed[name, "high"] = low - travel, travel - high
     if passed and max(passed.values()) > 0.0:

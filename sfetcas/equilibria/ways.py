@@ -208,8 +208,8 @@ class Ways:
         grown.iterations = alone.iterations
         apart = pilot.distance(alone.solved.state, grown.solved.state) > 1e-3
         # What falls from its start guess is nearest to no minimum.
-        held = pilot.diagnosis.mobility == 0
-        notable = held and alone.solved.multipliers <= BEYOND and not grown.notes
+        restrained = pilot.diagnosis.mobility == 0
+        notable = restrained and alone.solved.multipliers <= BEYOND and not grown.notes
         if notable and apart and alone.stability.negative == 0:
             grown.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
         return grown

@@ -102,7 +102,7 @@ class Balance:
         force = self._reactions.pushed(node) @ forces[self.model.segments.place(node)]
         if self._reactions.shared(node):
             return force, self._rigid.get(("node", node), np.zeros(3))
-        return force, sum((held @ moments[turn] for turn, held in self._reactions.turned(node)), np.zeros(3))
+        return force, sum((fixed @ moments[turn] for turn, fixed in self._reactions.turned(node)), np.zeros(3))
 
     def fixed_share(self, number: int, moment: Array) -> Array:
         """The part of a moment (3,) on a rotation that the ground takes: none about axes that are free."""

@@ -152,10 +152,10 @@ def _flow(edges: Index, sources: Array, grounded: Array) -> Array:
     free = free[free != GROUND]
     index = np.full(len(grounded), len(free))
     index[free] = np.arange(len(free))
-    held = grounded[edges[:, 0]]
-    a, b = index[edges[held]].T
+    supported = grounded[edges[:, 0]]
+    a, b = index[edges[supported]].T
     levels = np.vstack([_levels(a, b, sources[free]), np.zeros((1, 2))])
-    flow[held] = np.abs(levels[a] - levels[b])
+    flow[supported] = np.abs(levels[a] - levels[b])
     return flow
 
 

@@ -123,8 +123,8 @@ class Reactions:
         """
         model = self.model
         positions, axes, size = model.positions, model.element.axes, self._tables.of_rows - self._tables.of_places
-        held = [model.segments.place(name) for name, node in model.scene.nodes.items() if node.support != "free"]
-        supported = np.isin(np.arange(size // axes), held)
+        places = [model.segments.place(name) for name, node in model.scene.nodes.items() if node.support != "free"]
+        supported = np.isin(np.arange(size // axes), places)
         own = np.flatnonzero(np.repeat(supported, axes))
         parts = [(own, own, np.ones(len(own)))]
         begin = np.array([model.segments.place(part.start) for part in model.segments.parts], dtype=np.intp)
@@ -189,8 +189,8 @@ class Reactions:
         scene, width = self.model.scene, self._width
         names = [name for name in self.model.members if scene.members[name].type == "rigid"]
         nodes = list(dict.fromkeys(n for name in names for n in scene.members[name].nodes))
-        held = [n for n in nodes if scene.nodes[n].turn not in FREE]
-        keys = [*(("member", name) for name in names), *(("node", n) for n in held)]
+        turning = [n for n in nodes if scene.nodes[n].turn not in FREE]
+        keys = [*(("member", name) for name in names), *(("node", n) for n in turning)]
         unknowns = {key: i for i, key in enumerate(keys)}
         blocks = [self._at_node(unknowns, names, node) for node in nodes]
         hinged: list[Block] = []
@@ -203,10 +203,10 @@ class Reactions:
                     hinged.append((gains, cells, unit(scene.nodes[node].axis)))
                 else:
                     blocks.append((gains, cells, None))
-        freely = [n for n in held if self._turns_freely(n)]
+        freely = [n for n in turning if self._turns_freely(n)]
         blocks += hinged
         blocks += [({unknowns["node", n]: 1.0}, [], unit(scene.nodes[n].turn_axis)) for n in freely]
-        weights = np.repeat([INNER_WEIGHT, 1.0], [width * len(names), width * len(held)])
+        weights = np.repeat([INNER_WEIGHT, 1.0], [width * len(names), width * len(turning)])
         return RigidBalance(*self._written(blocks, len(weights)), weights, unknowns, width)
 
     def _written(self, blocks: list[Block], size: int) -> tuple[SparseMap, SparseMap]:

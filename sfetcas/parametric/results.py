@@ -379,7 +379,7 @@ class _Outputs:
             found = times(reactions.rigid.share(node), cells) if known else ca.MX.zeros(3)
             return self._about(found).T * model.scales.moment
         moments = self._about(ca.reshape(left[:first], self._expressions.turns, -1))
-        parts = (ca.mtimes(ca.DM(held), moments[:, turn]) for turn, held in reactions.turned(node))
+        parts = (ca.mtimes(ca.DM(fixed), moments[:, turn]) for turn, fixed in reactions.turned(node))
         return sum(parts, ca.MX.zeros(3)).T * model.scales.moment
 
     def _motion(self, name: str, key: str) -> ca.MX:

@@ -38,8 +38,8 @@ def _angles(model: Model, here: State, there: State) -> Array:
 def _rotation_vectors(model: Model, here: State, there: State) -> Array:
     vectors = quaternion.rotation_vector(quaternion.multiply(here.q, quaternion.conjugate(there.q)))
     # The one unknown of a rotation about a held axis is the angle about it.
-    held = model.rotations.kind == RotationFreedom.AXIS
-    vectors[held, 0] = (vectors * model.rotations.axis).sum(axis=1)[held]
+    hinged = model.rotations.kind == RotationFreedom.AXIS
+    vectors[hinged, 0] = (vectors * model.rotations.axis).sum(axis=1)[hinged]
     return vectors
 
 

@@ -67,8 +67,8 @@ class Diagnosis:
         free = f"mobility {self.mobility}{least}" + (f": {self.described(4)}" if self.motions else "")
         if not self.excess:
             return free
-        held = ", ".join(dict.fromkeys(self.redundant))
-        return f"{free}; {self.excess} redundant among {held}"
+        redundant = ", ".join(dict.fromkeys(self.redundant))
+        return f"{free}; {self.excess} redundant among {redundant}"
 
     def described(self, most: int) -> str:
         """Up to ``most`` motions in words, each sentence once, and how many more there are."""

@@ -433,8 +433,8 @@ class Globalised:
         while share < 1.0 and self._left:
             there = min(1.0, share + step)
             loads = self._shared(given, there)
-            held = program.hold(reached, loads)
-            found = self._corrected(self._at(held, loads), loads, rules.corrections)
+            begin = program.hold(reached, loads)
+            found = self._corrected(self._at(begin, loads), loads, rules.corrections)
             if found.code is Code.SOLVED:
                 share, reached, step = there, ca.DM(found.state), 2.0 * step
                 continue

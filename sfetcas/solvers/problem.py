@@ -97,7 +97,7 @@ class EquilibriumProblem:
             *(len(group.data) * group.kind.sizes[4] for group in model.connections),
         )
         self.p = ca.MX.sym("p", sum(sizes))
-        pull, held, force, shift, self._unwrapped, *loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
+        pull, rest, force, shift, self._unwrapped, *loads = ca.vertsplit(self.p, np.cumsum([0, *sizes]).tolist())
         self._given = Given(
             **data_of(model),
             pull=pull,
@@ -107,7 +107,7 @@ class EquilibriumProblem:
             spread=ca.MX(),
             loads=tuple(loads),
         )
-        turned = held + times(self._spread, self.x) if tables.of_places else held
+        turned = rest + times(self._spread, self.x) if tables.of_places else rest
         self._q = ca.reshape(turned, element.components, len(model.rotations.kind))
         self._places = self.terms.retained_places(self._y, self._given)
         self._arguments = self.terms.every(self._q, self._places, self._given, self._unwrapped)
@@ -243,14 +243,14 @@ class EquilibriumProblem:
     def parameters(self, loading: Loading, near: State | None = None) -> Array:
         """Values (parameters,) of the parameters for a loading; angles that count turns are those near a state's."""
         model, positions = self.model, self.model.positions
-        held = np.where(
+        rest = np.where(
             (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
         )
         hanging = (positions.E.T @ loading.force.ravel()).reshape(-1, model.element.axes)
         pull = loading.pull - hanging[model.segments.owner][:, None, :]
         unwrapped = self._guessed_unwrapped if near is None else near.unwrapped
         loads = [load.ravel() for load in loading.loads]
-        parts = [pull.ravel(), held.ravel(), loading.force.ravel(), loading.shift, unwrapped, *loads]
+        parts = [pull.ravel(), rest.ravel(), loading.force.ravel(), loading.shift, unwrapped, *loads]
         return np.concatenate(parts)
 
     def parameters_by(self, given: Given, unwrapped: Array) -> ca.MX:
@@ -259,10 +259,10 @@ class EquilibriumProblem:
         ``unwrapped`` (angles,), rad, are the values near which angles count turns.
         """
         still = np.zeros((self.model.element.components, len(self.model.rotations.kind)))
-        held = (self.model.rotations.kind == RotationFreedom.FIXED).astype(float)
+        fixed = (self.model.rotations.kind == RotationFreedom.FIXED).astype(float)
         if self.model.space:
             # Fixed rotations without a prescribed motion are identities.
-            still[0] = held
+            still[0] = fixed
         turned = self.terms.with_prescribed_rotations(ca.MX(ca.DM(still)), given)
         return ca.vertcat(given.pull, ca.vec(turned), given.force, given.shift, ca.MX(ca.DM(unwrapped)), *given.loads)
 
@@ -294,11 +294,11 @@ class EquilibriumProblem:
             With exactly normalised quaternions; nan for a quaternion that is zero.
         """
         model, tables = self.model, self._tables
-        held = np.where(
+        rest = np.where(
             (model.rotations.kind == RotationFreedom.FIXED)[:, None], model.prescribed_rotations(loading), 0.0
         )
         unknown, weight = tables.unknown[: tables.of_places], tables.weight[: tables.of_places]
-        q = held + (weight * np.append(x, 0.0)[unknown]).reshape(held.shape)
+        q = rest + (weight * np.append(x, 0.0)[unknown]).reshape(rest.shape)
         if model.space:
             # A zero quaternion has no direction and becomes nan, which callers refuse.
             with np.errstate(divide="ignore", invalid="ignore"):

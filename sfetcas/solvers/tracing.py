@@ -334,10 +334,10 @@ def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int =
     across = _full_shape(curve, here, shapes[:, number - 1])
     across = replace(across, z=side * across.z, factor=side * across.factor)
     others = np.delete(shapes, number - 1, axis=1)
-    held = replace(across, neutral=curve.neutral(here.point, others, LARGEST_PRIMAL_FACTOR)) if others.size else across
+    alone = replace(across, neutral=curve.neutral(here.point, others, LARGEST_PRIMAL_FACTOR)) if others.size else across
     for length in (0.01, 0.02, 0.04, 0.08, 0.16, 0.3):
         state, factor = curve.predicted(replace(here, tangent=across), length)
-        for tangent in (held, across) if others.size else (across,):
+        for tangent in (alone, across) if others.size else (across,):
             found = curve.corrected(state, factor, tangent, length)
             if found is None or curve.inner(found.tangent, across) <= 0.3:
                 continue

@@ -100,10 +100,10 @@ def _travel(prepared: Prepared, loading: Loading, start: State, motions: Array) 
     for way in FAR:
         there = _moved(prepared, start, way * motion)
         point = equations.at(there, unloaded)
-        held = np.abs(point.residual[: equations.unknowns]).max() > tolerances.BALANCED * work
+        restrained = np.abs(point.residual[: equations.unknowns]).max() > tolerances.BALANCED * work
         opened = np.abs(point.residual[equations.unknowns :]).max(initial=0.0) > tolerances.CLOSED * way
         driven = float(motion @ _pull(prepared, there, loading)) >= (1.0 - tolerances.BALANCED) * work
-        if held or opened or point.strain > tolerances.BALANCED * way * work or not driven:
+        if restrained or opened or point.strain > tolerances.BALANCED * way * work or not driven:
             return None
     return motion
 

@@ -337,8 +337,8 @@ class Transcription:
         parts += [block.index.ravel() for block in (impulse, lam, left, bent)]
         index = np.concatenate(parts)
         w, reference = ca.MX.sym("w", len(index)), ca.MX.sym("reference", self.references.shape[1])
-        d, v, given, pushed, held, momentum, shape = ca.vertsplit(w, np.cumsum([0, *map(len, parts)]).tolist())
-        found = system.rest(ca.vertcat(d, ca.MX.zeros(rows)), v, reference, given, pushed, held)
+        d, v, given, pushed, fixed, momentum, shape = ca.vertsplit(w, np.cumsum([0, *map(len, parts)]).tolist())
+        found = system.rest(ca.vertcat(d, ca.MX.zeros(rows)), v, reference, given, pushed, fixed)
         balanced = [found[0] - ca.mtimes(ca.DM(momenta), momentum), found[1] - ca.mtimes(ca.DM(forces), shape)]
         function = ca.Function("rest", [w, reference], [ca.vertcat(*balanced)])
         self.pieces.add_rows("rest at the end", function, index[None, :], self.references[-1:])

@@ -230,10 +230,10 @@ def _placed(system: ControlledSystem, q: Array, unwrapped: Array, numbers: Array
     ]
     y = ca.MX.sym("y", n.y)
     given = own.given(s[2])
-    held = own.with_prescribed_rotations(ca.MX(s[0]), given)
+    prescribed = own.with_prescribed_rotations(ca.MX(s[0]), given)
     closings = len(own.model.positions.rows)
-    open_ = ca.Function("open", s, [own.gaps(held, ca.MX.zeros(n.y), given, s[1])[:closings]])
-    moved = ca.Function("moved", [*s, y], [own.moving(held, y, given, s[1])])
+    open_ = ca.Function("open", s, [own.gaps(prescribed, ca.MX.zeros(n.y), given, s[1])[:closings]])
+    moved = ca.Function("moved", [*s, y], [own.moving(prescribed, y, given, s[1])])
     # Closings are linear in displacements.
     # Of closings that depend on each other rounding leaves 1e-16.
     back = -np.linalg.pinv(
