@@ -30,8 +30,11 @@ SPRING = 300.0
 SHORT_STEP = 0.3
 """Largest rotation of a node, rad, in a step downhill from a ``start`` of a user, so as not to leave its basin."""
 
-NEAR_TARGET, SAME_GAP = 0.05, 1e-6
-"""Distances from targets, and gaps, dimensionless, within which of two shapes that of less energy begins."""
+NEAR_TARGET = 0.05
+"""Distance from targets, dimensionless, up to which nodes count as at their start places."""
+
+SAME_GAP = 1e-6
+"""Gaps, dimensionless, that differ by less are the same: of such shapes that of less energy begins."""
 
 BOW = 0.2
 """Largest slope (rad) of the bow: enough slack for the first closing step, little enough to choose no branch."""
@@ -234,16 +237,16 @@ def _bent(equations: Equations, state: State, loading: Loading, weight: Array) -
             bent = replace(state, q=_turned_by(equations, state, sign * vectors))
             closed, gap = restore(equations, bent, loading, weight)
             sides.append((gap, equations.at(closed, loading).potential, bent))
-    return _least(sides, SAME_GAP)[2]
+    return _least(sides)[2]
 
 
-def _least(sides: list[tuple[float, float, State]], near: float) -> tuple[float, float, State]:
-    """The entry of least energy among those whose gap is within ``near`` of the least; of equal ones the first.
+def _least(sides: list[tuple[float, float, State]], near: float = 0.0) -> tuple[float, float, State]:
+    """The entry of least energy among those with a gap up to ``near``, or else of least gap; of equal ones the first.
 
     Mirror images differ by rounding only.
     """
-    least = min(gap for gap, _, _ in sides)
-    closed = [side for side in sides if side[0] <= least + near]
+    most = max(near, min(gap for gap, _, _ in sides) + SAME_GAP)
+    closed = [side for side in sides if side[0] <= most]
     lowest = min(energy for _, energy, _ in closed)
     return next(side for side in closed if side[1] <= lowest + 1e-9 * max(1.0, abs(lowest)))
 
