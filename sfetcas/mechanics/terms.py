@@ -339,6 +339,7 @@ def _shared(
     return ca.Function(name, arguments, results, given, outputs, {"cse": True})
 
 
+@functools.cache
 def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
     """Arguments, energy, rows and generalised forces of a kind."""
     arguments, sides = _symbols(kind)
