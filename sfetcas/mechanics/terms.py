@@ -324,6 +324,7 @@ ARGUMENTS = ("q", "u", "data", "load", "lam")
 """Names of the arguments of functions of a term."""
 
 
+@functools.cache
 def _symbols(kind: Term) -> tuple[list[ca.SX], tuple[list[Side], list[Side]]]:
     """Arguments q, u, data, load, lam; the sides as lists."""
     turns, places, rows, data, load = kind.sizes
@@ -340,18 +341,23 @@ def _shared(
 
 
 @functools.cache
+def _energy(kind: Term) -> ca.SX:
+    arguments, sides = _symbols(kind)
+    return kind.energy(*sides, arguments[2], arguments[3])
+
+
+@functools.cache
 def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
     """Arguments, energy, rows and generalised forces of a kind."""
     arguments, sides = _symbols(kind)
-    energy = kind.energy(*sides, arguments[2], arguments[3])
     rows = ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, arguments[2], arguments[3]))
     forces = ca.vertcat(ca.SX(0, 1), *kind.forces(*sides, arguments[2], arguments[3]))
-    return arguments, energy, rows, forces
+    return arguments, _energy(kind), rows, forces
 
 
-def _work(kind: Term, arguments: list[ca.SX]) -> ca.SX:
-    q, u = ([ca.vertsplit(part[:, i]) for i in range(part.shape[1])] for part in arguments[:2])
-    return kind.work(q, u, arguments[2], arguments[3])
+def _work(kind: Term) -> ca.SX:
+    arguments, sides = _symbols(kind)
+    return kind.work(*sides, arguments[2], arguments[3])
 
 
 @functools.cache
@@ -393,7 +399,7 @@ def _rotation_gradient(kind: Term) -> ca.Function:
         gradient += forces
         stiffness += ca.mtimes(ca.jacobian(forces, x), basis) + _halves(forces, q.shape[1], kind.space)
     results = [
-        energy + _work(kind, arguments),
+        energy + _work(kind),
         ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape)),
         ca.densify(rows),
         ca.densify(gradient),
@@ -453,9 +459,9 @@ def _curvatures(kind: Term) -> ca.Function:
 @functools.cache
 def energies_of(kind: Term) -> ca.Function:
     """``(q, u, data, load) ->`` energy of a kind, and its part without loads."""
-    arguments, energy, _, _ = _said(kind)
+    arguments, energy = _symbols(kind)[0], _energy(kind)
     stored = ca.substitute(energy, arguments[3], ca.SX.zeros(arguments[3].shape))
-    results, names = [energy + _work(kind, arguments), stored], ["energy", "stored"]
+    results, names = [energy + _work(kind), stored], ["energy", "stored"]
     return _shared(f"energies_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], names)
 
 
