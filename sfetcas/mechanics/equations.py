@@ -472,12 +472,15 @@ class Equations:
 
     def spins(self, step: Array) -> Array:
         """Rotation vectors (rotations, turns), rad, fixed axes, of an increment of the unknowns (unknowns or more,)."""
-        tables = self.tables
-        unknown, weight = (
-            part[: tables.of_places].reshape(self.number.shape) for part in (tables.unknown, tables.weight)
-        )
-        # What is held, number -1, turns by the zero at the end.
-        return np.asarray((np.append(step[: self.rotation_unknowns], 0.0)[unknown] * weight).reshape(self.number.shape))
+        unknown, weight = self._of_rotations
+        # What is fixed, number -1, turns by the zero at the end.
+        return np.asarray(np.append(step[: self.rotation_unknowns], 0.0)[unknown] * weight)
+
+    @functools.cached_property
+    def _of_rotations(self) -> tuple[Index, Array]:
+        """Unknown of each component of a rotation, -1 for none, and its weight, (rotations, turns)."""
+        tables, shape = self.tables, self.number.shape
+        return tables.unknown[: tables.of_places].reshape(shape), tables.weight[: tables.of_places].reshape(shape)
 
     def moved(self, state: State, step: Array) -> State:
         """The state after an increment (unknowns + rows,) of all unknowns and multipliers."""

@@ -7,6 +7,7 @@ loads, or with unknown factor, orthogonal to a direction of a curve.  :func:`des
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
@@ -345,11 +346,12 @@ class _Correction:
             self.refused = True
             return None
         total, factor = self.equations.total, here.loading.factor
-        moved, factor = self.equations.moved(here.state, step[:total]), factor + float(step[total:].sum())
-        if factor != here.loading.factor:
+        moved = self.equations.moved(here.state, step[:total])
+        if len(step) > total:
+            factor += float(step[total])
             moved = self.system.with_prescribed(moved, self.system.loading(factor))
         there = self.at(moved, factor, length, here.count + 1)
-        if not np.isfinite(there.residual):
+        if not math.isfinite(there.residual):
             return None
         if there.residual > 0.25 * here.residual and self._low(here):
             return replace(there if there.residual < here.residual else here, over=True)
