@@ -105,3 +105,25 @@ def test_jitter_changes_every_number_but_not_the_scene():
         apart = np.abs(change.back(there, 1) - node.position).max() / scene.size
         assert 0.0 < apart < 1e-12
     assert list(change.scene.nodes) != list(scene.nodes)
+
+
+@pytest.mark.parametrize("direction", [(6, -8), (-6, -8), (5, -12), (7, -24)])
+def test_what_stands_upright_stays_or_leaves_by_the_rule_in_whatever_axes(direction):
+    """A pendulum begun upright: along axes that no binary number gives, rounding leads it off."""
+    gravity = 9.81 * np.array(direction) / np.linalg.norm(direction)
+    up = -gravity / 9.81
+    table = {
+        "gravity": gravity.tolist(),
+        "sections": {"s": {"rhoA": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": up.tolist()}},
+        "members": {"rod": {"nodes": ["A", "B"], "type": "rigid", "section": "s"}},
+        "analysis": {"unstable": "stay"},
+    }
+    stays = sfetcas.solve(made(table)).last
+    assert stays.certificate.stable is False
+    assert stays.angle("B") == pytest.approx(0.0, abs=1e-9)
+    # Between a spring that pulls it up and its weight there are two places of the same energy.
+    spring = {"type": "translational", "node": "B", "stiffness": 20.0, "anchor": (2.0 * up).tolist()}
+    leaves = sfetcas.solve(made({**table, "springs": {"k": spring}, "analysis": {}})).last
+    assert leaves.certificate.stable is True
+    assert leaves.angle("B") > 0.1

@@ -5,6 +5,7 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path as File
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,9 +18,9 @@ from sfetcas.mechanics.model import assemble
 from sfetcas.paths import paths
 from sfetcas.pictures.charts import chart
 from sfetcas.solvers.arclength import Curve, Tangent
-from sfetcas.solvers.critical import events_between, root
+from sfetcas.solvers.critical import Event, events_between, root
 from sfetcas.solvers.prepared import Prepared
-from sfetcas.solvers.tracing import trace
+from sfetcas.solvers.tracing import Traced, _with_crossed_folds, trace
 
 PROBLEMS = File(__file__).parent.parent / "problems"
 P_LEE = (1.85587465394782, -0.942128745387476)
@@ -835,3 +836,12 @@ def test_root_at_the_kink_of_the_lower_of_two_eigenvalues_is_found_in_few_steps(
 
     assert root(lower, 0.0, lower(0.0), 1.0, lower(1.0)) == pytest.approx(0.3, abs=1e-9)
     assert len(asked) < 15
+
+
+def test_a_stretch_that_ends_at_an_event_keeps_it():
+    """Folds at which no eigenvalue changes its sign are looked for up to the next ordinary point, or to the end."""
+    points = [SimpleNamespace(arc=float(i), inertia=SimpleNamespace(zero=0, negative=0)) for i in range(4)]
+    last = Event("limit", points[3])
+    found = _with_crossed_folds(Traced(points, [last], "range"), 0)
+    assert found.points == points
+    assert found.events == [last]

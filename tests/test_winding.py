@@ -201,3 +201,29 @@ def test_universal_support_gives_no_moment_about_its_axes(between):
     efforts = [sign * step.spring(name).effort for name in ("one", "two")]
     np.testing.assert_allclose(moment + efforts[0] * one + efforts[1] * carried, -np.cross(tip, force), atol=1e-11)
     assert np.linalg.norm(moment) > 0.1
+
+
+@pytest.mark.parametrize(
+    "load",
+    [{"value": [0, 0, 0]}, {"value": [0, 0.5, 0], "frame": "follower", "history": "late"}],
+    ids=["no load", "follower with a dead time"],
+)
+def test_where_nothing_acts_an_angle_that_counts_turns_stays(load):
+    """No correction is needed there, which is no sign of a step that is too long."""
+    scene = {
+        "dimension": "space",
+        "sections": {"s": {"EI2": 1.0, "EI3": 1.0, "GJ": 1.0}},
+        "nodes": {
+            "A": {"position": [0, 0, 0], "support": "clamped"},
+            "B": {"position": [1, 0, 0], "joint": "hinge", "axis": [0, 0, 1]},
+            "C": {"position": [2, 0, 0]},
+        },
+        "members": {"a": {"nodes": ["A", "B"], "section": "s"}, "b": {"nodes": ["B", "C"], "section": "s"}},
+        "springs": {"k": {"type": "rotational", "node": "B", "between": ["a", "b"], "stiffness": 1.0}},
+        "loads": {"p": {"type": "force", "node": "C", **load}},
+        "histories": {"late": {"t": [0, 0.5, 1], "value": [0, 0, 1]}} if "history" in load else {},
+    }
+    step = solve(made(scene)).last
+    assert step.way == ("growing",)
+    plane = {**scene, "dimension": "plane"}
+    assert step.position("C") == pytest.approx(solve(made(plane)).last.position("C"), abs=1e-6)

@@ -120,6 +120,11 @@ class Scene(Record):
             lines[name] = place(member.shape, start, end, member.b2, ("members", name))
         return MappingProxyType(lines)
 
+    @property
+    def started(self) -> bool:
+        """Whether nodes have ``start`` places, which choose among equilibria."""
+        return any(node.start is not None for node in self.nodes.values())
+
     @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box of the undeformed members, m."""

@@ -30,7 +30,7 @@ PILOT_ORDER = 4
 """Coarse meshes of lower order have equilibria that no beam has."""
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class EquilibriumResult:
     """An equilibrium in the course of an analysis.
 

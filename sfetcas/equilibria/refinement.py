@@ -38,7 +38,7 @@ HUGE = 2000
 LEVELS = 40
 """Most refinements of a mesh: a boundary layer of 1e-8 of a member needs about 27."""
 
-STALLED = 3
+STALLS = 3
 """Halvings of all elements in a row that leave more than half of the error: what is left is rounding."""
 
 MOST_FURTHER = 300
@@ -73,7 +73,7 @@ COARSE = 0.1
 RESISTED = 2e-9
 """Eigenvalues above this, in those of the softest member, and above rounding hold a mechanism, if barely."""
 
-CARRIED = 1e-6
+LOOSE = 1e-6
 """Share of what acts that redundant multipliers carry, on next to nothing: rounding of what hardly acts is far less."""
 
 LARGE = 1e3
@@ -180,7 +180,7 @@ class Refinement:
                 if error <= self.meshes.accuracy:
                     return self._answer(now, max(error, self._of_fixed(now)), difference)
                 stalled = stalled + 1 if error > 0.5 * last else 0
-                if stalled == STALLED:
+                if stalled == STALLS:
                     return self._answer(now, max(error, self._of_fixed(now)), difference)
                 last, smooth = error, min(usual, 0.1 * smooth)
             elif now.solved.model.mesh.elements > (MOST_FURTHER if now.kept else MOST_ELEMENTS):
@@ -244,27 +244,18 @@ class Refinement:
         return now
 
     def _answer(self, found: EquilibriumResult, error: float, halved: float | None = None) -> Equilibrium:
-        """The answer with its estimated error, and how far it is from that on half the elements."""
-        found = _with_unique_reactions(found)
-        solved, prepared = found.solved, found.solved.prepared
-        stability = solved.stability
-        _refuse_many_turns(solved)
-        self._refuse_torn(solved)
-        if not found.kept:
-            _refuse_free(solved)
-        if (
-            stability.negative > 0
-            and self.meshes.switch_branch
-            and prepared.switches_branch
-            and not found.kept
-            and KEPT not in found.notes
-        ):
-            solved = prepared.switch_branch(solved, solved.loading)
+        """The answer with its estimated error, and how far it is from that before all elements were halved."""
+        found = self._accepted(found)
+        leaves = self.meshes.switch_branch and not found.kept and KEPT not in found.notes
+        if leaves and found.solved.stability.negative > 0 and found.solved.prepared.switches_branch:
+            solved = found.solved.prepared.switch_branch(found.solved, found.solved.loading)
             note = "left an equilibrium that is unstable on the fine mesh only"
             notes, way = (*found.notes, note), (*found.way, "left")
             found = replace(found, solved=solved, stability=solved.stability, notes=notes, way=way)
-            # The error was that of the state that was left.
-            error = sum(self._difference(found, self.onto(solved.model.mesh.refined(), found)))
+            # The error and the difference were those of the state that was left.
+            error, halved = sum(self._difference(found, self.onto(solved.model.mesh.refined(), found))), None
+            found = self._accepted(found)
+        solved = found.solved
         twin = any(ALONG_MODE in note for note in found.notes) and has_twin(solved)
         return finished(
             solved,
@@ -275,6 +266,21 @@ class Refinement:
             iterations=found.iterations,
             way=found.way,
         )
+
+    def _accepted(self, found: EquilibriumResult) -> EquilibriumResult:
+        """The same with unique reactions, where it is an equilibrium of the scene and not of the mesh only.
+
+        Raises
+        ------
+        SceneError, SolveError
+            Nothing holds it, or angles or forces have no meaning.
+        """
+        found = _with_unique_reactions(found)
+        _refuse_many_turns(found.solved)
+        self._refuse_torn(found.solved)
+        if not found.kept:
+            _refuse_free(found.solved)
+        return found
 
     def _refuse_torn(self, found: Solved) -> None:
         """Refuse rotations that jump within an element, however short: a full turn there bends no beam.
@@ -309,7 +315,7 @@ def more_than(mesh: Mesh, source: EquilibriumResult) -> str:
 
 
 def _with_coarse_moments(now: EquilibriumResult, finer: EquilibriumResult) -> EquilibriumResult:
-    """The same, with a note where section moments are far from those on half the elements, wherever positions are."""
+    """The same, with a note where section moments are far from those on twice the elements, wherever positions are."""
     most = apart = 0.0
     for name, cuts in now.solved.model.mesh.cuts.items():
         middles = 0.5 * (cuts[1:] + cuts[:-1])
@@ -319,7 +325,9 @@ def _with_coarse_moments(now: EquilibriumResult, finer: EquilibriumResult) -> Eq
     if apart <= COARSE * most:
         return now
     share = f"by {100.0 * apart / most:.0f} % of the largest" if most > 0.0 else "from none"
-    return replace(now, notes=(*now.notes, f"section moments differ {share} from those on half the elements asked for"))
+    return replace(
+        now, notes=(*now.notes, f"section moments differ {share} from those on twice the elements asked for")
+    )
 
 
 def _refuse_many_turns(found: Solved) -> None:
@@ -384,7 +392,7 @@ def _with_unique_reactions(found: EquilibriumResult) -> EquilibriumResult:
     # Springs and motions act as loads do: beside all that does, and what was left before, loose rows carry nothing.
     acting, left = (p[: equations.unknowns] for p in (point.scale - equations.noise, solved.point.residual))
     carried = np.abs(point.residual[: equations.unknowns] - left).max(initial=0.0)
-    needed = carried > CARRIED * acting.max(initial=LEAST_SCALE) and carried > np.abs(left).max(initial=0.0)
+    needed = carried > LOOSE * acting.max(initial=LEAST_SCALE) and carried > np.abs(left).max(initial=0.0)
     if residual <= tolerances.BALANCED and not needed:
         solved = replace(solved, state=state, point=point, residual=residual)
     elif solved.multipliers > BEYOND or needed:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -113,7 +112,7 @@ class Ways:
 
     def __init__(self, meshes: Meshing) -> None:
         self.meshes, self.scene = meshes, meshes.scene
-        self.started = any(node.start is not None for node in meshes.scene.nodes.values())
+        self.started = meshes.scene.started
 
     # -- the order ------------------------------------------------------------------------------------
 
@@ -186,7 +185,8 @@ class Ways:
         if not pilot.model.conservative:
             diverged = found.solved.diverged
             regular = diverged == 0 and CARRIED not in found.notes
-            found.notes += (NO_POTENTIAL if regular else DIVERGED if diverged else NO_ENERGY,)
+            note = NO_POTENTIAL if regular else DIVERGED if diverged else NO_ENERGY
+            found = replace(found, notes=(*found.notes, note))
         return found
 
     def _finer(self, pilot: Prepared, error: SolveError) -> Prepared | None:
@@ -205,14 +205,14 @@ class Ways:
         if alone is None:
             return grown
         pilot = grown.solved.prepared
-        grown.iterations = alone.iterations
         apart = pilot.distance(alone.solved.state, grown.solved.state) > 1e-3
         # What falls from its start guess is nearest to no minimum.
         restrained = pilot.diagnosis.mobility == 0
         notable = restrained and alone.solved.multipliers <= BEYOND and not grown.notes
+        notes = grown.notes
         if notable and apart and alone.stability.negative == 0:
-            grown.notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
-        return grown
+            notes += ("the loads growing from zero lead here, not to the minimum nearest to the start guess",)
+        return replace(grown, iterations=alone.iterations, notes=notes)
 
     def named(self, pilot: Prepared, error: SolveError) -> SolveError:
         """The error with the names of unrestrained mechanisms, and of members without slack, where there are any."""
@@ -318,8 +318,13 @@ class Ways:
         """Whether straight members carry the loads all the way without bending: where they do not move at the end."""
         if pilot.model.loaded_at_zero or self.scene.histories:
             return False
-        there = pilot.correct(zero, pilot.model.loading(factor))
-        return there.converged and pilot.distance(there.state, zero) < STRAIGHT
+        return self._resting(pilot, zero, pilot.model.loading(factor)) is not None
+
+    @staticmethod
+    def _resting(pilot: Prepared, state: State, loading: Loading) -> Solved | None:
+        """The equilibrium that a state is but for rounding; None if it is none."""
+        there = pilot.correct(state, loading)
+        return there if there.converged and pilot.distance(there.state, state) < STRAIGHT else None
 
     def _through(
         self, pilot: Prepared, begin: float, end: float, state: State, allowed: Allowed | None = None
@@ -338,8 +343,8 @@ class Ways:
         return found
 
     def _grown_from_bent(self, pilot: Prepared, factor: float, allowed: Allowed | None) -> EquilibriumResult | None:
-        """As :meth:`_grown` where straight members have no slack to begin with: from a slightly moved state."""
-        # What cannot be minimised is followed to each, in thousands of steps where it falls.
+        """As :meth:`grown_from_zero`, from where a small share of the loads moves the structure to."""
+        # Without a potential each share is reached in many steps: only the first is tried.
         for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
             begin = share * factor
             bent = self._put(pilot, pilot.model.loading(begin))
@@ -359,8 +364,10 @@ class Ways:
     def _put(self, pilot: Prepared, loading: Loading) -> EquilibriumResult | None:
         """Where a small share of the loads puts what has no place without them: downhill, or from the start guess."""
         if pilot.diagnosis.mobility and pilot.countable:
-            # IPOPT may take any of several places of the same energy, as rounding of its long way decides.
-            there = pilot.downhill(self._unloaded(pilot), loading)
+            zero = self._unloaded(pilot)
+            # IPOPT may take any of several places of the same energy, as rounding of its long way decides; downhill
+            # from what stands upright rounding decides as well.
+            there = self._resting(pilot, zero, loading) or pilot.downhill(zero, loading)
             if there is not None:
                 return EquilibriumResult(there, there.stability)
         return self._direct(pilot, loading)[0]
@@ -368,7 +375,7 @@ class Ways:
     def _followed(
         self,
         pilot: Prepared,
-        way: Any,
+        way: Callable[[float], Loading],
         state: State,
         factors: tuple[float, float] | None,
         allowed: Allowed | None = None,
@@ -377,20 +384,14 @@ class Ways:
         switch_branch, energy_known = self.meshes.switch_branch and pilot.switches_branch, pilot.model.minimisable
 
         def refuse(there: Solved) -> None:
-            refuse_large(there.fields)
+            if self.meshes.has_superelements:
+                refuse_large(there.fields)
 
-        result = follow(
-            pilot,
-            way,
-            state,
-            switch_branch=switch_branch,
-            allowed=allowed,
-            refuse=refuse if self.meshes.has_superelements else None,
-        )
+        result = follow(pilot, way, state, switch_branch=switch_branch, allowed=allowed, refuse=refuse)
         passed = not result.reached and switch_branch and not energy_known
         if passed:
             # What cannot be minimised has this one way: better an unstable state that says so than none.
-            result = follow(pilot, way, state, switch_branch=False, allowed=allowed)
+            result = follow(pilot, way, state, switch_branch=False, allowed=allowed, refuse=refuse)
         if not result.reached:
             return None
         solved = pilot.correct(result.state, way(1.0))

@@ -8,9 +8,9 @@ of the rotations ``q`` and displacements ``u`` of its *sides*.  The rows of a jo
 are unknowns.  The row of an element is the change of its chord, and its multiplier the internal force, which is linear
 in the multipliers of the loop closures.  A term without potential gives generalised forces instead of an energy.
 
-A kind of term is one class that defines these functions.  Their derivatives follow from the one expression, once a
-process and kind, in either chart: components of rotations, whose norms are further constraints (IPOPT's program), or
-rotation vectors about the fixed axes, ``dq = 1/2 (0, phi) q`` on unit quaternions (Newton's method).
+A kind of term is one class that defines these functions.  Their derivatives follow from the one expression, once for
+each kind in a process, in either chart: components of rotations, whose norms are further constraints (IPOPT's
+program), or rotation vectors about the fixed axes, ``dq = 1/2 (0, phi) q`` on unit quaternions (Newton's method).
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ class Term(Components, abc.ABC):
         """Quantities for the answer, in the order of :attr:`answers`, dimensionless; ``lam``: multipliers."""
         return []
 
-    # -- what the sides say to each other --------------------------------------------------------
+    # -- vectors and rotations of the sides --------------------------------------------------------
 
     def back(self, q: Side, v: Side) -> Side:
         """The components of a vector in rotated axes, ``R(q)^T v``."""
@@ -347,7 +347,7 @@ def _energy(kind: Term) -> ca.SX:
 
 
 @functools.cache
-def _said(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
+def _expressions(kind: Term) -> tuple[list[ca.SX], ca.SX, ca.SX, ca.SX]:
     """Arguments, energy, rows and generalised forces of a kind."""
     arguments, sides = _symbols(kind)
     rows = ca.vertcat(ca.SX(0, 1), *kind.residual(*sides, arguments[2], arguments[3]))
@@ -379,7 +379,7 @@ def rotation_gradient(kind: Term) -> ca.Function:
 
 
 def _rotation_gradient(kind: Term) -> ca.Function:
-    arguments, energy, rows, forces = _said(kind)
+    arguments, energy, rows, forces = _expressions(kind)
     q, u = arguments[0], arguments[1]
     x = ca.vertcat(ca.vec(q), ca.vec(u))
     hessian, gradient = ca.hessian(energy + ca.dot(arguments[4], rows), x)
@@ -436,7 +436,7 @@ def slopes_of(kind: Term) -> ca.Function:
 
 
 def _slopes(kind: Term) -> ca.Function:
-    arguments, energy, rows, _ = _said(kind)
+    arguments, energy, rows, _ = _expressions(kind)
     x = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1]))
     results = [ca.densify(ca.gradient(energy, x)), ca.densify(ca.jacobian(rows, x))]
     return _shared(f"slopes_{name_of(kind)}", arguments[:4], results, [*ARGUMENTS[:4]], ["gradient", "jacobian"])
@@ -449,7 +449,7 @@ def curvatures_of(kind: Term) -> ca.Function:
 
 
 def _curvatures(kind: Term) -> ca.Function:
-    arguments, energy, rows, _ = _said(kind)
+    arguments, energy, rows, _ = _expressions(kind)
     x, weight = ca.vertcat(ca.vec(arguments[0]), ca.vec(arguments[1])), ca.SX.sym("weight")
     hessian = ca.densify(ca.hessian(weight * energy + ca.dot(arguments[4], rows), x)[0])
     given = [*ARGUMENTS, "weight"]
@@ -468,7 +468,7 @@ def energies_of(kind: Term) -> ca.Function:
 @functools.cache
 def rows_of(kind: Term) -> ca.Function:
     """``(q, u, data, load) ->`` constraint rows of a kind."""
-    arguments, _, rows, _ = _said(kind)
+    arguments, _, rows, _ = _expressions(kind)
     return ca.Function(f"rows_{name_of(kind)}", arguments[:4], [ca.densify(rows)], [*ARGUMENTS[:4]], ["rows"])
 
 

@@ -72,7 +72,7 @@ class Trace:
         What happened on the way.
     end : str
         Why it ends: ``range``, ``points``, ``lost``, or ``bent``: a small member is bent beyond linear elasticity.
-    told : str
+    message : str
         For ``bent``: which member, and how far.
     corners : set of int
         Indices of points after which the contacts change.

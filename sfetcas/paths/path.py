@@ -269,7 +269,7 @@ class Path:
 
 
 def ending(end: str, factor: float, count: int, message: str) -> str:
-    """A sentence on why a branch of ``count`` points ends at a factor; ``told`` names a small member bent too far."""
+    """A sentence on why a branch of ``count`` points ends at a factor; ``message``: a small member bent too far."""
     return {
         "range": f"the factor leaves the range at {factor:g}",
         "points": f"{count} points",

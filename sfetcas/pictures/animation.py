@@ -21,7 +21,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array, Index
 from ..paths.path import Path
 from .files import check_ending
-from .glyphs import sketch_holds
+from .glyphs import sketch_supports
 from .sheet import DOTTED, Sheet, axes_on, plot_line, title_of
 from .sketch import REST, Mark, Sketch, course_of, in_short, prefix, view_of
 
@@ -158,7 +158,7 @@ class _Film:
         """What holds the structure at a step."""
         course = replace(self._course, last=self._lines[number], earlier=self._lines)
         sketch = Sketch(self._scene, self._steps[number], course, self._view)
-        sketch_holds(sketch)
+        sketch_supports(sketch)
         return sketch
 
     def show(self, number: int, text: str) -> None:

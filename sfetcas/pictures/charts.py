@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from ..mathematics.arrays import TINY, Array
 from ..paths.path import Branch, Path
 from .files import DPI, check_ending, save_figure
-from .glyphs import sketch_holds
+from .glyphs import sketch_supports
 from .looks import dashes_of
 from .sheet import DOTTED, Sheet, axes_on, drawn_text, plot_line, title_of
 from .sketch import REST, Course, Sketch, course_of, view_of
@@ -229,7 +229,7 @@ def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     course = course_of(path.scene, [path.configuration(point) for point in points], "none")
     view = view_of(path.model.space, [course.everything])
     sketch = Sketch(path.scene, path.configuration(path.points[-1]), course, view)
-    sketch_holds(sketch)
+    sketch_supports(sketch)
     assert isinstance(paper.figure, Figure)
     axes = axes_on(paper.figure, paper, sketch)
     _draw_lines(axes, course, shapes)

@@ -37,10 +37,10 @@ from .sketch import (
     tangents_of,
 )
 
-__all__ = ["sketch_all", "sketch_holds"]
+__all__ = ["sketch_all", "sketch_supports"]
 
 ARROW = 0.12
-"""Length of the longest arrow over the size of the picture; the other constants are meant like this."""
+"""Length of the longest arrow over the size of the picture; sizes below are shares of it, too."""
 SYMBOL = 0.03
 SPRING = "#5A5A5A"
 SPIRAL = 0.026
@@ -55,13 +55,13 @@ TURNS = {LOAD: 0.05, REACTION: 0.063, MOTION: 0.076}
 
 def sketch_all(sketch: Sketch) -> None:
     """Sketch everything but the centre lines; what comes first has the free choice of place."""
-    sketch_holds(sketch)
+    sketch_supports(sketch)
     _sketch_tables(sketch, LOADS)
 
 
-def sketch_holds(sketch: Sketch) -> None:
+def sketch_supports(sketch: Sketch) -> None:
     """Add symbols of obstacles, supports, joints and springs to a sketch."""
-    _sketch_tables(sketch, HOLDS)
+    _sketch_tables(sketch, SUPPORTS)
 
 
 def _sketch_tables(sketch: Sketch, glyphs: Iterable[tuple[str, Glyph]]) -> None:
@@ -251,11 +251,11 @@ def _sketch_zigzag(sketch: Sketch, name: str, spring: Spring) -> None:
     if norm(apart) < SHORT * sketch.size:
         return
     along = apart / norm(apart)
-    across = sketch.view.raised(left_of(flat_unit(sketch.view.flat(along), (1.0, 0.0))))
+    aside = sketch.view.raised(left_of(flat_unit(sketch.view.flat(along), (1.0, 0.0))))
     teeth = int(np.clip(round(1.2 * norm(apart) / (SYMBOL * sketch.size)), 5, 60))
     share = np.array([0.0, 0.15, *(0.15 + 0.7 * (np.arange(teeth) + 0.5) / teeth), 0.85, 1.0])
     side = np.array([0.0, 0.0, *(1.0 - 2.0 * (np.arange(teeth) % 2)), 0.0, 0.0])
-    points = end + share[:, None] * apart + 0.5 * SYMBOL * sketch.size * side[:, None] * across
+    points = end + share[:, None] * apart + 0.5 * SYMBOL * sketch.size * side[:, None] * aside
     sketch.line(points, f"spring-{name}", colour=SPRING, width=0.9, level=4.5)
     if spring.to is None:
         down = flat_unit(sketch.view.flat(along), (0.0, -1.0))
@@ -424,7 +424,7 @@ def _label_place(profile: Array) -> int:
 Glyph = Callable[[Sketch, str, Any], None]
 """Sketches what belongs to a record: (sketch, name, record)."""
 
-HOLDS: tuple[tuple[str, Glyph], ...] = (
+SUPPORTS: tuple[tuple[str, Glyph], ...] = (
     ("contacts", _sketch_contact),
     ("nodes", _sketch_node),
     ("members", _sketch_release),

@@ -23,7 +23,7 @@ from ..dynamics.motion import MotionState, Trajectory
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .files import DPI, check_ending, save_figure
-from .glyphs import sketch_holds
+from .glyphs import sketch_supports
 from .sheet import DOTTED, Sheet, axes_on, drawn_text, plot_line, title_of
 from .sketch import REST, Ink, Sketch, course_of, prefix, view_of
 
@@ -172,7 +172,7 @@ def _draw_strobes(figure: Figure, paper: Axes, motion: Trajectory) -> None:
     course = course_of(scene, chosen, "none")
     view = view_of(motion.last.model.space, [course.everything])
     sketch = Sketch(scene, chosen[-1], course, view)
-    sketch_holds(sketch)
+    sketch_supports(sketch)
     _sketch_ways(sketch, motion)
     axes = axes_on(figure, paper, sketch)
     unit, letter = _unit_of_time(motion)

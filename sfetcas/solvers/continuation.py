@@ -1,9 +1,8 @@
 """Continuation: the loop of all step by step ways, and the way of an equilibrium as loads and motions grow.
 
-Nobody has to prescribe load steps; this is a check, and it costs a few Newton iterations.  The library asks
-which of several equilibria the growing loads lead to: the state is followed from the undeformed scene in as
-few steps as Newton's method allows, the inertia is counted at each of them, and where the state ceases to be
-stable it is left along its unstable mode.
+Nobody has to prescribe load steps.  :func:`follow` tells which of several equilibria growing loads lead to: the state
+is followed in as few steps as Newton's method allows, negative eigenvalues are counted at each of them, and where the
+state ceases to be stable it is left along its unstable mode.
 """
 
 from __future__ import annotations
@@ -36,12 +35,13 @@ LEAST_STEP = 1e-12
 """The first step is never below this part of the way."""
 
 HALF_TURN, LINEAR = np.pi, 1e-3
-"""A step turns a node by at most half a turn, rad, beyond which Newton's method may end whole turns away as well as it
-ends here, unless its corrections, rad, show that the answer is linear; where turns are counted also then."""
+"""The first correction of a step rotates a node by at most half a turn, rad: beyond that Newton's method may end whole
+turns away.  A second correction below the second number, rad, shows that the answer is linear, and any first one is
+taken, but where the scene has angles that count turns."""
 
 UNBALANCED, STILL = 1e-4, 1e-3
-"""Part of the way of a first step that need not be shorter where the second of its corrections is this share of the
-first, and equilibrium is missed all the same: no unknown carries the loads."""
+"""A first step of at most this part of the way, whose second correction is less than this share of its first and that
+still does not converge, ends the way: the state does not move any more, so no unknown carries the loads."""
 
 NARROW = 0.02
 """The share of the way done at which a stable and an unstable state are near enough to leave between them."""
@@ -56,7 +56,8 @@ FARTHEST = 200.0
 """So many of these steps a way has at most: what is driven on beyond, in the plane, takes longer ones."""
 
 CREPT, CREEPS = 1e-3, 3
-"""What lands this near, rad, has left nothing; so many times it happens by chance, and else the way leads nowhere."""
+"""Leaving an unstable state that ends within the first number, rad, of where it began has not left it; the way ends
+when this happens more often than the second number says."""
 
 MOST = 400
 """Steps tried before giving up."""
@@ -101,7 +102,7 @@ def near_factor(factor: float) -> str:
 
 
 JUMPED = "left an unstable equilibrium there along its unstable mode"
-"""What became of it."""
+"""What a note says of a place on the way where a state was left."""
 
 
 Point = TypeVar("Point")
@@ -213,7 +214,7 @@ class _Following:
             return None, 0.0 if step <= BLOCKED else step * (0.5 if there.first < 2.0 * STEP_ROTATION else 0.25)
         unstable = self._negative(there) if good and self.switch_branch else 0
         if not good or unstable is None:
-            # No step may move the state any more, and something be out of balance, in a short step as in a long one.
+            # Short steps may leave the state where it is and out of balance, just as long ones do.
             stuck = here.done == 0.0 and step <= UNBALANCED and there.second < STILL * there.first and not far
             if not stuck and step > max(SHORTEST * here.done, LEAST_STEP):
                 return None, step * (0.1 if here.done == 0.0 else 0.5 if there.iterations > 2 else 0.25)
@@ -233,7 +234,7 @@ class _Following:
 
     def _snapped(self, here: _On) -> tuple[_On | None, float]:
         """The stable state shortly beyond one that ends its branch, and the length of the next step."""
-        # What is no equilibrium has no unstable mode, whatever a first step balances to rounding.
+        # Only an equilibrium has an unstable mode.
         if not self.switch_branch or not here.found.converged:
             return None, 0.0
         beyond = min(1.0, here.done * (1.0 + 10.0 * SHORTEST) + LEAST_STEP)
@@ -252,7 +253,7 @@ class _Following:
 
     @staticmethod
     def _negative(found: Solved) -> int | None:
-        """Negative eigenvalues; None where forces without bound meet closings that no unknown changes, by rounding."""
+        """Number of negative eigenvalues; None where multipliers without bound leave none that can be counted."""
         try:
             return found.negative
         except SolveError:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ __all__ = [
     "TURN",
     "AtLoads",
     "Balance",
+    "Converged",
     "Iterate",
     "Limits",
     "Moving",
@@ -50,7 +51,7 @@ class Iterate:
     point : Point
         The equations there, as the functions of steps take them.
     length : float
-        Largest rotation of the step that led here, rad; infinite at the first state.
+        Largest rotation of the full Newton step, before it was shortened, that led here, rad; infinite at first.
     count : int
         Steps taken so far.
     """
@@ -291,11 +292,20 @@ class Balance(Iterate):
     over: bool = False
 
 
-Found = tuple[State, Loading, Point, float, bool, int, float, float]
-"""What :func:`correct` finds: what a :class:`~sfetcas.solvers.prepared.Solved` has besides its model, in its order."""
+class Converged(NamedTuple):
+    """Result of :func:`correct`: the fields of a :class:`~sfetcas.solvers.prepared.Solved` besides its model."""
+
+    state: State
+    loading: Loading
+    point: Point
+    residual: float
+    converged: bool
+    iterations: int
+    first: float
+    second: float
 
 
-def correct(system: System, state: State, *, factor: float = 1.0, limits: Limits | None = None) -> Found:
+def correct(system: System, state: State, *, factor: float = 1.0, limits: Limits | None = None) -> Converged:
     """Newton's method from a near state down to rounding: as long as a step reduces the residual to a fourth.
 
     A residual that rounding of the state explains counts as converged, too.  Multipliers of redundant rows follow the
@@ -363,7 +373,7 @@ class _Correction:
             return here.count > 0 or (self.limits.returns and balanced(self.equations, here.point))
         return here.count > 0 and rounded(self.equations, here.state, here.point)
 
-    def __call__(self, state: State, factor: float) -> Found:
+    def __call__(self, state: State, factor: float) -> Converged:
         begin = self.at(self.system.with_prescribed(state, self.system.loading(factor)), factor)
         here, _ = newton(begin, self.system.step, self.after, self.arrived, self.limits.iterations)
         tolerance, count = tolerances.CONVERGED, here.count
@@ -377,8 +387,9 @@ class _Correction:
         if good and complete:
             found, point = with_sharing(self.equations, found, here.loading, point, max(tolerance, residual))
             residual = relative_residual(self.equations, point)
-        first, second = (*self.lengths[:2], *(np.inf, 0.0)[len(self.lengths) :])
-        return found, here.loading, point, residual, good, count, first, second
+        # Where nothing acts no step is taken; where none could be taken nothing is known.
+        first, second, *_ = [*self.lengths, 0.0 if self.lengths or good else np.inf, 0.0]
+        return Converged(found, here.loading, point, residual, good, count, first, second)
 
 
 # -- downhill ------------------------------------------------------------------------------------------------

@@ -125,7 +125,7 @@ class Prepared:
     @property
     def started(self) -> bool:
         """Whether nodes have ``start`` places, which choose among equilibria."""
-        return any(node.start is not None for node in self.model.scene.nodes.values())
+        return self.model.scene.started
 
     def correct(
         self,
@@ -149,7 +149,7 @@ class Prepared:
             Fields of :class:`~sfetcas.solvers.newton.Limits`.
         """
         system = AtLoads(self.equations, loading, self._test.weight, tangent, flat, drag)
-        return Solved(self, *correct(system, state, limits=Limits(**limits)))
+        return Solved(self, **correct(system, state, limits=Limits(**limits))._asdict())
 
     @functools.cached_property
     def _tangent(self) -> TangentTest:
@@ -431,11 +431,7 @@ class Solved:
     @property
     def negative(self) -> int:
         """Number of negative eigenvalues, at less cost; 0 if :attr:`Prepared.switches_branch` is false."""
-        if not self.prepared.switches_branch:
-            return 0
-        if self.model.conservative:
-            return self.prepared._test.negative(self.point)
-        return self.prepared._tangent.inertia(self.point).negative
+        return self.prepared._test.negative(self.point) if self.prepared.switches_branch else 0
 
     @property
     def diverged(self) -> int | None:

@@ -55,7 +55,7 @@ MOST_AT_ONCE = 6
 SEARCHED = 200
 """Points at which critical ones may be looked for, or as many as a curve may have if these are more.
 
-A bifurcation takes five to fifteen; where more are needed rounding makes one after the other of them.
+A bifurcation takes five to fifteen; more are needed only where rounding makes bifurcations that there are not.
 """
 
 EXPECTED = 3
@@ -87,7 +87,7 @@ class Traced:
         Why it ends: ``range`` (the factor leaves it), ``points`` (as many as asked for), ``closed`` (the last point is
         the first one again), ``lost`` (no further point was found), or ``bent`` (a small member beyond linear
         elasticity).
-    told : str
+    message : str
         Where it ends ``bent``: a sentence that names the member and its deformation.
     """
 
@@ -151,6 +151,7 @@ def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
             events[id(between[0])] = Event("bifurcation", between[0])
         points += [*between, point]
         firm = i
+    points += traced.points[firm + 1 :]
     order = [events[id(point)] for point in points if id(point) in events]
     return Traced(points, order, traced.end, traced.message)
 
@@ -195,7 +196,8 @@ def _apart(curve: Curve, a: Standing, b: Standing) -> float:
 class _Piece:
     """A stretch of a curve within one piece of the histories, in steps that change the factor by a stride at most.
 
-    ``more`` is the number of steps that are still to be taken, ``budget`` the number of points that searches may take.
+    ``more`` is the number of steps that are still to be taken, ``budget`` the value of ``curve.searched`` at which the
+    stretch is given up.
     """
 
     curve: Curve
@@ -211,12 +213,11 @@ class _Piece:
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
-        _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended, shortest=SHORTEST)
+        _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended(), shortest=SHORTEST)
         return Traced(self.points, self.events, self.end if arrived else "lost", self.message)
 
-    @property
     def ended(self) -> bool:
-        """Whether no further step is to be taken, and why not."""
+        """Whether no further step is to be taken; ``end`` says why not."""
         if not self.end and self.more <= 0:
             self.end = "points"
         elif not self.end and self.curve.searched > self.budget:
