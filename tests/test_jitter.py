@@ -69,9 +69,7 @@ SCENES = {
 def test_the_same_answer_after_what_nobody_means(name):
     scene = SCENES[name]
     first = answered(scene)
-    # In the second change IPOPT takes what falls far to another of two places of the same energy.
-    for change in (1, 2) if name == "mechanism that falls far" else (1,):
-        assert differences(scene, jittered(scene, change), first) == []
+    assert differences(scene, jittered(scene, 1), first) == []
 
 
 def test_twins_are_chosen_by_a_rule_and_told():
@@ -127,3 +125,6 @@ def test_what_stands_upright_stays_or_leaves_by_the_rule_in_whatever_axes(direct
     leaves = sfetcas.solve(made({**table, "springs": {"k": spring}, "analysis": {}})).last
     assert leaves.certificate.stable is True
     assert leaves.angle("B") > 0.1
+    # Without it half a turn, not two and a half, as IPOPT takes it in long steps.
+    falls = sfetcas.solve(made({**table, "analysis": {}})).last
+    assert falls.angle("B") == pytest.approx(np.pi, abs=1e-6)

@@ -318,13 +318,8 @@ class Ways:
         """Whether straight members carry the loads all the way without bending: where they do not move at the end."""
         if pilot.model.loaded_at_zero or self.scene.histories:
             return False
-        return self._resting(pilot, zero, pilot.model.loading(factor)) is not None
-
-    @staticmethod
-    def _resting(pilot: Prepared, state: State, loading: Loading) -> Solved | None:
-        """The equilibrium that a state is but for rounding; None if it is none."""
-        there = pilot.correct(state, loading)
-        return there if there.converged and pilot.distance(there.state, state) < STRAIGHT else None
+        there = pilot.correct(zero, pilot.model.loading(factor))
+        return there.converged and pilot.distance(there.state, zero) < STRAIGHT
 
     def _through(
         self, pilot: Prepared, begin: float, end: float, state: State, allowed: Allowed | None = None
@@ -347,7 +342,7 @@ class Ways:
         # Without a potential each share is reached in many steps: only the first is tried.
         for share in SMALL_SHARES if pilot.model.minimisable else SMALL_SHARES[:1]:
             begin = share * factor
-            bent = self._put(pilot, pilot.model.loading(begin))
+            bent, _ = self._direct(pilot, pilot.model.loading(begin))
             if bent is not None:
                 break
         if bent is None:
@@ -360,17 +355,6 @@ class Ways:
                 return None
         found = self._followed(pilot, between(pilot.model, begin, factor), state, (begin, factor), allowed)
         return None if found is None else replace(found, way=("small share", *found.way[1:]))
-
-    def _put(self, pilot: Prepared, loading: Loading) -> EquilibriumResult | None:
-        """Where a small share of the loads puts what has no place without them: downhill, or from the start guess."""
-        if pilot.diagnosis.mobility and pilot.countable:
-            zero = self._unloaded(pilot)
-            # IPOPT may take any of several places of the same energy, as rounding of its long way decides; downhill
-            # from what stands upright rounding decides as well.
-            there = self._resting(pilot, zero, loading) or pilot.downhill(zero, loading)
-            if there is not None:
-                return EquilibriumResult(there, there.stability)
-        return self._direct(pilot, loading)[0]
 
     def _followed(
         self,

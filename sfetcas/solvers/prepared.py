@@ -327,8 +327,9 @@ class Prepared:
 
     def _fallen(self, state: State, loading: Loading) -> Solved:
         """The equilibrium downhill from a state, by pseudo-transient continuation or minimisation."""
-        # With redundant rows IPOPT may stop at states that only large multipliers hold, or jump to the other side.
-        flows = not self.model.minimisable or bool(self.equations.redundant)
+        # With redundant rows IPOPT may stop at states that only large multipliers hold, or jump to the other side; what
+        # falls without stiffness it may turn by whole turns more.
+        flows = not self.model.minimisable or bool(self.equations.redundant) or self.diagnosis.mobility > 0
         found = self.downhill(state, loading) if flows else None
         if found is not None:
             return found
