@@ -194,7 +194,7 @@ class ContactRun:
 
     def unstopped(self, before: Solved, after: Solved) -> bool:
         """Whether a step from one equilibrium without obstacles to another meets none of them."""
-        held, there = (Held(found, Touched.of(found.fields)) for found in (before, after))
+        held, there = (Held(found) for found in (before, after))
         if there.touched.inside({}, self.reviser.sides, tolerances.CLOSED * self.scene.size):
             return False
         return not self.toucher.passing.possible(held, there, {})

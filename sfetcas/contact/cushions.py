@@ -134,7 +134,7 @@ class Cushions:
             # What soft cushions hold thin ones may not: it rolls away over them, which what touches at places cannot.
             away = self._rolled(there)
             found, thickness, rolled = away, trial, rolled or away is not there
-        held = Held(found, Touched.of(found.fields))
+        held = Held(found)
         return Cushioned(held, self._touches(held)), rolled
 
     def _grown(self, prepared: Prepared, factors: Sequence[float], falls: bool) -> Solved | None:

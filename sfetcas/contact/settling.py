@@ -6,6 +6,7 @@ Jacobian by differences and Broyden's updates.  The mesh moves with them.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
@@ -79,14 +80,17 @@ class Held:
     Attributes
     ----------
     corrected : Solved
-    touched : Touched
     slopes : ndarray (places, places), optional
         Derivative of the conditions by the free places, dimensionless.
     """
 
     corrected: Solved
-    touched: Touched
     slopes: Array | None = None
+
+    @functools.cached_property
+    def touched(self) -> Touched:
+        """Evaluates forces, conditions and gaps of contact."""
+        return Touched.of(self.corrected.fields)
 
     @property
     def prepared(self) -> Prepared:
@@ -276,7 +280,7 @@ class Settler:
         corrected = prepared.correct(state, loading, iterations=30, most=MOST_TURN, drag=drag)
         if not corrected.converged and not corrected.residual <= tolerances.BALANCED:
             return None
-        return Held(corrected, Touched.of(corrected.fields))
+        return Held(corrected)
 
     def settle(self, mesh: Mesh, source: tuple[Model, State] | None, way: Way) -> Held | Ran | None:
         """The equilibrium with fulfilled conditions, or the place that reached an end or a touch; None for neither."""

@@ -25,7 +25,6 @@ from .cushions import Cushioned, Cushions
 from .passing import Passing
 from .revising import Reviser, Tried
 from .settling import Held, Ran, Settler, Way, placed
-from .touches import Touched
 
 __all__ = ["Toucher"]
 
@@ -277,7 +276,7 @@ class Toucher:
         loading = way.loading(prepared.model)
         try:
             corrected = prepared.switch_branch(start.corrected, loading)
-            there = Held(corrected, Touched.of(corrected.fields))
+            there = Held(corrected)
             return self.resolved(replace(start.mesh, touches=()), there, touches, way)
         except SolveError:
             return None
@@ -317,7 +316,7 @@ class Toucher:
         prepared, loading = held.prepared, held.loading
         state = prepared.nudged(held.corrected, loading, NUDGE)
         corrected = replace(held.corrected, state=state, point=prepared.equations.at(state, loading))
-        return Held(corrected, Touched.of(corrected.fields))
+        return Held(corrected)
 
     def read(self, base: Mesh, found: Cushioned, way: Way) -> Held | None:
         """The state in contact near one of penalty contact; None if it is not found."""

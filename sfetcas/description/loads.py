@@ -182,7 +182,8 @@ class Load(Record):
     value : (3,), fixed axes of the undeformed scene; a moment about z may be one number
     frame : fixed (dead load); follower: the value rotates with the node, or with the section it acts on; section, of a
         distributed load: the value is along b1, b2, b3 of the sections and rotates with them
-    profile : factor along a distributed load: a number, :class:`Table` or :class:`Polynomial`
+    profile : factor along a distributed load: a number, :class:`~sfetcas.description.sections.Table` or
+        :class:`~sfetcas.description.sections.Polynomial`
     history : name of the history that replaces the load factor
     """
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from ..contact.contact_balance import refuse_lost_forces, refuse_unbalanced
 from ..contact.contact_statics import ContactRun, Pressed
 from ..contact.settling import Held
-from ..contact.touches import Touched
 from ..errors import SolveError, Status
 from ..solvers.prepared import Prepared
 from .meshing import EquilibriumResult, Meshing
@@ -59,7 +58,7 @@ class ContactSteps:
         if unstopped is not None:
             there = self.refinement.onto(base, unstopped)
             notes += there.notes
-            free = Held(there.solved, Touched.of(there.solved.fields))
+            free = Held(there.solved)
             if contact.reviser.wrong(free, contact.at(factor)) is None:
                 answer = self.refinement.refined(replace(unstopped, way=("no contact",)))
                 if contact.clear(answer.fields):

@@ -92,7 +92,8 @@ class Configuration:
     Attributes
     ----------
     factor : float
-        Factor that multiplies the loads and prescribed displacements; of a :class:`MotionState` the time, s.
+        Factor that multiplies the loads and prescribed displacements; of a
+        :class:`~sfetcas.dynamics.motion.MotionState` the time, s.
     model : Model
         The discretised scene.
     state : State

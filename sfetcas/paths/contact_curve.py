@@ -228,7 +228,7 @@ class ContactCurve:
 
 
 def _as_held(standing: Standing) -> Held:
-    return Held(standing, Touched.of(standing.fields))
+    return Held(standing)
 
 
 def _difference(equations: Equations, here: State, there: State) -> Array:
