@@ -1,0 +1,46 @@
+"""How the documentation is built: ``python -m sphinx -W -b html docs build/docs``, without network."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "extensions")]
+
+import sfetcas  # noqa: E402
+
+project = "sfetcas"
+author = "the authors of sfetcas"
+copyright = "the authors of sfetcas"
+version = release = sfetcas.__version__
+html_title = f"sfetcas {release}"
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "matplotlib.sphinxext.plot_directive",
+    "mathml",
+]
+exclude_patterns = ["extensions", "**/.cache"]
+nitpicky = True
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+napoleon_google_docstring = False
+napoleon_use_param = False
+napoleon_use_rtype = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+
+html_theme = "furo"
+html_math_renderer = "mathml"
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True}
+
+plot_formats = [("png", 110)]
+plot_html_show_formats = False
+plot_html_show_source_link = False
+plot_rcparams = {"figure.dpi": 110}
+plot_working_directory = str(HERE.parent)
