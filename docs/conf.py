@@ -19,7 +19,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "matplotlib.sphinxext.plot_directive",
-    "mathml",
+    "formulas",
 ]
 exclude_patterns = ["extensions", "**/.cache"]
 nitpicky = True
@@ -34,7 +34,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 
 html_theme = "furo"
-html_math_renderer = "mathml"
+html_math_renderer = "svg"
 html_show_sphinx = False
 html_copy_source = False
 html_theme_options = {"navigation_with_keys": True}
