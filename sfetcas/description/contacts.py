@@ -39,15 +39,29 @@ class Contact(Record):
 
     Parameters
     ----------
-    type : point (in the plane), line, plane, circle, cylinder or sphere
-    position : (3,), m - of a point that members slide over
-    point : (3,), m - any point of a line or a plane
-    normal : (3,) - across a plane, towards where members are allowed unless ``side`` says otherwise
-    direction : (3,) - of a line
-    center, radius : (3,), m - of a circle or sphere, or any point of the axis of a cylinder
-    axis : (3,) - of a cylinder, default z
-    member, members : name, names or 'all' - which members it stops
-    side : (3,) - where members are allowed, by a direction that points there; 'inside' or 'outside' of what is round
+    type : text
+        ``point`` (in plane scenes), ``line``, ``plane``, ``circle``, ``cylinder`` or ``sphere``.
+    position : (3,), m
+        Of a point that members slide over.
+    point : (3,), m
+        Any point of a line or a plane.
+    normal : (3,)
+        Of a plane: points to where members are allowed, unless ``side`` says otherwise.
+    direction : (3,)
+        Of a line.
+    center : (3,), m
+        Of a circle or sphere, or any point of the axis of a cylinder.
+    radius : m
+        Of a circle, cylinder or sphere.
+    axis : (3,)
+        Of a cylinder.
+    member : name
+        Name of the member that the obstacle stops.
+    members : list of names
+        Instead of ``member``: several names, or ``"all"``.
+    side : (3,), or text
+        Where members are allowed: a direction that points there; of what is round ``"inside"`` or
+        ``"outside"``.
     """
 
     type: Literal["point", "line", "plane", "circle", "cylinder", "sphere"]

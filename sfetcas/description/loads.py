@@ -25,10 +25,13 @@ class History(Record):
 
     Parameters
     ----------
-    t : (n,), s, or in statics the load factor - rising
-    value : (n,) - the factor at t, linear between and constant outside
-    polynomial : (n - 1, any) - instead of value: for each interval c0 + c1 x + ... in
-        x = (t - t_i)/(t_i+1 - t_i), constant outside
+    t : (n,), s, or in statics load factors
+        Rising.  Outside the factor is constant.
+    value : (n,)
+        Factors at these, linear between.
+    polynomial : (n - 1, any)
+        Instead of values: for each interval coefficients c0, c1, ... in the fraction of the interval, from 0 to
+        1.
     """
 
     t: Numbers
@@ -176,15 +179,24 @@ class Load(Record):
 
     Parameters
     ----------
-    type : force (N), moment (N m) or distributed (N per metre of the undeformed member)
-    node : name of the node it acts on; or
-    member, at : name of the member, and the fraction of its length; a distributed load acts along all of it
-    value : (3,), fixed axes of the undeformed scene; a moment about z may be one number
-    frame : fixed (dead load); follower: the value rotates with the node, or with the section it acts on; section, of a
-        distributed load: the value is along b1, b2, b3 of the sections and rotates with them
-    profile : factor along a distributed load: a number, :class:`~sfetcas.description.sections.Table` or
-        :class:`~sfetcas.description.sections.Polynomial`
-    history : name of the history that replaces the load factor
+    type : text
+        ``force`` (N), ``moment`` (N m) or ``distributed`` (N per metre of the undeformed member).
+    node : name
+        Name of the node that it acts on.
+    member : name
+        Instead of a node: name of the member that it acts on.
+    at : 1
+        On a member, unless distributed: fraction of its length.
+    value : (3,), N, N m or N/m, fixed axes of the undeformed scene
+        The load.  A moment about z may be one number.
+    frame : text
+        ``fixed``: a dead load.  ``follower``: it turns with the node, or with the section that it acts on.
+        ``section``, of a distributed load: the ``value`` is along b1, b2, b3 of the sections and turns with
+        them.
+    profile : number or varying
+        Of a distributed load: factor along the member.
+    history : name
+        Name of a history that replaces the load factor of the step.
     """
 
     type: Literal["force", "moment", "distributed"]
@@ -246,13 +258,19 @@ class Motion(Record):
 
     Parameters
     ----------
-    node : name of the node
+    node : name
+        Name of a supported node, or of a joint that is driven.
     displacement : (3,), m, fixed axes
-    rotation : rad, about the axis of a hinge (z where the node is clamped in a plane scene);
-        or (3,), rad, fixed axes - rotation vector of a node whose support prevents rotation
-    between : drives a joint instead of a support: two members that end at the node, hinged there (rotation: angle
-        of the second against the first) or the second released as a slider (displacement along the direction)
-    history : name of the history that replaces the load factor
+        Displacement since the undeformed scene.  At a driven slider the component along its ``direction``
+        counts.
+    rotation : rad
+        A number about the axis of a hinge (about z where the node is clamped in a plane scene), else a rotation
+        vector (3,) in the fixed axes.
+    between : list of two names
+        Drives a joint instead of a support: two members that end at the node, hinged there (``rotation`` of the
+        second against the first), or the second released as a slider (``displacement``).
+    history : name
+        Name of a history that replaces the load factor of the step.
     """
 
     node: str

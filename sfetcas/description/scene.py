@@ -52,14 +52,38 @@ class Scene(Record):
 
     Parameters
     ----------
-    title, source : free text
-    dimension : plane (x-y), space, or auto: plane where everything lies in x-y
-    gravity : (3,), m/s2, fixed axes
-    rotating : (3,), rad/s - angular velocity of the axes about the origin; answers are in the rotating axes
-    sections, nodes, members, springs, loads, motions, histories, contacts : tables by name, read-only; ``prescribed``
-        is another name of ``motions``, which prescribe displacements and rotations
-    analysis : what is to be computed
-    expect : known values to compare the answer with
+    title : text
+        Free text.
+    source : text
+        Free text: where the scene is from.
+    dimension : text
+        ``plane`` (x-y), ``space``, or ``auto``: plane where everything lies in x-y.  Buckling out of the plane
+        is seen in ``space`` only.
+    gravity : (3,), m/s², fixed axes
+        Acceleration, multiplied by the load factor of the step.  It needs masses, as ``rhoA`` of sections.
+    rotating : (3,), rad/s, fixed axes
+        Angular velocity with which the axes turn about the origin.  Answers are in these rotating axes.  The
+        load factor does not multiply it.  It needs ``rhoA``.
+    sections : table by name
+        ``[sections.NAME]``: cross-sections.
+    nodes : table by name
+        ``[nodes.NAME]``: where members end, are joined and are supported.
+    members : table by name
+        ``[members.NAME]``: at least one.
+    springs : table by name
+        ``[springs.NAME]``: springs, dampers and stops.
+    loads : table by name
+        ``[loads.NAME]``: forces, moments and distributed loads.
+    motions : table by name
+        ``[motions.NAME]``, or ``[prescribed.NAME]``: prescribed displacements and rotations.
+    histories : table by name
+        ``[histories.NAME]``: factors of loads and motions, over the load factor or the time.
+    contacts : table by name
+        ``[contacts.NAME]``: frictionless obstacles.
+    analysis : table
+        ``[analysis]``: what is to be computed.
+    expect : list of tables
+        ``[[expect]]``: known values of the answer, with which ``sfetcas check`` compares.
 
     Raises
     ------

@@ -30,7 +30,7 @@ class Table(Record):
     at : (m,)
         Fractions of the length, rising from 0 to 1, at least two.
     value : (m,)
-        The values there.
+        The values there, linear between.
     """
 
     at: Numbers
@@ -58,7 +58,7 @@ class Polynomial(Record):
     Parameters
     ----------
     polynomial : (m,)
-        The coefficients c0, c1, ..., at least one.
+        Coefficients c0, c1, ... in x = s/L, at least one.
     """
 
     polynomial: Numbers
@@ -235,26 +235,42 @@ class CrossSection(Record):
 
     Parameters
     ----------
-    EI2, EI3 : N m2
-        Bending stiffness about b2, b3.
-    GJ : N m2
-        Torsional stiffness about b1, the tangent.
+    EI2 : N m²
+        Bending stiffness about b2.  Needed in space.
+    EI3 : N m²
+        Bending stiffness about b3.  The axis b3 is z where the member lies in x-y.
+    GJ : N m²
+        Torsional stiffness about the tangent b1.  Needed in space.
     rhoA : kg/m
-        Mass per length.
-    rhoI : (3,) kg m
-        Rotary inertia per length about b1, b2, b3; zero where it is left out.
+        Mass per length.  Needed with gravity, rotating axes, modes and motions.
+    rhoI : (3,), kg m
+        Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
     damping : s
-        Retardation time of Kelvin and Voigt: moments are stiffness times (strain + damping times its rate), in
-        bending and twist.
-    drag : N s/m2
-        Force per length against the velocity.
-    shape : rectangle (width along b3, height along b2), circle (radius) or tube (outer, inner radius), in m
-    E, G : N/m2
-        Young's and shear modulus.
+        Retardation time of Kelvin and Voigt in bending and twist: a moment is the stiffness times (the strain +
+        ``damping`` times its rate).
+    drag : N s/m²
+        Force per length against the velocity, per unit of the velocity.
+    shape : text
+        Instead of these numbers: ``rectangle`` (``width``, ``height``), ``circle`` (``radius``) or ``tube``
+        (``outer``, ``inner``).
+    E : N/m²
+        Young's modulus of a shape, which needs it.
     nu : 1
-        Poisson's ratio in place of G.
-    rho : kg/m3
-        Density.
+        Poisson's ratio of a shape, instead of ``G``.
+    G : N/m²
+        Shear modulus of a shape.
+    rho : kg/m³
+        Density of a shape.
+    width : m
+        Of a rectangle, along b3.
+    height : m
+        Of a rectangle, along b2.
+    radius : m
+        Of a circle.
+    outer : m
+        Outer radius of a tube.
+    inner : m
+        Inner radius of a tube.
 
     Raises
     ------

@@ -59,11 +59,11 @@ class Arc(Record):
     Parameters
     ----------
     angle : rad
-        Between the end tangents, below a full turn; above zero it turns by the right hand about the normal.
+        Angle between the end tangents, below a full turn.  Above zero it turns right-handed about the normal.
     normal : (3,)
         Axis of the circle, of any length.
-    start : (3,), optional
-        Tangent at the first node; it follows from the rest and is only checked.
+    start : (3,)
+        Tangent at the first node.  It follows from the rest and is only checked.  Default: from the rest.
     """
 
     type: Literal["arc"] = "arc"
@@ -86,12 +86,14 @@ class Helix(Record):
     Parameters
     ----------
     radius : m
+        Radius of the cylinder that the helix lies on.
     pitch : m
         Advance along the axis in one turn; below zero it goes against the axis.
     turns : 1
+        Number of turns.
     axis : (3,)
-        Direction, of any length.
-    center : (3,) m
+        Direction of the axis, of any length.  The helix turns right-handed about it, from the first node on.
+    center : (3,), m
         Any point of the axis.
     """
 
@@ -109,11 +111,16 @@ class Curvature(Record):
 
     Parameters
     ----------
-    kappa3, kappa2, twist : (m,) 1/m
-        Curvature about b3, b2 and the tangent b1.
+    kappa3 : (m,), 1/m
+        Curvature about b3: coefficients in s/L.
+    kappa2 : (m,), 1/m
+        Curvature about b2.
+    twist : (m,), 1/m
+        Curvature about the tangent b1.
     length : m
-    start : (3,), optional
-        Tangent at the first node; may be left out for a straight line, bent about no axis.
+        Length of the member.
+    start : (3,)
+        Tangent at the first node.  A straight line may do without.
     """
 
     type: Literal["curvature"] = "curvature"
@@ -133,7 +140,8 @@ class Spline(Record):
 
     Parameters
     ----------
-    points : (m, 3) m
+    points : (m, 3), m
+        Points of a smooth curve; the first and the last are the nodes.
     """
 
     type: Literal["spline"] = "spline"

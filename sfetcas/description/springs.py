@@ -37,21 +37,34 @@ class Spring(Record):
 
     Parameters
     ----------
-    type : rotational or translational
-    node : name of the node
-    stiffness : N m, or N/m of a translational one
-    axis : (3,), fixed axes of the undeformed scene - of a rotational spring; turns with the first party, at a
-        universal joint with the side that has this axis; left out: the axis about which the node's hinge turns
-    between : rotational: the two parties, of ground, the node, or members that end there; the angle is that of the
-        second against the first since the undeformed scene; left out: the ground and the node
-    rest : rad - angle at which it gives no moment; of a translational spring with a direction m, the travel
-    to : translational: the other node; left out: the ground
-    anchor : (3,), m - where it is fixed to the ground; left out: the place of the node in the undeformed scene
-    length : m - free length of a translational spring; left out: the distance in the undeformed scene
-    direction : (3,), fixed axes - a translational spring that acts along this direction only
-    damping : N m s/rad, or N s/m of a translational one - gives a moment or force against the rate of its angle, travel
-        or length
-    stop : [low, high], rad, or m of a spring with a direction - the angle or travel goes no further; statics only
+    type : text
+        ``rotational`` at a node, or ``translational`` between two nodes or a node and the ground.
+    node : name
+        Name of the node.
+    stiffness : N m, or N/m of a translational spring
+        Moment by angle, or force by travel.
+    axis : (3,), fixed axes of the undeformed scene
+        Axis of a rotational spring.  It turns with the first party of ``between``; at a universal joint with
+        the side that has this axis.  Default: that of the node's hinge, else along z.
+    between : list of two texts
+        Of a rotational spring, two parties: ``"ground"``, the name of the node, or names of members that end
+        there.  The angle is that of the second against the first since the undeformed scene.  Default: the
+        ground and the node.
+    rest : rad, or m with a ``direction``
+        Angle without moment; with a ``direction`` the travel without force.
+    to : name
+        Other node of a translational spring.  Default: the ground.
+    anchor : (3,), m, fixed axes
+        Where a translational spring is fixed to the ground.  Default: the undeformed place of the node.
+    length : m
+        Free length of a translational spring.  Default: the undeformed distance.
+    direction : (3,), fixed axes
+        A translational spring with a direction acts along it only.
+    damping : N m s/rad, or N s/m of a translational spring
+        Moment or force against the rate of the angle, travel or length, per unit of that rate.
+    stop : (2,), rad, or m with a ``direction``
+        ``[low, high]`` about 0: the angle, or the travel along a ``direction``, goes no further.  In statics
+        only.
     """
 
     type: Literal["rotational", "translational"] = "rotational"

@@ -80,22 +80,38 @@ class Node(Record):
 
     Parameters
     ----------
-    position : (3,), m, fixed axes - in the undeformed scene
-    support : what holds the node: free, clamped, hinge (about axis), ball, universal (about axis, fixed in the
-        ground, and axis2, fixed in the node), slider (along direction) or cylindrical (along and about direction)
-    axis : (3,), fixed axes - of the hinges of this node: support, joint, or member ends released here; of a
-        universal joint the axis in the first side (ground, node or first member end)
-    axis2 : (3,), fixed axes - of a universal joint the axis in the other side, normal to the first
-    direction : (3,), fixed axes - the guide of a slider; for member ends released as slider or cylindrical the
-        line along which they slide, which turns with the node
-    rotation : how a slider turns: fixed, hinge (about axis) or ball
-    joint : how the member ends are joined: rigid (or weld), hinge (about axis), ball or universal; but for the
-        first case each end turns against every other and the node has no rotation of its own
-    mass : kg, lumped in the node; has weight where there is gravity
-    inertia : (3,), kg m2 - of the lumped mass about x, y, z through the node; for dynamics, with a rigid joint only
-    start : (3,), m, fixed axes - roughly where the node ends up, as a first guess
-    velocity : (3,), m/s, fixed axes - dynamics, at t = 0; left out: what follows from the others, or zero
-    drag : N s/m - gives a force against the velocity of the node
+    position : (3,), m, fixed axes
+        Place in the undeformed scene.
+    support : text
+        How the ground holds the node: ``free``, ``clamped``, ``hinge`` (turns about ``axis``), ``ball``,
+        ``slider`` (moves along ``direction``), ``cylindrical`` (moves along and turns about ``direction``) or
+        ``universal`` (turns about ``axis``, fixed in the ground, and ``axis2``, fixed in the node).
+    axis : (3,), fixed axes
+        Axis of the hinges and universal joints of this node: of its support, its joint and the member ends
+        released here.  The axis of a universal joint is fixed in its first side: the ground, the first member
+        that ends here, or the node.
+    axis2 : (3,), fixed axes
+        Second axis of a universal joint, across the first.  It is fixed in the other side: the node, every
+        other member, or the released end.
+    direction : (3,), fixed axes
+        Guide of a slider or cylindrical support, fixed in the ground; or the line along which released member
+        ends slide, which turns with the node.
+    rotation : text
+        How a slider turns: ``fixed``, ``hinge`` (about ``axis``) or ``ball``.
+    joint : text
+        How the member ends are joined to each other: ``rigid`` (or ``weld``), ``hinge``, ``ball`` or
+        ``universal``.  Unless it is rigid each end turns against every other one, and the node has no rotation
+        of its own.
+    mass : kg
+        Lumped mass.  It has weight where there is gravity.
+    inertia : (3,), kg m²
+        Moments of inertia of the lumped mass about x, y and z.  For modes and motions, with a rigid joint only.
+    start : (3,), m, fixed axes
+        Roughly where the node ends up: chooses among several equilibria.
+    velocity : (3,), m/s, fixed axes
+        Dynamics: velocity at t = 0.  Default: what follows from the others, else zero.
+    drag : N s/m
+        Force against the velocity of the node, per unit of the velocity.
     """
 
     position: Vector
@@ -166,24 +182,40 @@ class Member(Record):
 
     Parameters
     ----------
-    nodes : names of the nodes at its first and second end; a small member with a stiffness may have more
-    section : name of the cross-section; a rigid member needs it for its mass only, a small one has it instead of
-        a stiffness
-    type : flexible, rigid, or small (or superelement: linear elasticity in a corotated frame)
-    shape : the unloaded centre line
-    b2 : (3,), fixed axes - direction of the section's axis b2 at the first end; left out: b3 along z
-        where the member lies in x-y
-    element : SFET2 to SFET9, by the nodes of an element; left out: chosen by the accuracy
-    elements : number of elements, 1 to 1000000; left out: chosen by the accuracy
-    release : how each end is joined to its node: rigid (or weld), hinge (about the node's axis), ball, universal,
-        slider (along the node's direction), cylindrical (along and about it) or slot (along it, turning freely)
-    stiffness : (6 n, 6 n), N/m, N, N m - of a small member: forces and moments at its n nodes by displacements
-        and rotations (x, y, z, about x, y, z at the first node, then at the next), along the section's axes b1,
-        b2, b3 at its start; or the name of a file, .npz (array ``stiffness``, or the only one) or Matrix Market;
-        in a scene file relative to its folder
-    mass : (6 n, 6 n), kg, kg m, kg m2 - of a small member, in the same way; for its weight and for dynamics
-    spin : rad/s - dynamics, at t = 0: angular velocity of the sections along the member, in a plane scene about z,
-        constant or varying; or (3,), fixed axes, the same along the member
+    nodes : list of names
+        Names of the nodes at its first and second end.  A small member with a ``stiffness`` may have more than
+        two.
+    section : name
+        Name of its cross-section.  A rigid member needs one for its mass only.
+    type : text
+        ``flexible``, ``rigid``, or ``small`` (or ``superelement``): linear elasticity in a frame that moves
+        with the member.
+    shape : table
+        The unloaded centre line: a table with the key ``type`` (``straight``, ``arc``, ``helix``, ``curvature``
+        or ``spline``) and the keys of that shape.
+    b2 : (3,), fixed axes
+        Direction of the section's axis b2 at the first end.  Default: such that b3 is along z, where the member
+        lies in x-y.
+    element : text
+        ``SFET2``, ``SFET3``, ``SFET4``, ``SFET5``, ``SFET6``, ``SFET7``, ``SFET8`` or ``SFET9``: the number of
+        nodes of an element.  Default: chosen by the accuracy.
+    elements : whole number
+        Number of elements, 1 to 1000000.  Default: chosen by the accuracy.
+    release : list of two texts
+        How each end is joined to its node: ``rigid`` (or ``weld``), ``hinge`` (turns about the node's
+        ``axis``), ``ball``, ``universal``, ``slider`` (moves along the node's ``direction``), ``cylindrical``
+        (moves along and turns about it) or ``slot`` (moves along it and turns freely).
+    stiffness : (6 n, 6 n), N/m, N, N m, or a file name
+        Of a small member, instead of a section: forces and moments at its n nodes by displacements and
+        rotations (x, y, z, then about x, y, z, at the first node, then at the next), along the axes b1, b2, b3
+        at its start.  Or the name of a file (``.npz``, ``.npy``, Matrix Market), in a scene file relative to
+        its folder.
+    mass : (6 n, 6 n), kg, kg m, kg m², or a file name
+        Mass matrix of a small member, in the same order, for its weight and for dynamics.
+    spin : rad/s
+        Dynamics: angular velocity of the sections along the member at t = 0.  In a plane scene a number or
+        varying along the member, in space (3,) in the fixed axes.  Default: what follows from the others, else
+        zero.
     """
 
     nodes: Annotated[tuple[str, ...], BeforeValidator(_ends)]

@@ -97,9 +97,14 @@ class Until(Record):
 
     Parameters
     ----------
-    quantity : name in the answer, as ``nodes.tip.position``
-    component : 0, 1 or 2 - of a vector; left out for a single number
-    above, below : in the unit of the quantity - one of them: the motion ends when the quantity passes it
+    quantity : text
+        Name of a quantity of the answer, as ``nodes.tip.position``.
+    component : whole number
+        Of a vector: 0, 1 or 2.
+    above : number, in the unit of the quantity
+        The motion ends when the quantity gets above this.
+    below : number, in the unit of the quantity
+        Instead: when it gets below this.
     """
 
     quantity: str
@@ -119,33 +124,55 @@ class Analysis(Record):
 
     Parameters
     ----------
-    type : static; path: the equilibria from factor 0 on, through limit points; modes: small vibrations about the
-        equilibrium of the loads (factor 1); or dynamic: the motion in time
-    accuracy : wanted error of the positions relative to the size of the scene, 1e-14 to 0.1
-    accuracy_of : static, dynamic: name of the quantity that the accuracy refers to instead, as ``reactions.A.moment``
-        or ``members.beam.moment at 0.5``; errors of positions are over the size of the scene, of rotations in rad, all
-        others relative to the value, along members to the largest there
-    steps : (n,) - load factors: each multiplies loads, gravity and motions without history, and gives an answer
-    unstable : leave an unstable equilibrium for a stable one, or stay there
-    equilibria : one, to which the loads lead when they grow together from zero, or all that a search finds
-    range : (2,) - path: the factors between which it is followed, downwards where the range ends at 0
-    points : path: largest number of points
-    branches : path: from the first so many bifurcation points the branches that cross there are followed too, to
-        both sides, each for so many points; their answers stand after those of the path, in the order of the
-        bifurcations and of the sides 1 and -1.  0, the default, stays on the path.  Where several eigenvalues
-        vanish at once the first shape is taken; ``switch`` takes others
-    modes : number of the lowest modes, 8 where left out; of a path at each of its points, where left out none
-    end : s - dynamic: the motion is followed from 0 to this time
-    output : s - dynamic: spacing of the answers, left out: a hundredth of the span
-    step : s - dynamic: fixed time step, left out: chosen by the accuracy
-    integrator : dynamic: time integration method, left out: radau-3
-    initial : dynamic: the motion begins undeformed, or at rest in the equilibrium of the loads and motions as their
-        histories give them at t = 0 (factor 1 where there is none)
-    cut : dynamic: names of loads that act in that equilibrium only
-    release : dynamic: names of nodes whose support exists in that equilibrium only
-    until : dynamic: a condition that ends the motion earlier
-
-    On a path each crossing of a factor of ``steps`` is an answer, in the order in which they are met.
+    type : text
+        ``static``.  ``path``: the equilibria from factor 0 on, through limit points.  ``modes``: small
+        vibrations about the equilibrium of the loads at factor 1.  ``dynamic``: the motion in time.
+    accuracy : 1
+        Wanted error of the positions over the size of the scene, 1e-14 to 0.1; of modes that of the frequencies
+        over themselves.
+    accuracy_of : text
+        Static and dynamic: a quantity that the accuracy refers to instead, as ``reactions.A.moment`` or
+        ``members.beam.moment at 0.5``.  Errors of positions are over the size of the scene, of rotations in
+        rad, all others over the quantity itself (along members over the largest there).
+    steps : (n,)
+        Load factors.  Each multiplies all loads, gravity and motions without a history, and gives an answer;
+        histories are evaluated there.  On a path each crossing of one of these factors is an answer, in the
+        order in which they are met.
+    unstable : text
+        ``leave`` an unstable equilibrium for a stable one, or ``stay``.
+    equilibria : text
+        ``one``: the equilibrium to which the loads lead when they grow together from zero; or ``all`` that a
+        search finds.
+    range : (2,)
+        Of a path, needed there: load factors between which it is followed, from 0 upwards, or downwards where
+        the range ends at 0.
+    points : whole number
+        Of a path: it ends after so many points.
+    branches : whole number
+        Of a path: from so many of the first bifurcations the branches are followed too, to both sides, each for
+        ``points`` points.  Their answers stand after those of the path, in the order of the bifurcations and of the
+        sides 1 and -1.  Where several eigenvalues vanish at once the first shape is taken;
+        :func:`~sfetcas.switch` takes others.
+    modes : whole number
+        How many of the lowest modes; on a path at each point.  Default: 8, on a path none.
+    end : s
+        Dynamic, needed there: the time up to which the motion is followed.
+    output : s
+        Dynamic: spacing of the answers.  Default: a hundredth of the span.
+    step : s
+        Dynamic: fixed time step, not with ``idas``.  Default: chosen by the accuracy.
+    integrator : text
+        Dynamic: ``radau-3``, ``radau-2``, ``generalised-alpha``, ``conserving`` or ``idas`` (which needs rotary
+        inertia where masses do not resist a turn).  Default: ``radau-3``.
+    initial : text
+        Dynamic: the motion begins ``undeformed``, or at rest in the ``equilibrium`` of loads and motions as
+        their histories give them at t = 0, with factor 1 where there is none.
+    cut : list of names
+        Dynamic: names of loads that act in that equilibrium only.
+    release : list of names
+        Dynamic: names of nodes whose support holds in that equilibrium only.
+    until : table
+        Dynamic: a condition that ends the motion earlier.
     """
 
     type: Literal["static", "path", "modes", "dynamic"] = "static"
@@ -231,18 +258,33 @@ class Expect(Record):
 
     Parameters
     ----------
-    quantity : name in the answer, as ``nodes.B.position``, ``nodes.B.position.y``; the keys from ``at`` on may be
-        appended to it instead, ``members.beam.moment at 0.5``
-    value : number, nested list of numbers, true, false or a text, in the unit of the quantity
-    tolerance : largest accepted absolute difference; may be left out for what is met exactly
-    why : reason for the tolerance
-    source : where the value is from
-    at : fraction of the length of a member
-    step : factor of the answer; left out: the last step
-    time : s - dynamic: time of the answer, from 0 to the end; left out: the end
-    equilibrium : with several equilibria: all expectations with the same number have to be met by one of these
-    crossing : path: which crossing of that factor, 1 is the first
-    limit_point, bifurcation, flutter_point : path: which limit, bifurcation or flutter point
+    quantity : text
+        Name of a quantity of the answer, as ``nodes.tip.position`` or ``nodes.tip.position.y``.  The keys from
+        ``at`` on may stand behind it instead: ``members.beam.moment at 0.5``.
+    value : number, list, true, false or text
+        The expected value, in the unit of the quantity.
+    tolerance : number
+        Largest absolute difference that is accepted.  Needed for numbers that are not whole.
+    why : text
+        Reason for the tolerance.
+    source : text
+        Where the value is from.
+    at : 1
+        Fraction of the length of a member.
+    step : number
+        Load factor of the answer.  Default: the last step.
+    time : s
+        Dynamic: time of the answer.  Default: the end.
+    equilibrium : whole number
+        With several equilibria: all expectations of the same number are met by one of them.
+    crossing : whole number
+        Of a path: which crossing of the factor, from 1.
+    limit_point : whole number
+        Of a path: which limit point, from 1.
+    bifurcation : whole number
+        Of a path: which bifurcation, from 1.
+    flutter_point : whole number
+        Of a path: which flutter point, from 1.
     """
 
     quantity: str
