@@ -17,19 +17,21 @@ html_title = f"sfetcas {release}"
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
+    "numpydoc",
     "matplotlib.sphinxext.plot_directive",
+    "sphinxarg.ext",
     "formulas",
+    "reference",
+    "gallery",
 ]
-exclude_patterns = ["extensions", "**/.cache"]
+exclude_patterns = ["extensions", "**/generated"]
 nitpicky = True
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
-napoleon_google_docstring = False
-napoleon_use_param = False
-napoleon_use_rtype = False
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 

@@ -52,8 +52,8 @@ def solve(
     SolveError
         There is no equilibrium that could be found; the sentence says why.
 
-    Example
-    -------
+    Examples
+    --------
     >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """

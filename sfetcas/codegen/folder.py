@@ -92,8 +92,8 @@ def export(
         The scene or one of its numbers cannot be exported, options contradict each other, or the name or the folder
         cannot be used.
 
-    Example
-    -------
+    Examples
+    --------
     >>> export(scene, "tip", arguments=["loads.tip.value"])       # doctest: +SKIP
     """
     check_scene(scene, "export({}, ...)")

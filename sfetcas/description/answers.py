@@ -399,7 +399,7 @@ def single_number(motion: Any, key: str) -> bool:
     return motion.between is not None or (key == "moment" and isinstance(motion.rotation, float))
 
 
-HEAD = "name | unit | components | told of | what it is"
+HEAD = "name | unit | components | available in | what it is"
 
 
 def answers_table() -> str:

@@ -90,8 +90,8 @@ class Scene(Record):
     SceneError
         Anything that is not accepted: one sentence with its place.
 
-    Example
-    -------
+    Examples
+    --------
     >>> strip = CrossSection(EI3=1.0)
     >>> nodes = {"A": Node(position=[0, 0], support="clamped"), "B": Node(position=[1, 0])}
     >>> beam = Member(nodes=["A", "B"], section="strip")

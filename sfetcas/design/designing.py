@@ -147,8 +147,8 @@ class Design(Cases):
     SceneError
         Numbers that the scene does not have, bounds that contradict each other, a scene with contact or in motion.
 
-    Example
-    -------
+    Examples
+    --------
     >>> design = Design(scene, variables={"sections.strip.EI3": (0.2, 5.0)})          # doctest: +SKIP
     >>> design.subject_to(design.answer("", "nodes.tip.position")[1] == 0.3)         # doctest: +SKIP
     >>> design.solve().values["sections.strip.EI3"]                                 # doctest: +SKIP

@@ -138,8 +138,8 @@ class QuasiStatic(Cases):
     SceneError
         Numbers that the scene does not have, contradictory bounds, fewer than three points.
 
-    Example
-    -------
+    Examples
+    --------
     >>> path = QuasiStatic(scene, {"loads.tip.value": (-50.0, 50.0)}, points=21)    # doctest: +SKIP
     >>> tip = path.answer("nodes.tip.position")                                     # doctest: +SKIP
     >>> path.subject_to(tip[:, 1] == 0.2 + 0.3 * path.s)                            # doctest: +SKIP

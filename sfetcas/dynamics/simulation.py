@@ -385,8 +385,8 @@ def left(apart: float, before: float | None, accuracy: float) -> float:
     accuracy : float
         Wanted relative error.
 
-    Example
-    -------
+    Examples
+    --------
     >>> [round(left(0.024, before, 0.01), 3) for before in (None, 0.5, 0.09, 0.025)]
     [0.024, 0.024, 0.009, 0.072]
     """

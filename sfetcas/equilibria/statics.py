@@ -55,8 +55,8 @@ def solve(
     SolveError
         A factor has no equilibrium that could be found; the sentence says why.
 
-    Example
-    -------
+    Examples
+    --------
     >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """

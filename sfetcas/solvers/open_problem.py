@@ -35,8 +35,8 @@ def equilibrium_nlp(model: Model | Prepared, factor: float = 1.0) -> OpenProblem
     SceneError
         The scene has loads without potential, contacts, or stops of springs.
 
-    Example
-    -------
+    Examples
+    --------
     >>> problem = equilibrium_nlp(assemble(scene, uniform_mesh(scene, 4, 8)))      # doctest: +SKIP
     >>> tip = problem.answer("nodes.tip.position")                                # doctest: +SKIP
     >>> answer = problem.subject_to(tip[1] == 0.2, name="tip on the line").solve()  # doctest: +SKIP

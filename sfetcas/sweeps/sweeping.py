@@ -71,8 +71,8 @@ def sweep(
     SceneError
         The scene has no such numbers, its answers no such quantities, or anything else is not accepted.
 
-    Example
-    -------
+    Examples
+    --------
     >>> found = sweep(scene, {"loads.tip.value.1": [0, 5, 10]}, ["nodes.tip.position"])  # doctest: +SKIP
     >>> found.values("nodes.tip.position")  # doctest: +SKIP
     """

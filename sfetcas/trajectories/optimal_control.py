@@ -65,8 +65,8 @@ class OptimalControl(Problem):
     SceneError
         The scene has no such numbers, they cannot be controlled, or arguments contradict each other.
 
-    Example
-    -------
+    Examples
+    --------
     >>> problem = OptimalControl(scene, {"loads.motor.value": (-5.0, 5.0)}, time=2.0)       # doctest: +SKIP
     >>> torque, angle = problem.control("loads.motor.value"), problem.answer("nodes.hub.angle")  # doctest: +SKIP
     >>> problem.minimise(problem.integral(torque**2))                                     # doctest: +SKIP

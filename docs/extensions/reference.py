@@ -1,0 +1,205 @@
+"""The reference, made from the program: keys of scenes, names of answers, tolerances, all public docstrings.
+
+Each function gives the text of a page; :func:`setup` writes them before Sphinx reads.
+"""
+
+import importlib
+import json
+import pkgutil
+import typing
+from dataclasses import dataclass
+from pathlib import Path
+
+from numpydoc.docscrape import NumpyDocString
+from sphinx.application import Sphinx
+
+import sfetcas
+from sfetcas.description.answers import answers_table
+from sfetcas.description.records import Record, plain
+from sfetcas.description.scene import Scene
+
+TABLES = {
+    "Scene": ("The scene", "Keys at the top of a file."),
+    "CrossSection": (
+        "Sections",
+        "`[sections.NAME]`. Each number but `nu`, `damping` and `drag` may vary along the member.",
+    ),
+    "Node": ("Nodes", "`[nodes.NAME]`"),
+    "Member": ("Members", "`[members.NAME]`"),
+    "Arc": ("Shapes: arc", '`shape = { type = "arc", ... }` of a member'),
+    "Helix": ("Shapes: helix", '`shape = { type = "helix", ... }` of a member'),
+    "Curvature": ("Shapes: curvature", '`shape = { type = "curvature", ... }` of a member'),
+    "Spline": ("Shapes: spline", '`shape = { type = "spline", ... }` of a member'),
+    "Spring": ("Springs", "`[springs.NAME]`. Signs stand under [conventions](../theory/conventions.md#signs)."),
+    "Load": ("Loads", "`[loads.NAME]`"),
+    "Motion": ("Motions", "`[motions.NAME]`: prescribed displacements and rotations"),
+    "History": ("Histories", "`[histories.NAME]`"),
+    "Contact": ("Contacts", "`[contacts.NAME]`: frictionless obstacles"),
+    "Analysis": ("Analysis", "`[analysis]`"),
+    "Until": ("Analysis: until", "`until = { ... }` of the analysis: what ends a motion early"),
+    "Expect": ("Expect", "`[[expect]]`: a known value of the answer"),
+    "Table": (
+        "Varying numbers by values",
+        "`{ at = [...], value = [...] }` instead of a number of a section or a profile",
+    ),
+    "Polynomial": (
+        "Varying numbers as polynomials",
+        "`{ polynomial = [...] }` instead of a number of a section or a profile",
+    ),
+}
+"""Records that a scene is written with, by their heading and where they stand, in the order of the page."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table of a scene, as its record explains it."""
+
+    name: str
+    kind: str
+    meaning: str
+    default: str
+
+
+def records() -> dict[str, type[Record]]:
+    """All records that a scene may hold, by name."""
+    found: dict[str, type[Record]] = {}
+    _collect(Scene, found)
+    return found
+
+
+def _collect(annotation: typing.Any, found: dict[str, type[Record]]) -> None:
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        if annotation.__name__ not in found:
+            found[annotation.__name__] = annotation
+            for field in annotation.model_fields.values():
+                _collect(field.annotation, found)
+    else:
+        for part in typing.get_args(annotation):
+            _collect(part, found)
+
+
+def choices(annotation: typing.Any) -> set[typing.Any]:
+    """Words that an annotation allows."""
+    if typing.get_origin(annotation) is typing.Literal:
+        return set(typing.get_args(annotation))
+    return set().union(*(choices(part) for part in typing.get_args(annotation)))
+
+
+def keys(record: type[Record]) -> list[Key]:
+    """The keys of a record in the order of its docstring."""
+    return [_key(record, entry) for entry in NumpyDocString(record.__doc__ or "")["Parameters"]]
+
+
+def _key(record: type[Record], entry: typing.Any) -> Key:
+    meaning, _, words = " ".join(line.strip() for line in entry.desc if line.strip()).partition("Default: ")
+    field = record.model_fields[entry.name]
+    if field.is_required():
+        default = "needed"
+    else:
+        value = plain(field.get_default(call_default_factory=True))
+        default = f"`{json.dumps(value)}`" if value not in (None, {}, []) else words.rstrip(".")
+    return Key(entry.name, entry.type, " ".join(meaning.split()), default)
+
+
+def _markdown(text: str) -> str:
+    """Text of a docstring as it stands in a cell of a table."""
+    return text.replace(":func:`~sfetcas.switch`", "{py:func}`sfetcas.switch`").replace("``", "`").replace("|", "\\|")
+
+
+def scene_tables() -> str:
+    """A heading and a table for each record."""
+    known, lines = records(), []
+    for name, (heading, place) in TABLES.items():
+        lines += [f"## {heading}", "", place, "", "| key | unit, shape | meaning | default |", "|---|---|---|---|"]
+        for key in keys(known[name]):
+            lines.append(f"| `{key.name}` | {key.kind} | {_markdown(key.meaning)} | {_markdown(key.default)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+GROUPS = {
+    "scenes": ("Scenes", ("description",)),
+    "solving": ("Solving", ("analyses", "checks", "equilibria", "errors")),
+    "paths": ("Paths", ("paths",)),
+    "dynamics": ("Modes and motions", ("dynamics",)),
+    "parameters": ("Parameters and identification", ("parametric",)),
+    "design": ("Design", ("design",)),
+    "trajectories": ("Optimal control", ("trajectories",)),
+    "sweeps": ("Sweeps", ("sweeps",)),
+    "code": ("Generated C", ("codegen",)),
+    "underneath": ("Underneath", ("mechanics", "solvers", "mathematics")),
+}
+"""Pages of the public names: their titles and the folders that the names are from."""
+
+
+def api_pages() -> dict[str, str]:
+    """Pages of the public names, by file name."""
+    rest, pages = dict(sfetcas._MODULES), {}
+    for page, (title, folders) in GROUPS.items():
+        names = [name for name in sorted(rest) if rest[name].partition(".")[0] in folders]
+        blocks = [_autodoc(f"sfetcas.{rest.pop(name)}", name) for name in names]
+        pages[page] = f"# {title}\n\n" + "\n".join(blocks)
+    if rest:
+        raise ValueError(f"public names without a page of the reference: {', '.join(rest)}")
+    pages["pictures"] = "# Pictures\n\n" + "\n".join(
+        _module(f"sfetcas.pictures.{name}") for name in ("plotting", "charts", "motions", "animation", "paraview")
+    )
+    pages["index"] = "# Python\n\n" + _toctree([*GROUPS, "pictures"])
+    return pages
+
+
+def _autodoc(module: str, name: str) -> str:
+    is_class = isinstance(getattr(importlib.import_module(module), name), type)
+    options = ":members:\n:inherited-members: BaseModel, tuple, NamedTuple, Enum\n" if is_class else ""
+    return _rst(f".. auto{'class' if is_class else 'function'}:: sfetcas.{name}", options)
+
+
+def _rst(directive: str, options: str) -> str:
+    indented = "".join(f"   {line}\n" for line in options.splitlines())
+    return f"```{{eval-rst}}\n{directive}\n{indented}```\n"
+
+
+def _module(name: str) -> str:
+    public = [public for public, module in sfetcas._MODULES.items() if f"sfetcas.{module}" == name]
+    options = ":members:\n" + (f":exclude-members: {', '.join(public)}\n" if public else "")
+    return f"## {name.removeprefix('sfetcas.')}\n\n" + _rst(f".. automodule:: {name}", options)
+
+
+def _toctree(names: typing.Iterable[str]) -> str:
+    return "```{toctree}\n" + "\n".join(names) + "\n```\n"
+
+
+def module_pages() -> dict[str, str]:
+    """Pages of the modules within the package, one for each folder, by file name."""
+    folders: dict[str, list[str]] = {}
+    for module in pkgutil.walk_packages(sfetcas.__path__, "sfetcas."):
+        folder = module.name.split(".")[1] if module.name.count(".") > 1 or module.ispkg else "sfetcas"
+        shown = module.ispkg or module.name.endswith("__main__") or folder == "pictures"
+        folders.setdefault(folder, []).extend([] if shown else [module.name])
+    pages = {
+        folder: f"# {folder}\n\n" + "\n".join(map(_module, names)) for folder, names in sorted(folders.items()) if names
+    }
+    return {**pages, "index": "# Modules\n\n" + _toctree(pages)}
+
+
+def _write(folder: Path, pages: dict[str, str]) -> None:
+    """Write pages that differ from those that are there, so that Sphinx reads these alone anew."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages.items():
+        file = folder / f"{name}.md"
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")
+
+
+def _generate(app: Sphinx) -> None:
+    reference = Path(app.srcdir) / "reference"
+    tables = {"scene": scene_tables(), "answers": answers_table()}
+    _write(reference / "generated", tables)
+    _write(reference / "api", api_pages())
+    _write(reference / "modules", module_pages())
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages before Sphinx looks which there are."""
+    app.connect("builder-inited", _generate)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
