@@ -26,8 +26,10 @@ extensions = [
 ]
 exclude_patterns = ["extensions", "**/generated"]
 nitpicky = True
+# The domain of the command line knows no references of its own.
+suppress_warnings = ["myst.domains"]
 
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 numpydoc_show_class_members = False

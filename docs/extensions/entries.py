@@ -1,0 +1,207 @@
+"""What the gallery says of a problem file: solved, compared with what is known of it, and drawn.
+
+A problem is solved and drawn again only after it, the program or a library has changed; what was made of it is kept in
+``docs/gallery``, where the test of the problems finds it, too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import importlib.util
+import io
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+from sfetcas import Scene, load, solve
+from sfetcas.checks import check
+from sfetcas.description.records import say
+from sfetcas.outputs import _plot
+from sfetcas.reports import report
+
+ROOT = Path(__file__).resolve().parents[2]
+PROBLEMS = ROOT / "problems"
+GALLERY = ROOT / "docs" / "gallery"
+PICTURES = GALLERY / "pictures"
+KEPT = GALLERY / "kept"
+
+GROUPS = (
+    "Statics in the plane",
+    "Statics in space",
+    "Contact",
+    "Paths and stability",
+    "Vibrations",
+    "Motion",
+    "Programs",
+)
+WIDE = 3
+"""Pictures in a row of the index."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An expected value beside what was found, as text, and whether it is within its tolerance."""
+
+    quantity: str
+    expected: str
+    found: str
+    difference: float
+    tolerance: str
+    reason: str
+    passed: bool
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a page of the gallery says of a problem."""
+
+    name: str
+    title: str
+    group: str
+    source: str
+    text: str
+    command: str
+    found: str
+    comparisons: list[Comparison]
+    seconds: float
+    picture: bool
+
+
+def problems() -> list[Path]:
+    """All problem files, scenes and programs."""
+    return sorted([*PROBLEMS.glob("*.toml"), *PROBLEMS.glob("*.py")])
+
+
+def entry_of(file: Path) -> Entry:
+    """Solve, check and draw a problem.
+
+    Raises
+    ------
+    SceneError, SolveError
+        It cannot be solved.
+    """
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context({"figure.dpi": 100, "savefig.dpi": 100}):
+        return _of_program(file) if file.suffix == ".py" else _of_scene(file)
+
+
+def _of_scene(file: Path) -> Entry:
+    begun, scene, said = time.perf_counter(), load(file), io.StringIO()
+    answer = solve(scene)
+    seconds = time.perf_counter() - begun
+    with contextlib.redirect_stdout(said):
+        report(answer, seconds)
+    comparisons = [
+        Comparison(
+            # What chooses an answer stands behind the name, as in the file's own words.
+            quantity=" ".join([entry.expect.quantity, *_choice(entry.expect)]),
+            expected=say(entry.expect.value),
+            found=_rounded(entry.value),
+            difference=entry.error,
+            tolerance="exactly" if entry.expect.tolerance is None else f"{entry.expect.tolerance:.1e}",
+            reason="; ".join(filter(None, (entry.expect.why, entry.expect.source))),
+            passed=entry.passed,
+        )
+        for entry in check(scene, answer)
+    ]
+    drawing = PICTURES / f"{file.stem}.png"
+    _plot(drawing, scene)(answer, drawing)
+    title = scene.title or file.stem
+    command = f"sfetcas run problems/{file.name} --plot {file.stem}.png"
+    return Entry(
+        file.stem, title, _group(scene), scene.source, "", command, said.getvalue(), comparisons, seconds, picture=True
+    )
+
+
+def _choice(expect: Any) -> Iterator[str]:
+    for key in ("at", "step", "time", "equilibrium", "crossing", "limit_point", "bifurcation", "flutter_point"):
+        if getattr(expect, key) is not None:
+            yield f"{key} {getattr(expect, key):g}"
+
+
+def _rounded(value: Any) -> str:
+    if isinstance(value, bool | str):
+        return say(value)
+    if isinstance(value, list | tuple) or hasattr(value, "tolist"):
+        return f"[{', '.join(map(_rounded, value))}]"
+    return f"{value:.9g}"
+
+
+def _group(scene: Scene) -> str:
+    if scene.analysis.type == "static":
+        plane = scene.resolved_dimension == "plane"
+        return "Contact" if scene.contacts else f"Statics in {'the plane' if plane else 'space'}"
+    return {"path": "Paths and stability", "modes": "Vibrations", "dynamic": "Motion"}[scene.analysis.type]
+
+
+def _of_program(file: Path) -> Entry:
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{file} cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    begun = time.perf_counter()
+    differences = module.check()
+    seconds = time.perf_counter() - begun
+    comparisons = [
+        Comparison(name, "", "", float(value), f"{module.TOLERANCE:.1e}", "", bool(value <= module.TOLERANCE))
+        for name, value in differences.items()
+    ]
+    drawn = hasattr(module, "picture")
+    if drawn:
+        module.picture().savefig(PICTURES / f"{file.stem}.png")
+    title, _, text = (module.__doc__ or file.stem).partition("\n")
+    command = f"python problems/{file.name}"
+    return Entry(
+        file.stem, title.rstrip("."), "Programs", "", text.strip(), command, "", comparisons, seconds, picture=drawn
+    )
+
+
+# -- what was made before -------------------------------------------------------------------------------
+
+
+def program_digest() -> str:
+    """A digest of the program, of this module, and of the versions of what they are run with."""
+    versions = (sys.version, *(importlib.metadata.version(name) for name in ("casadi", "matplotlib", "numpy", "scipy")))
+    digest = hashlib.sha256(repr(versions).encode())
+    for file in sorted([*(ROOT / "sfetcas").rglob("*.py"), Path(__file__)]):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def kept(file: Path, program: str) -> Entry | None:
+    """The entry that was made of a problem as it stands, by this program (its digest)."""
+    try:
+        found = json.loads((KEPT / f"{file.name}.json").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    comparisons = [Comparison(**comparison) for comparison in found["entry"]["comparisons"]]
+    entry = Entry(**{**found["entry"], "comparisons": comparisons})
+    there = not entry.picture or (PICTURES / f"{file.stem}.png").exists()
+    return entry if found["digest"] == _digest(file, program) and there else None
+
+
+def made(file: Path, program: str) -> Entry:
+    """The entry of a problem, made anew where the problem or the program (its digest) is another than before."""
+    entry = kept(file, program)
+    if entry is None:
+        entry = entry_of(file)
+        KEPT.mkdir(parents=True, exist_ok=True)
+        # Whoever reads meanwhile finds all of it or nothing.
+        part = KEPT / f"{file.name}.{os.getpid()}"
+        part.write_text(json.dumps({"digest": _digest(file, program), "entry": asdict(entry)}), encoding="utf-8")
+        part.replace(KEPT / f"{file.name}.json")
+    return entry
+
+
+def _digest(file: Path, program: str) -> str:
+    return hashlib.sha256(program.encode() + file.read_bytes()).hexdigest()
