@@ -139,3 +139,21 @@ def test_a_wrong_digit_is_noticed(tmp_path):
     page.write_text("```python\nvalue = 0.25\nvalue  # 0.26...\n```\n", encoding="utf-8")
     with pytest.raises(AssertionError, match=r"page.md, line 1"):
         run_python(blocks(page)[0], {}, page)
+
+
+def test_every_module_stands_in_the_table():
+    rows = [
+        line
+        for line in (DOCS / "developer" / "architecture.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("| `")
+    ]
+    folder = ROOT / "sfetcas"
+    for place in (folder, folder.with_name("benchmarks"), *(path.parent for path in folder.glob("*/__init__.py"))):
+        modules = {file.stem for file in place.glob("*.py")} - {"__init__", "__main__"}
+        listed = {
+            word
+            for line in rows
+            if (place == folder) == (not line.startswith("| `" + place.name + "/`"))
+            for word in re.findall(r"`(\w+)`", line.split("|")[1 if place == folder else 2])
+        }
+        assert modules <= listed, place.name

@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import entries
 import pytest
 
 from sfetcas import Scene, load, solve
 from sfetcas.checks import Check, check
 
-FILES = sorted((Path(__file__).parent.parent / "problems").glob("*.toml"))
+ROOT = Path(__file__).parent.parent
+FILES = sorted((ROOT / "problems").glob("*.toml"))
+PROGRAM = entries.program_digest()
 by_name = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 
 
@@ -35,7 +38,10 @@ def test_problem_is_solved(file: Path) -> None:
     assert scene.expect
     for expect in scene.expect:
         assert expect.tolerance is None or (expect.tolerance > 0.0 and expect.why), expect.quantity
-    assert not failures(scene)
+    made = entries.kept(file, PROGRAM)
+    # What the gallery has found with this very program needs no second solve.
+    missed = failures(scene) if made is None else [found for found in made.comparisons if not found.passed]
+    assert not missed
 
 
 def test_falsified_reference_fails() -> None:

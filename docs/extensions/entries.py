@@ -34,18 +34,6 @@ GALLERY = ROOT / "docs" / "gallery"
 PICTURES = GALLERY / "pictures"
 KEPT = GALLERY / "kept"
 
-GROUPS = (
-    "Statics in the plane",
-    "Statics in space",
-    "Contact",
-    "Paths and stability",
-    "Vibrations",
-    "Motion",
-    "Programs",
-)
-WIDE = 3
-"""Pictures in a row of the index."""
-
 
 @dataclass(frozen=True)
 class Comparison:

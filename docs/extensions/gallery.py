@@ -97,7 +97,7 @@ def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
         )
         rows.append(f"| [{group}]({page}.md): {len(chosen)} | {shown} |")
     text = (
-        "# Gallery\n\nEach file of `problems/` has a page with its picture, the file, what is expected and from where, and "
+        "# Gallery\n\nEach file of `problems/` has a page: its picture, the file, what is expected and from where, and "
         "what is found. They are made with the documentation, which cannot be built where a value is missed.\n"
     )
     listed = "\n".join(pages)
