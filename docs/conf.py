@@ -18,7 +18,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "numpydoc",
-    "matplotlib.sphinxext.plot_directive",
+    "plots",
     "sphinxarg.ext",
     "formulas",
     "reference",
