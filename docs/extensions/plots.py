@@ -1,7 +1,7 @@
 """The plot directive of matplotlib in pages of Markdown.
 
-The directive puts lines of reStructuredText in front of the parser; that of Markdown takes none, so they are parsed where
-they stand.
+The directive puts lines of reStructuredText in front of the parser. That of Markdown takes none, so they are parsed
+where they stand.
 """
 
 from typing import Any
