@@ -47,6 +47,7 @@ ORDER = [
     "description.matrices",
     "description.sections",
     "description.shapes",
+    "description.changes",
     "description.structure",
     "description.springs",
     "description.loads",

@@ -254,9 +254,9 @@ class Record(BaseModel):
         return {n: plain(v) for n, v, field in pairs if n == "type" or not _is_default(v, field)}
 
     def replace(self: R, **changes: Any) -> R:
-        """A copy with other values, validated anew."""
-        kept = {name: getattr(self, name) for name in self.model_fields_set}
-        return type(self)(**{**kept, **changes})
+        """A copy with other values, validated anew; None stands for the default."""
+        kept = {name: getattr(self, name) for name in self.model_fields_set - changes.keys()}
+        return type(self)(**kept, **{name: value for name, value in changes.items() if value is not None})
 
 
 def counted(number: int, one: str, more: str | None = None) -> str:

@@ -19,8 +19,7 @@ from ..description.scene import Scene
 from ..errors import SceneError
 from ..files import UnreadableError, read_file
 from ..mathematics.arrays import Array
-from ..parametric.arguments import argument
-from ..parametric.changing import changed
+from ..parametric.arguments import argument, with_values
 from .distributions import Distribution
 
 __all__ = ["MOST_CASES", "Cases", "cases_from", "grid", "read_cases", "sampled"]
@@ -81,7 +80,7 @@ class Cases:
             try:
                 known = argument(scene, name)
                 # What is accepted by name alone shows with the scene's own numbers.
-                changed(scene, {name: known.default})
+                with_values(scene, {name: known.default})
             except SceneError as error:
                 raise SceneError(error.bare, ("cases", name)) from None
             rows = column.reshape(len(column), -1)

@@ -16,7 +16,7 @@ from ..description.records import unknown
 from ..dynamics.motion import Trajectory
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
-from ..parametric.changing import changed
+from ..parametric.arguments import with_values
 from .replay import HALVINGS, Response, respond
 from .transcription import GridMotion, Transcription
 
@@ -246,4 +246,4 @@ class ControlledMotion:
         for one in self.transcription.statement.variables:
             value = self.variables[one.name]
             found |= {one.name: value} if one.parameter is None else one.parameter.numbers(value)
-        return changed(scene, found) if found else scene
+        return with_values(scene, found) if found else scene
