@@ -43,6 +43,7 @@ ORDER = [
     "mathematics.statements",
     "description",
     "description.records",
+    "description.columns",
     "description.answers",
     "description.matrices",
     "description.sections",
