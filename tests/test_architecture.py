@@ -43,6 +43,7 @@ ORDER = [
     "mathematics.statements",
     "description",
     "description.records",
+    "description.showing",
     "description.columns",
     "description.answers",
     "description.matrices",

@@ -23,9 +23,10 @@ from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
 from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
 from .obstacles import check_start, members_of, obstacle
-from .records import Named, Record, Vector, number, say, unknown
+from .records import Named, Record, Vector, brief, counted, number, say, unknown
 from .sections import CrossSection
 from .shapes import CenterLine, place
+from .showing import named, number_in_words, shown
 from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
@@ -98,6 +99,20 @@ class Scene(Record):
     contacts: Named[Contact] = Field(default_factory=dict)
     analysis: Analysis = Analysis()
     expect: tuple[Expect, ...] = ()
+
+    def __repr__(self) -> str:
+        return shown(
+            self,
+            [brief(self.title) if self.title else "", self.resolved_dimension, self.analysis.type],
+            [
+                *(named(getattr(self, table), *kind) for table, kind in _TABLES.items()),
+                *(f"{key}: {number_in_words(v, unit)}" for key, unit in _UNITS.items() if (v := getattr(self, key))),
+                repr(self.analysis) if self.analysis != Analysis() else "",
+                counted(len(self.expect), "known value") if self.expect else "",
+            ],
+        )
+
+    __str__ = __repr__
 
     @model_validator(mode="before")
     @classmethod
@@ -226,6 +241,22 @@ class Scene(Record):
             self.contacts,
             self.rotating,
         )
+
+
+_TABLES = {
+    "sections": ("section",),
+    "nodes": ("node",),
+    "members": ("member",),
+    "springs": ("spring",),
+    "loads": ("load",),
+    "motions": ("prescribed motion",),
+    "histories": ("history", "histories"),
+    "contacts": ("contact",),
+}
+"""Tables of a scene in their order, with what one of their entries is."""
+
+_UNITS = {"gravity": "m/s2", "rotating": "rad/s"}
+"""What acts everywhere, with its unit."""
 
 
 def _remade(record: Record, entries: Mapping[str, Any]) -> Record:

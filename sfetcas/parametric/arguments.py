@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -16,6 +16,7 @@ from ..description import records
 from ..description.changes import FACTOR, branch_of, carry_ends, with_entries
 from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
+from ..description.showing import named
 from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
@@ -36,6 +37,7 @@ __all__ = [
     "argument",
     "asked_for",
     "default_arguments",
+    "in_words",
     "single_numbers",
     "with_cuts",
     "with_numbers",
@@ -62,7 +64,7 @@ class Parameter:
     """
 
     value: float
-    numbers: Callable[[float], Mapping[str, ArrayLike]]
+    numbers: Callable[[float], Mapping[str, ArrayLike]] = field(repr=False)
     low: float | None = None
     high: float | None = None
     unit: str = ""
@@ -95,7 +97,7 @@ class Argument:
     low: float | None = None
     high: float | None = None
     components: tuple[int, ...] | None = None
-    numbers: Callable[[float], Mapping[str, ArrayLike]] | None = None
+    numbers: Callable[[float], Mapping[str, ArrayLike]] | None = field(default=None, repr=False)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -526,6 +528,12 @@ class Arguments:
         """A function (arguments) -> given, with a name."""
         p = ca.MX.sym("arguments", len(self.defaults))
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
+
+
+def in_words(arguments: Arguments, results: Results) -> list[str]:
+    """The names of arguments and of results, a line of each."""
+    parameters, answers = [one.name for one in arguments.arguments], [one.name for one in results.results]
+    return [named(parameters, "parameter"), named(answers, "answer")]
 
 
 def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:

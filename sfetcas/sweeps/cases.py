@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..description.columns import read_columns
 from ..description.records import counted, say, whole
 from ..description.scene import Scene
+from ..description.showing import ranges_in_words, shown
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..parametric.arguments import argument, with_values
@@ -61,6 +62,10 @@ class Cases:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+    def __repr__(self) -> str:
+        sample = "a random sample" if self.random else ""
+        return shown(self, [counted(len(self), "case"), sample], ranges_in_words(self.columns))
 
     def single(self, scene: Scene) -> Cases:
         """The cases with a column for each single number: ``loads.tip.value.0``, ... instead of ``loads.tip.value``.
