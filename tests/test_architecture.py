@@ -42,6 +42,7 @@ ORDER = [
     "mathematics.relations",
     "mathematics.statements",
     "description",
+    "description.described",
     "description.records",
     "description.showing",
     "description.columns",

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Val
 from pydantic.fields import FieldInfo
 
 from ..errors import SceneError
+from .described import Described
 
 __all__ = [
     "Direction",
@@ -249,7 +250,7 @@ Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]
 """A read-only table by name."""
 
 
-class Record(BaseModel):
+class Record(Described):
     """Frozen data with known keys only; a wrong value raises :class:`SceneError` at construction."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
