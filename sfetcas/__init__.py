@@ -1,4 +1,4 @@
-"""sfetcas: equilibria, vibrations and motions of very flexible beams.
+"""Equilibria, vibrations and motions of very flexible beams.
 
 The flow, in the order of the names below:
 

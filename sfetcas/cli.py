@@ -34,7 +34,7 @@ from .mechanics.model import assemble
 from .mechanics.resistance import check_resistance
 from .outputs import Output, outputs_of, outputs_of_sweep, outputs_of_trade
 from .quoting import printable
-from .reports import flexible, print_checks, report, report_sweep
+from .reports import print_checks, report, report_sweep
 from .solvers.prepared import Prepared
 from .stopping import COMMAND, INTERRUPTED, SENTENCE, arrived, asked, heard
 
@@ -387,7 +387,7 @@ def _info(options: argparse.Namespace) -> int:
     model = assemble(scene, mesh, assembly=settings.assembly)
     print(printable(scene.title) or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(f"  begins with {flexible(model)}; {model.assembly} assembly")
+    print(f"  begins with {model.elements_in_words}; {model.assembly} assembly")
     for block in model.blocks:
         print(f"  {block.size:6d}  {block.name}: {block.why}")
     print(f"  {model.unknowns:6d}  unknowns of the minimisation")
@@ -423,7 +423,7 @@ def _export(options: argparse.Namespace) -> int:
     )
     folder = printable(str(options.folder))
     print(f"{folder}: {name}.c, {name}.h and what belongs to them; `make check` there builds and compares")
-    print(f"  {flexible(solver.model)}, {counted(solver.arguments.expressions.total, 'unknown')}")
+    print(f"  {solver.model.elements_in_words}, {counted(solver.arguments.expressions.total, 'unknown')}")
     for one in solver.arguments.arguments:
         print(f"  argument {one.name} [{one.unit}]: {', '.join(f'{x:.6g}' for x in one.default)}")
     if solver.results.results:

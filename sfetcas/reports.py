@@ -10,6 +10,7 @@ import numpy as np
 from .checks import Answer, Check
 from .description.answers import answer_name
 from .description.records import counted
+from .description.showing import WAYS, error_in_words, stability_in_words
 from .dynamics.motion import MotionState, Trajectory
 from .equilibria.solution import Equilibrium
 from .mathematics.arrays import first_of_largest
@@ -22,10 +23,7 @@ if TYPE_CHECKING:
     from .dynamics.modes import Modes
     from .sweeps.result import Sweep
 
-__all__ = ["flexible", "print_checks", "report", "report_sweep"]
-
-WAYS = ("way out", "ways out")
-"""Negative eigenvalues in words."""
+__all__ = ["print_checks", "report", "report_sweep"]
 
 MOST_NODES = 20
 """Nodes in the printed report at most."""
@@ -36,7 +34,7 @@ def report(solution: Answer, seconds: float) -> None:
     model = solution.last.model
     print(printable(solution.scene.title) or "untitled scene")
     print(f"  {model.dimension}: {model.reason}")
-    print(f"  {flexible(model)}, {counted(model.unknowns, 'unknown')}, {model.assembly} assembly")
+    print(f"  {model.size_in_words}")
     if isinstance(solution, Course):
         _report_path(solution)
     if solution.scene.analysis.type == "modes":
@@ -85,7 +83,7 @@ def _report_motion(motion: Trajectory) -> None:
     if len(ends) > 1:
         _report_course(motion)
     worst = ", ".join(f"{kind} {value:.1e}" for kind, value in motion.violation.items())
-    print(f"  worst violation: {worst}; {_accuracy(motion.error_estimate, motion.error_of)}")
+    print(f"  worst violation: {worst}; {error_in_words(motion.error_estimate, motion.error_of)}")
     for note in motion.notes:
         print(f"  note: {note}")
 
@@ -230,24 +228,18 @@ def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
     for name, entry in step.contacts.items():
         _report_contact(name, entry)
     proof = step.certificate
-    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {_accuracy(proof.error_estimate, proof.error_of)}")
+    print(f"  {_kind(step)}, residual {proof.residual:.1e}, {error_in_words(proof.error_estimate, proof.error_of)}")
     for note in dict.fromkeys(step.notes):
         if note not in said:
             print(f"  note: {note}")
     said.update(step.notes)
 
 
-def _accuracy(error: float | None, quantity: str) -> str:
-    if error is None:
-        return "error not estimated"
-    return f"estimated error {error:.1e} of {quantity or 'the size'}"
-
-
 def _kind(step: Equilibrium) -> str:
     proof = step.certificate
     if proof.stable == "not defined":
         return "stability not defined, as loads have no potential"
-    kind = {"True": "stable", "False": f"unstable ({counted(proof.negative, *WAYS)})"}.get(str(proof.stable), "neutral")
+    kind = stability_in_words(proof.stable, proof.negative)
     return f"{kind}, smallest eigenvalue {proof.smallest:.4g} N" if np.isfinite(proof.smallest) else kind
 
 
@@ -362,10 +354,3 @@ def _short(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_short(entry) for entry in value) + "]"
     return f"{value:.8g}" if isinstance(value, float) else str(value)
-
-
-def flexible(model: Model) -> str:
-    """The elements of flexible members: a rigid or small one is cut into none."""
-    cuts, members = model.mesh.cuts, model.scene.members
-    count = sum(len(cuts[name]) - 1 for name, member in members.items() if member.type == "flexible")
-    return f"{counted(count, 'element')} {model.element.name}" if count else "no flexible member"

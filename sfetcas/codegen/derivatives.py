@@ -9,12 +9,13 @@ import casadi as ca
 import numpy as np
 
 from ..description.scene import Scene
+from ..description.showing import shown
 from ..equilibria.settings import Settings
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.nlp import NLP
 from ..mechanics.model import Model
-from ..parametric.arguments import Arguments, Asked
+from ..parametric.arguments import Arguments, Asked, in_words
 from ..parametric.equilibrium import equilibrium_solver
 from ..parametric.results import Results
 from ..solvers.prepared import Prepared
@@ -52,6 +53,9 @@ class Derivatives:
     nlp: NLP
     parameters: ca.MX
     guess: Array
+
+    def __repr__(self) -> str:
+        return shown(self, [self.name, self.model.size_in_words], in_words(self.arguments, self.results))
 
     @property
     def model(self) -> Model:

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ..description.scene import Scene
+from ..description.showing import shown
 from ..dynamics.integrating import Memory, Stepper
 from ..dynamics.methods import Method
 from ..dynamics.simulation import INTEGRATORS, Simulation
@@ -22,7 +23,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import Equations
 from ..mechanics.masses import masses_of
 from ..mechanics.model import Model, assemble
-from ..parametric.arguments import Arguments, Asked, asked_for
+from ..parametric.arguments import Arguments, Asked, asked_for, in_words
 from ..parametric.equilibrium import Place, chosen_places
 from ..parametric.moving import ParametricStages, answers_of_motion, motion_of, parametric_stages
 from ..parametric.results import Results, default_motion_results
@@ -59,6 +60,9 @@ class TimeStep:
     method: Method
     time: float
     begin: Array
+
+    def __repr__(self) -> str:
+        return shown(self, [self.name, self.model.size_in_words], in_words(self.arguments, self.results))
 
     @property
     def model(self) -> Model:

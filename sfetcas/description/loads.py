@@ -2,45 +2,134 @@
 
 from __future__ import annotations
 
+import os
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
-from math import perm
-from typing import Literal
+from math import isfinite, perm
+from typing import Any, Literal
 
 from pydantic import model_validator
 
 from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.arrays import TINY
-from .records import Fraction, Numbers, Record, Turn, Vector, say
+from ..mathematics.interpolation import cubic_spline, fitted_spline
+from .columns import read_columns
+from .records import Fraction, Numbers, Record, Turn, Vector, enumerated, number, say
 from .sections import Varying
 
 __all__ = ["History", "Load", "Motion"]
 
 
 class History(Record):
-    """A factor as a function of time, or in statics of the load factor.
+    """A factor as a function of time, or in statics of the load factor; constant before the first t and after the last.
 
     Parameters
     ----------
     t : (n,), s, or in statics load factors
-        Rising.  Outside the factor is constant.
+        Rising.  Outside the factor is constant.  In a scene file the key ``table`` may name a CSV file with columns
+        ``t`` and ``value`` instead of both keys.
     value : (n,)
-        Factors at these, linear between.
+        Factors at these.
+    interpolation : text
+        Between the values: ``linear``, or ``spline``: the cubic spline through them, with continuous rate and
+        acceleration, which begins and ends with zero rate, as the factor is constant outside.  Motions need such a
+        smooth history.  It goes through all values; smooth measured ones before where they are noisy.
     polynomial : (n - 1, any)
-        Instead of values: for each interval coefficients c0, c1, ... in the fraction of the interval, from 0 to
-        1.
+        Instead of values: for each interval coefficients c0, c1, ... in the fraction of the interval, from 0 to 1.
+
+    :meth:`of` makes a history from a function.
+
+    Examples
+    --------
+    >>> History(t=[0, 2], value=[0, 1], interpolation="spline").factor(0.5)
+    0.15625
     """
 
     t: Numbers
     value: Numbers | None = None
+    interpolation: Literal["linear", "spline"] = "linear"
     polynomial: tuple[Numbers, ...] | None = None
+
+    @classmethod
+    def of(cls, function: Callable[[float], float], start: float, end: float, *, tolerance: float = 1e-6) -> History:
+        """A history that goes as a function does: a cubic spline with continuous rate and acceleration.
+
+        Intervals are halved until the spline is as near to the function as is asked for.  It is constant outside of
+        ``start`` and ``end``: where the function has zero slope at an end, so has the history; elsewhere its rate jumps
+        there, which motions do not accept during the analysis.
+
+        Parameters
+        ----------
+        function : callable
+            t -> factor, numbers; of t in s, or in statics of the load factor.
+        start, end : float
+            Where it begins and ends, s.
+        tolerance : float
+            Largest difference over the largest value of the function.
+
+        Raises
+        ------
+        SceneError
+            The function has values that are no finite numbers, jumps, or changes too fast.
+
+        Example
+        -------
+        >>> import math
+        >>> wave = History.of(lambda t: (1 - math.cos(t)) / 2, 0.0, math.pi)
+        >>> round(wave.factor(1.0), 6), wave.rate(0.0)
+        (0.229849, 0.0)
+        """
+        name = f"{cls.__name__}.of"
+        start, end, tolerance = (
+            _given(value, (name, key)) for key, value in (("start", start), ("end", end), ("tolerance", tolerance))
+        )
+        if not start < end:
+            raise SceneError(f"found {start:g} to {end:g}, accepted: a start before the end", (name,))
+        if not FINEST <= tolerance <= 1.0:
+            raise SceneError(f"found {tolerance:g}, accepted: from {FINEST:g} to 1", (name, "tolerance"))
+        if not callable(function):
+            raise SceneError(f"found {say(function)}, accepted: a function of t", (name,))
+
+        def value(t: float) -> float:
+            return _given(function(t), (name, f"the function at t = {t:g}"))
+
+        try:
+            t, terms = fitted_spline(value, start, end, tolerance, MOST_INTERVALS)
+        except ArithmeticError as error:
+            if not error.args or not isinstance(error.args[0], float):
+                raise
+            message = f"the function jumps or changes too fast near t = {error.args[0]:.9g}"
+            raise SceneError(f"{message}, accepted: a continuous function, or a larger tolerance", (name,)) from None
+        return cls(t=tuple(t.tolist()), polynomial=tuple(map(tuple, terms.tolist())))
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_table(cls, values: Any) -> Any:
+        """Columns of a file in place of t and value."""
+        if not isinstance(values, Mapping) or "table" not in values:
+            return values
+        name, twice = values["table"], [key for key in ("t", "value", "polynomial") if key in values]
+        if twice:
+            raise SceneError(f"found 'table' and {twice[0]!r}, accepted: one of them")
+        if not isinstance(name, (str, os.PathLike)):
+            raise SceneError(f"found {say(name)}, accepted: the name of a CSV file", ("table",))
+        try:
+            columns = read_columns(name)
+        except SceneError as error:
+            raise error.within("table") from None
+        missing = [key for key in ("t", "value") if key not in columns]
+        if missing:
+            message = f"found the columns {enumerated(list(columns))}, accepted: with t and value"
+            raise SceneError(message, ("table", os.fspath(name)))
+        others = {key: value for key, value in values.items() if key != "table"}
+        return {**others, "t": columns["t"], "value": columns["value"]}
 
     @model_validator(mode="after")
     def _check(self) -> History:
-        if any(right <= left for left, right in zip(self.t, self.t[1:], strict=False)):
+        if any(right <= left for left, right in pairwise(self.t)):
             raise SceneError(f"found {say(self.t)}, accepted: rising numbers", ("t",))
         if (self.value is None) == (self.polynomial is None):
             raise SceneError("accepted: either value or polynomial, one of them")
@@ -52,7 +141,28 @@ class History(Record):
                 f"found {len(self.polynomial)} for {len(self.t)} numbers t, accepted: {accepted}",
                 ("polynomial",),
             )
+        if self.interpolation == "spline":
+            self._check_spline()
         return self
+
+    def _check_spline(self) -> None:
+        if self.polynomial is not None:
+            raise SceneError("found 'spline' with polynomials, accepted: with values", ("interpolation",))
+        if not all(isfinite(c) for terms in self._pieces for c in terms):
+            message = (
+                "found t or values too far apart for a spline in double precision, accepted: linear, or other units"
+            )
+            raise SceneError(message, ("interpolation",))
+
+    @cached_property
+    def _pieces(self) -> tuple[tuple[float, ...], ...]:
+        """Coefficients of each interval in the fraction of it."""
+        if self.polynomial is not None:
+            return self.polynomial
+        assert self.value is not None
+        if self.interpolation == "linear" or len(self.t) == 1:
+            return tuple((left, right - left) for left, right in pairwise(self.value))
+        return tuple(map(tuple, cubic_spline(self.t, self.value).tolist()))
 
     def factor(self, t: float) -> float:
         """The factor at t.
@@ -70,9 +180,9 @@ class History(Record):
         if i < 0:
             return self._value(0)
         x = (t - self.t[i]) / (self.t[i + 1] - self.t[i])
-        if self.polynomial is not None:
-            return sum(c * x**k for k, c in enumerate(self.polynomial[i]))
-        return self._value(i) * (1.0 - x) + self._value(i + 1) * x
+        if self.polynomial is None and self.interpolation == "linear":
+            return self._value(i) * (1.0 - x) + self._value(i + 1) * x
+        return sum(c * x**k for k, c in enumerate(self._pieces[i]))
 
     def rate(self, t: float, side: Literal[-1, 1] = 1) -> float:
         """The derivative of the factor at t, zero outside of the history.
@@ -91,7 +201,7 @@ class History(Record):
             return 0.0
         span = self.t[i + 1] - self.t[i]
         x = (t - self.t[i]) / span
-        return sum(k * c * x ** (k - 1) for k, c in enumerate(self._terms(i)) if k) / span
+        return sum(k * c * x ** (k - 1) for k, c in enumerate(self._pieces[i]) if k) / span
 
     def between(self, begin: float, end: float) -> tuple[float, ...]:
         """The factor as a polynomial between two times in one interval of ``t``, or outside of all.
@@ -106,10 +216,10 @@ class History(Record):
         span = self.t[i + 1] - self.t[i]
         first, slope = (begin - self.t[i]) / span, (end - begin) / span
         found = [0.0]
-        for c in reversed(self._terms(i)):
+        for c in reversed(self._pieces[i]):
             found = [first * a + slope * b for a, b in zip([*found, 0.0], [0.0, *found], strict=True)]
             found[0] += c
-        return tuple(found[: len(self._terms(i))])
+        return tuple(found[: len(self._pieces[i])])
 
     def jumps(self) -> Iterator[tuple[float, float, float]]:
         """Where the factor or its rate jumps by more than rounding: t, jump of the factor, jump of the rate in 1/s.
@@ -119,7 +229,7 @@ class History(Record):
         largest, fastest = self.rounding
         last = len(self.t) - 1
         for i, t in enumerate(self.t):
-            step = self._terms(i)[0] - sum(self._terms(i - 1)) if 0 < i < last else 0.0
+            step = self._pieces[i][0] - sum(self._pieces[i - 1]) if 0 < i < last else 0.0
             kink = self.rate(t, 1) - self.rate(t, -1)
             step, kink = step if abs(step) > largest else 0.0, kink if abs(kink) > fastest else 0.0
             if step or kink:
@@ -128,11 +238,11 @@ class History(Record):
     @cached_property
     def kinks(self) -> tuple[float, ...]:
         """Values of t where the factor or its first or second derivative jumps, by more than six-digit rounding."""
-        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._terms(i))) for i in range(len(self.t) - 1)), 0.0)
+        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._pieces[i])) for i in range(len(self.t) - 1)), 0.0)
         found = []
         for i, t in enumerate(self.t):
-            left = (self._terms(i - 1), self.t[i] - self.t[i - 1]) if i else None
-            right = (self._terms(i), self.t[i + 1] - t) if i < len(self.t) - 1 else None
+            left = (self._pieces[i - 1], self.t[i] - self.t[i - 1]) if i else None
+            right = (self._pieces[i], self.t[i + 1] - t) if i < len(self.t) - 1 else None
             span = min(piece[1] for piece in (left, right) if piece) if left or right else 1.0
             jumps = [
                 (_derivative(*right, 0.0, k) if right else 0.0) - (_derivative(*left, 1.0, k) if left else 0.0)
@@ -149,20 +259,28 @@ class History(Record):
         """Bounds below which a jump is rounding of the coefficients: of the factor, and of its rate in 1/s."""
         size, rate = abs(self.factor(self.t[0])), 0.0
         for i, (left, right) in enumerate(pairwise(self.t)):
-            terms = self._terms(i)
+            terms = self._pieces[i]
             size = max(size, sum(map(abs, terms)))
             rate = max(rate, sum(k * abs(c) for k, c in enumerate(terms)) / (right - left))
         return tolerances.WRITTEN * size, tolerances.WRITTEN * rate
 
-    def _terms(self, i: int) -> tuple[float, ...]:
-        """Coefficients of the interval i in the fraction of it."""
-        if self.polynomial is not None:
-            return self.polynomial[i]
-        return self._value(i), self._value(i + 1) - self._value(i)
-
     def _value(self, i: int) -> float:
         assert self.value is not None
         return self.value[i]
+
+
+def _given(value: Any, where: tuple[str, ...]) -> float:
+    try:
+        return number(value)
+    except ValueError as error:
+        raise SceneError(str(error), where) from None
+
+
+FINEST = 1e-12
+"""Least tolerance of a history made from a function: rounding of its spline leaves less."""
+
+MOST_INTERVALS = 100_000
+"""Of a history made from a function."""
 
 
 def _derivative(terms: tuple[float, ...], span: float, x: float, k: int) -> float:

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Val
 from pydantic.fields import FieldInfo
 
 from ..errors import SceneError
+from .described import Described
 
 __all__ = [
     "Direction",
@@ -26,6 +27,7 @@ __all__ = [
     "Record",
     "Turn",
     "Vector",
+    "brief",
     "counted",
     "enumerated",
     "listed",
@@ -49,6 +51,36 @@ def say(value: object) -> str:
         return _short(repr(list(value) if isinstance(value, tuple) else value))
     except ValueError:
         return "a whole number with over 4300 digits"
+
+
+def brief(value: object) -> str:
+    """A value as Python would write it; of a long text or list the beginning.
+
+    >>> brief((0.0, 1.0)), brief(tuple(range(40)))
+    ('(0.0, 1.0)', '(0, 1, 2, 3, ... and 36 more)')
+    """
+    if isinstance(value, Mapping):
+        entries = [f"{key!r}: {brief(entry)}" for key, entry in list(value.items())[:LISTED]]
+        return "{" + _cut(entries, len(value)) + "}"
+    if isinstance(value, tuple):
+        rows = len(value) > 1 and all(isinstance(entry, tuple) and len(entry) > 1 for entry in value)
+        if rows and sum(map(len, value)) > LISTED:
+            return f"({counted(len(value), 'row')} of numbers)"
+        most = LISTED if len(value) <= LISTED else LISTED // 2
+        entries = [brief(entry) for entry in value[:most]]
+        return f"({_cut(entries, len(value))}{',' if len(value) == 1 else ''})"
+    text = repr(value)
+    # A record is brief by itself.
+    return text if isinstance(value, BaseModel) or len(text) <= LONGEST else repr(str(value)[: LONGEST - 3] + "...")
+
+
+def _cut(entries: Sequence[str], number: int) -> str:
+    more = [f"... and {number - len(entries)} more"] if number > len(entries) else []
+    return ", ".join([*entries, *more])
+
+
+LISTED, LONGEST = 8, 80
+"""Entries of a list and characters of a text up to which they are printed as a whole."""
 
 
 def _short(word: str) -> str:
@@ -218,7 +250,7 @@ Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]
 """A read-only table by name."""
 
 
-class Record(BaseModel):
+class Record(Described):
     """Frozen data with known keys only; a wrong value raises :class:`SceneError` at construction."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
@@ -234,6 +266,14 @@ class Record(BaseModel):
 
     def __deepcopy__(self: R, memo: dict[int, Any] | None = None) -> R:
         return self
+
+    def __repr__(self) -> str:
+        """As it would be made, without what stands at its default."""
+        fields = type(self).model_fields.items()
+        given = ((name, getattr(self, name)) for name, field in fields if not _is_default(getattr(self, name), field))
+        return f"{type(self).__name__}({', '.join(f'{name}={brief(value)}' for name, value in given)})"
+
+    __str__ = __repr__
 
     @classmethod
     def from_dict(cls: type[R], values: Mapping[str, Any]) -> R:
@@ -254,9 +294,9 @@ class Record(BaseModel):
         return {n: plain(v) for n, v, field in pairs if n == "type" or not _is_default(v, field)}
 
     def replace(self: R, **changes: Any) -> R:
-        """A copy with other values, validated anew."""
-        kept = {name: getattr(self, name) for name in self.model_fields_set}
-        return type(self)(**{**kept, **changes})
+        """A copy with other values, validated anew; None stands for the default."""
+        kept = {name: getattr(self, name) for name in self.model_fields_set - changes.keys()}
+        return type(self)(**kept, **{name: value for name, value in changes.items() if value is not None})
 
 
 def counted(number: int, one: str, more: str | None = None) -> str:

@@ -16,15 +16,17 @@ from .. import tolerances
 from ..errors import SceneError
 from ..mathematics.quaternion import matrix
 from .answers import answer_name, check_answer
+from .changes import FACTOR, Branch, branch_of, carry_ends, with_entries
 from .contacts import Contact
 from .dimension import out_of_plane
 from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
 from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
 from .obstacles import check_start, members_of, obstacle
-from .records import Named, Record, Vector, say, unknown
+from .records import Named, Record, Vector, brief, counted, number, say, unknown
 from .sections import CrossSection
 from .shapes import CenterLine, place
+from .showing import named, number_in_words, shown
 from .springs import Spring
 from .structure import SLIDING, Member, Node, released, unit
 from .supports import check_driven_joint, check_floating, check_motion, check_motions_once
@@ -45,6 +47,9 @@ __all__ = [
     "check_loaded",
     "check_scene",
 ]
+
+PRESCRIBED = "prescribed"
+"""Another name of the table ``motions``."""
 
 
 class Scene(Record):
@@ -119,21 +124,92 @@ class Scene(Record):
     analysis: Analysis = Analysis()
     expect: tuple[Expect, ...] = ()
 
+    def __repr__(self) -> str:
+        return shown(
+            self,
+            [brief(self.title) if self.title else "", self.resolved_dimension, self.analysis.type],
+            [
+                *(named(getattr(self, table), *kind) for table, kind in _TABLES.items()),
+                *(f"{key}: {number_in_words(v, unit)}" for key, unit in _UNITS.items() if (v := getattr(self, key))),
+                repr(self.analysis) if self.analysis != Analysis() else "",
+                counted(len(self.expect), "known value") if self.expect else "",
+            ],
+        )
+
+    __str__ = __repr__
+
     @model_validator(mode="before")
     @classmethod
     def _prescribed(cls, values: Any) -> Any:
         """Prescribed displacements and rotations by their other name."""
-        if not isinstance(values, Mapping) or "prescribed" not in values:
+        if not isinstance(values, Mapping) or PRESCRIBED not in values:
             return values
         if "motions" in values:
             raise SceneError("found 'motions' and 'prescribed', which are the same table, accepted: one of them")
-        return {("motions" if key == "prescribed" else key): table for key, table in values.items()}
+        return {("motions" if key == PRESCRIBED else key): table for key, table in values.items()}
 
     @model_validator(mode="after")
     def _check(self) -> Scene:
         for rule in _RULES:
             rule(self)
         return self
+
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> Scene:
+        """A scene with other values of any of its keys, validated as a new one; this scene stays as it is.
+
+        ``scene.replace({"loads.tip.value": [0, 5], "analysis.accuracy": 1e-8}, title="as measured")``
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            Values by the names of the keys, with dots: ``sections.strip.EI3``, one entry of a list as
+            ``loads.tip.value.1``, a whole entry of a table as ``loads.extra``, which may be a new one.  None removes
+            an entry, and sets a key to its default.  ``factor`` stands for all of ``analysis.steps``.
+        keys
+            Whole keys of the scene: ``title="..."``, ``gravity=[0, -9.81]``, ``analysis=Analysis(...)``.
+
+        Returns
+        -------
+        Scene
+            A free node at the end of a member whose changed shape says where it ends (a curvature with a ``start``, a
+            helix, a spline) moves along.  Values in ``expect`` are known of this scene: they are kept where only texts,
+            the dimension or numerical settings change (``accuracy``, ``accuracy_of``, ``step``, ``integrator``,
+            ``element``, ``elements``), and dropped where the answer may change, unless ``expect`` is given.
+
+        Raises
+        ------
+        SceneError
+            There is no such key, or the scene does not accept the value; the sentence begins with the key.
+
+        Example
+        -------
+        >>> strip, nodes = {"EI3": 1.0}, {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}}
+        >>> beam, tip = {"nodes": ["A", "B"], "section": "strip"}, {"type": "force", "node": "B", "value": [0, 1]}
+        >>> scene = Scene(sections={"strip": strip}, nodes=nodes, members={"beam": beam}, loads={"tip": tip})
+        >>> stronger = scene.replace({"loads.tip.value": [0, 5], "analysis.accuracy": 1e-6})
+        >>> stronger.loads["tip"].value, stronger.analysis.accuracy
+        ((0.0, 5.0, 0.0), 1e-06)
+        """
+        new = branch_of({} if changes is None else changes, keys)
+        if PRESCRIBED in new:
+            new = branch_of(new, {"motions": new.pop(PRESCRIBED)})
+        factor = new.pop(FACTOR, None)
+        if factor is not None and self.analysis.type == "dynamic":
+            message = "found the analysis 'dynamic', in which loads go by their histories, accepted: any other analysis"
+            raise SceneError(message, (FACTOR,))
+        for key in new:
+            if key not in type(self).model_fields and key in Analysis.model_fields:
+                raise SceneError(f"unknown key {key!r}; did you mean 'analysis.{key}'?")
+        carry_ends(self, new, _remade)
+        known = None if "expect" in new else self.expect
+        found = with_entries(self, Branch(new, expect=()) if known else new, _remade)
+        if factor is not None:
+            try:
+                steps = (number(factor),)
+            except ValueError as error:
+                raise SceneError(str(error), (FACTOR,)) from None
+            found = found.model_copy(update={"analysis": found.analysis.model_copy(update={"steps": steps})})
+        return Record.replace(found, expect=known) if known and _answers_alike(self, found) else found
 
     @cached_property
     def center_lines(self) -> Mapping[str, CenterLine]:
@@ -189,6 +265,47 @@ class Scene(Record):
             self.contacts,
             self.rotating,
         )
+
+
+_TABLES = {
+    "sections": ("section",),
+    "nodes": ("node",),
+    "members": ("member",),
+    "springs": ("spring",),
+    "loads": ("load",),
+    "motions": ("prescribed motion",),
+    "histories": ("history", "histories"),
+    "contacts": ("contact",),
+}
+"""Tables of a scene in their order, with what one of their entries is."""
+
+_UNITS = {"gravity": "m/s2", "rotating": "rad/s"}
+"""What acts everywhere, with its unit."""
+
+
+def _remade(record: Record, entries: Mapping[str, Any]) -> Record:
+    return Record.replace(record, **entries)
+
+
+_NUMERICAL = {"analysis": ("accuracy", "accuracy_of", "step", "integrator"), "members": ("element", "elements")}
+"""Keys that say how an answer is computed, not what it is."""
+
+
+def _answers_alike(scene: Scene, other: Scene) -> bool:
+    """Whether two scenes differ only in what the answer depends on no more than by the error of computing it."""
+
+    def bare(record: Record, table: str) -> Record:
+        return record.model_copy(update=dict.fromkeys(_NUMERICAL[table]))
+
+    for key in set(Scene.model_fields) - {"title", "source", "dimension", "expect"}:
+        one, two = getattr(scene, key), getattr(other, key)
+        if key == "analysis":
+            one, two = bare(one, key), bare(two, key)
+        elif key == "members" and one != two:
+            one, two = ({name: bare(member, key) for name, member in table.items()} for table in (one, two))
+        if one != two:
+            return False
+    return True
 
 
 def _check_members(scene: Scene) -> None:

@@ -147,13 +147,18 @@ def _read(path: Path) -> str:
         raise SceneError(str(error)) from None
 
 
+FILES = {"members": ("stiffness", "mass"), "histories": ("table",)}
+"""Keys that may name a file beside that of the scene, by their tables."""
+
+
 def _within(values: Any, folder: Path) -> Any:
-    """The values with the files of matrices named from the folder of the scene."""
-    members = values.get("members") if isinstance(values, dict) else None
-    for member in members.values() if isinstance(members, dict) else ():
-        for key in ("stiffness", "mass"):
-            if isinstance(member, dict) and isinstance(member.get(key), str):
-                member[key] = str(folder / member[key])
+    """The values with the files of matrices and tables named from the folder of the scene."""
+    for table, keys in FILES.items():
+        entries = values.get(table) if isinstance(values, dict) else None
+        for entry in entries.values() if isinstance(entries, dict) else ():
+            for key in keys:
+                if isinstance(entry, dict) and isinstance(entry.get(key), str):
+                    entry[key] = str(folder / entry[key])
     return values
 
 

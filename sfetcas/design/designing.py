@@ -10,8 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..description.records import counted
 from ..description.records import unknown as not_known
 from ..description.scene import Scene, check_scene
+from ..description.showing import first_lines, notes_in_words, shown, values_in_words
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
 from ..errors import SceneError, SolveError
@@ -79,6 +81,15 @@ class DesignAnswer:
     iterations: int
     outputs: Outputs = field(repr=False)
     scenes: Mapping[str, Scene] = field(repr=False)
+
+    def __repr__(self) -> str:
+        proofs = {name or "equilibrium": case.certificate.in_words for name, case in self.cases.items()}
+        cases = first_lines(proofs, lambda name: f"{name}: {proofs[name]}")
+        return shown(
+            self,
+            [f"objective={self.objective:.9g}", counted(self.iterations, "iteration")],
+            [*values_in_words(self.values), *cases, *notes_in_words(self.notes)],
+        )
 
     @property
     def stable(self) -> bool:

@@ -18,8 +18,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.statements import Bounds, Problem, Statement, bounds_of
 from ..mechanics.mesh import first_mesh
 from ..mechanics.model import assemble
-from ..parametric.arguments import Argument, Parameter, argument, single_numbers
-from ..parametric.changing import changed
+from ..parametric.arguments import Argument, Parameter, argument, single_numbers, with_values
 from ..parametric.equilibrium import refuse_search
 from ..parametric.results import Results
 
@@ -273,7 +272,7 @@ class Formulation(Statement):
         for name, value in numbers.items():
             follow = self.tied[name].numbers if name in self.tied else None
             found |= {name: value} if follow is None else single_numbers(self.scene, follow(value))
-        return changed(self.scene, found)
+        return with_values(self.scene, found)
 
     @property
     def guesses(self) -> dict[str, Array]:

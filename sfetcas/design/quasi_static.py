@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import tolerances
+from ..description.records import counted
 from ..description.records import unknown as not_known
 from ..description.scene import Scene, check_scene
+from ..description.showing import few, notes_in_words, ranges_in_words, shown, values_in_words
 from ..equilibria.solution import Equilibrium
 from ..errors import SceneError, SolveError
 from ..mathematics.arrays import Array
@@ -89,6 +91,19 @@ class QuasiStaticAnswer:
     notes: tuple[str, ...]
     iterations: int
     scenes: tuple[Scene, ...] = field(repr=False)
+
+    def __repr__(self) -> str:
+        jumps = f"jumps at the points {few(map(str, self.jumps))}" if self.jumps else "no jumps"
+        return shown(
+            self,
+            [f"objective={self.objective:.9g}", counted(len(self.s), "point"), counted(self.iterations, "iteration")],
+            [
+                *ranges_in_words(self.inputs),
+                *values_in_words(self.values),
+                f"{'all points stable' if self.stable else 'not all points stable'}, {jumps}",
+                *notes_in_words(self.notes),
+            ],
+        )
 
     @property
     def stable(self) -> bool:

@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
+from ..description.records import counted
 from ..description.scene import Scene
+from ..description.showing import notes_in_words, number_in_words, shown
 from ..description.supports import check_floating
 from ..equilibria import statics
 from ..equilibria.meshing import Meshing
 from ..equilibria.settings import Settings
 from ..equilibria.single import finished
-from ..equilibria.solution import Equilibrium, heading
+from ..equilibria.solution import Equilibrium, heading, heading_in_words
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
@@ -92,6 +94,10 @@ class Mode:
     nodes: Mapping[str, Mapping[str, Array]] = field(repr=False)
     members: Mapping[str, Mapping[str, Array]] = field(repr=False)
 
+    def __repr__(self) -> str:
+        damped = f"damping ratio {self.damping:.6g}" if self.damping else ""
+        return shown(self, [f"omega={self.omega:.9g} rad/s", damped, f"mass {self.mass:.6g} kg"])
+
     def to_dict(self) -> dict[str, Any]:
         """The shape as an entry of ``shapes`` in the JSON answer; imaginary parts have keys of their own."""
         answer: dict[str, Any] = {"mass": self.mass}
@@ -150,6 +156,22 @@ class Modes:
     buckling: Array
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        found = {
+            "frequencies omega": (self.omega, "rad/s"),
+            "grows at a rate of": (self.growing, "1/s"),
+            "buckles at factors, linear estimate:": (self.buckling, ""),
+        }
+        return shown(
+            self,
+            [*heading_in_words(self, self.motion.model), counted(len(self.modes), "mode")],
+            [
+                *(f"{what} {number_in_words(values, unit)}" for what, (values, unit) in found.items() if len(values)),
+                f"estimated relative error {self.error_estimate:.1e}",
+                *notes_in_words(self.notes),
+            ],
+        )
 
     @property
     def steps(self) -> tuple[Equilibrium, ...]:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..description.answers import MOTION
-from ..description.records import plain
-from ..equilibria.solution import Configuration, heading
+from ..description.records import counted, plain
+from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
+from ..equilibria.solution import Configuration, heading, heading_in_words
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.balance import three
@@ -91,6 +92,13 @@ class MotionState(Configuration):
     sample: Sample = field(repr=False)
     energies: tuple[float, float, float] = field(repr=False)
     mover: Mover = field(repr=False)
+
+    def __repr__(self) -> str:
+        energy = ", ".join(f"{kind} {number_in_words(value)}" for kind, value in self.energy.items())
+        return shown(self, [f"time={self.time:g} s"], [*self._moved(), f"energy {energy} N m"])
+
+    def _place(self, name: str) -> str:
+        return f"{super()._place(name)}, velocity {number_in_words(self.velocity(name), 'm/s')}"
 
     def velocity(self, node: str) -> Array:
         """Velocity of a node, (3,) m/s."""
@@ -195,6 +203,22 @@ class Trajectory:
     violation: Mapping[str, float]
     notes: tuple[str, ...] = ()
     failure: str = ""
+
+    def __repr__(self) -> str:
+        answers = f"{counted(len(self.steps), 'answer')} from {self.steps[0].time:g} to {self.last.time:g} s"
+        steps = f"{counted(self.count, 'time step')} of {self.integrator}" if self.integrator else ""
+        _, *last = repr(self.last).splitlines()
+        return shown(
+            self,
+            heading_in_words(self, self.last.model),
+            [
+                ", ".join(filter(None, [answers, steps, error_in_words(self.error_estimate, self.error_of)])),
+                self.failure,
+                f"at {self.last.time:g} s",
+                *last,
+                *notes_in_words(self.notes),
+            ],
+        )
 
     @property
     def last(self) -> MotionState:

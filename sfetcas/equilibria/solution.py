@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -11,7 +12,15 @@ import numpy as np
 
 from ..contact.touches import answers
 from ..description.answers import STATICS, outlined
-from ..description.records import counted, nearest, plain
+from ..description.records import brief, counted, nearest, plain
+from ..description.showing import (
+    error_in_words,
+    first_lines,
+    notes_in_words,
+    number_in_words,
+    shown,
+    stability_in_words,
+)
 from ..errors import SceneError, SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
@@ -31,9 +40,14 @@ __all__ = [
     "at_factor",
     "equilibrium",
     "heading",
+    "heading_in_words",
     "refuse_large",
+    "steps_in_words",
     "superelement_notes",
 ]
+
+MOST_SHOWN = 4
+"""Load steps that the text of an answer has."""
 
 MOST_PLACES = 400
 """Largest number of places listed along a member; with more, only ends of elements are listed, evenly thinned out."""
@@ -74,6 +88,16 @@ class Certificate:
     error_of: str = ""
     escape: Mapping[str, Array] = field(repr=False, default_factory=dict)
 
+    def __repr__(self) -> str:
+        smallest = f"smallest eigenvalue {self.smallest:.4g} N" if np.isfinite(self.smallest) else ""
+        return shown(self, [self.in_words, f"residual {self.residual:.1e}", smallest])
+
+    @property
+    def in_words(self) -> str:
+        """Stability and estimated error: ``stable, estimated error 1.0e-05 of the size``."""
+        stable = stability_in_words(self.stable, self.negative)
+        return f"{stable}, {error_in_words(self.error_estimate, self.error_of)}"
+
     def to_dict(self) -> dict[str, Any]:
         """The certificate as it stands in the JSON answer; undefined values are None."""
         smallest = self.smallest if np.isfinite(self.smallest) else None
@@ -111,6 +135,21 @@ class Configuration:
     state: State = field(repr=False)
     loading: Loading = field(repr=False)
     fields: Fields = field(repr=False)
+
+    def __repr__(self) -> str:
+        return shown(self, [f"factor={self.factor:g}"], self._moved())
+
+    def _moved(self) -> list[str]:
+        """The first nodes that can move in words, free ends before others."""
+        scene = self.model.scene
+        free = [name for name in self.model.nodes if scene.nodes[name].support == "free"]
+        ends = Counter(name for member in scene.members.values() for name in member.nodes)
+        return first_lines(sorted(free, key=ends.__getitem__), self._place, "more nodes")
+
+    def _place(self, name: str) -> str:
+        angle = self.angle(name)
+        turned = "" if angle is None else f", angle {number_in_words(angle, 'rad')}"
+        return f"node {brief(name)}: position {number_in_words(self.position(name), 'm')}{turned}"
 
     def position(self, node: str) -> Array:
         """Position of a node, (3,) m; SceneError where the scene has no such node."""
@@ -299,6 +338,14 @@ class Equilibrium(Configuration):
     potential: float
     way: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        head = [f"factor={self.factor:g}", self.certificate.in_words]
+        return shown(self, head, self.lines())
+
+    def lines(self) -> list[str]:
+        """The first nodes that can move, and the first note, in words."""
+        return [*self._moved(), *notes_in_words(self.notes)]
+
     @functools.cached_property
     def energy(self) -> dict[str, float]:
         """``elastic`` energy, potential of the ``loads``, and their ``total``, N m; zero for the undeformed scene."""
@@ -349,6 +396,9 @@ class Solution:
     seconds: Mapping[str, float]
     failure: str = ""
 
+    def __repr__(self) -> str:
+        return shown(self, heading_in_words(self, self.last.model), [self.failure, *steps_in_words(self.steps)])
+
     @property
     def last(self) -> Equilibrium:
         """The last of the steps: the equilibrium at the last load factor."""
@@ -369,6 +419,19 @@ def heading(answer: Any, model: Model, failure: str = "") -> dict[str, Any]:
         "unknowns": model.unknowns,
         "seconds": dict(answer.seconds),
     }
+
+
+def heading_in_words(answer: Any, model: Model) -> list[str]:
+    """What the text of each answer begins with: title, status, dimension and elements."""
+    title = brief(answer.scene.title) if answer.scene.title else ""
+    return [title, answer.status.value, model.dimension, model.elements_in_words]
+
+
+def steps_in_words(steps: Sequence[Equilibrium]) -> list[str]:
+    """A line for each of the last equilibria, and where the nodes of the last one are."""
+    lines = [f"factor {step.factor:g}: {step.certificate.in_words}" for step in steps[-MOST_SHOWN:]]
+    before = len(steps) - MOST_SHOWN
+    return [f"{counted(before, 'step')} before" if before > 0 else "", *lines, *steps[-1].lines()]
 
 
 def at_factor(

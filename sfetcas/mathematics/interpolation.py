@@ -7,7 +7,7 @@ Source: Abramowitz and Stegun 25.4.29 and 25.4.32; barycentric formulas as in Be
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,10 @@ from numpy.typing import ArrayLike
 from .arrays import Array, fixed, numbers
 
 __all__ = [
+    "cubic_spline",
     "differentiation",
     "evaluation",
+    "fitted_spline",
     "gauss",
     "integration",
     "legendre_tail",
@@ -114,3 +116,104 @@ def legendre_values(x: Array, degree: int) -> Array:
 def legendre_tail(nodes: Array) -> Array:
     """Row (len(nodes),) that takes nodal values to the coefficient of the highest Legendre polynomial."""
     return np.asarray(np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, len(nodes) - 1))[-1])
+
+
+def cubic_spline(x: ArrayLike, y: ArrayLike, ends: tuple[str, str] = ("clamped", "clamped")) -> Array:
+    """The cubic spline through points, twice continuously differentiable between the first and the last.
+
+    Parameters
+    ----------
+    x, y : (n,), n > 1
+        Rising places and the values there.
+    ends
+        For the first and the last point: ``clamped``, zero slope, or ``not-a-knot``, where the two intervals beside
+        the next point are one cubic.
+
+    Returns
+    -------
+    ndarray (n - 1, 4)
+        For each interval the coefficients of the powers of the fraction of it.  They are not finite where numbers
+        overflow.
+    """
+    from scipy.interpolate import CubicSpline
+
+    x, y = numbers(x), numbers(y)
+    # In units of the whole, in which nothing overflows that need not.
+    span, size = float(x[-1] - x[0]), float(np.abs(y).max()) or 1.0
+    with np.errstate(all="ignore"):
+        places, steps = (x - x[0]) / span, np.diff(x) / span
+        if not (np.diff(places) > 0.0).all() or not np.isfinite(places).all():
+            return np.full((len(x) - 1, 4), np.nan)
+        found = CubicSpline(places, y / size, bc_type=ends).c[::-1].T
+        return numbers(size * found * steps[:, None] ** np.arange(4))
+
+
+def fitted_spline(
+    function: Callable[[float], float], start: float, end: float, tolerance: float, most: int
+) -> tuple[Array, Array]:
+    """A cubic spline that is as near to a function as is asked for.
+
+    Intervals are halved where the spline misses the function, in the middle and at another place of the interval.  Ends
+    where a zero slope misses it by no more get one.
+
+    Parameters
+    ----------
+    function : callable
+        x -> value, for ``start`` <= x <= ``end``.
+    tolerance : float
+        Largest difference, over the largest value met.
+    most : int
+        Largest number of intervals.
+
+    Returns
+    -------
+    x : ndarray (n + 1,)
+        Ends of the intervals.
+    terms : ndarray (n, 4)
+        As :func:`cubic_spline` gives them.
+
+    Raises
+    ------
+    ArithmeticError
+        The function jumps, or it changes too fast for so many intervals; the argument is the place.
+    """
+    x = np.linspace(start, end, FIRST + 1)
+    known = {place: function(place) for place in x.tolist()}
+
+    def missed(ends: tuple[str, str]) -> tuple[Array, Array]:
+        """The spline, and by how much it misses the function in each interval."""
+        terms = cubic_spline(x, [known[place] for place in x.tolist()], ends)
+        off = np.zeros(len(terms))
+        for share in LOOKED_AT:
+            places = (x[:-1] + share * np.diff(x)).tolist()
+            for place in places:
+                if place not in known:
+                    known[place] = function(place)
+            off = np.maximum(off, np.abs(terms @ share ** np.arange(4) - [known[place] for place in places]))
+        return terms, off
+
+    while True:
+        terms, off = missed(("not-a-knot", "not-a-knot"))
+        allowed = tolerance * max(map(abs, known.values()))
+        wrong = off > allowed
+        if not wrong.any():
+            break
+        worst = int(off.argmax())
+        if x[worst + 1] - x[worst] < SHORTEST * (end - start) or len(terms) > most:
+            raise ArithmeticError(float(x[worst]))
+        x = np.sort(np.concatenate([x, (x[:-1] + LOOKED_AT[0] * np.diff(x))[wrong]]))
+    for ends in (("clamped", "clamped"), ("clamped", "not-a-knot"), ("not-a-knot", "clamped")):
+        resting, off = missed(ends)
+        if (off <= allowed).all():
+            return x, resting
+    return x, terms
+
+
+FIRST = 16
+"""Intervals with which :func:`fitted_spline` begins."""
+
+LOOKED_AT = (0.5, 0.2113)
+"""Fractions of an interval where a spline is compared with its function; the first becomes an end of two."""
+
+SHORTEST = 2.0**-30
+"""Share of the whole below which an interval holds a jump: the function changes there by more than is allowed."""

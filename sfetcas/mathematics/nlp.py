@@ -58,6 +58,9 @@ class NLP:
     jacobian: ca.MX
     hessian: Callable[[ca.MX, ca.MX], ca.MX]
 
+    def __repr__(self) -> str:
+        return f"NLP({self.x.numel()} unknowns, {self.g.numel()} constraint rows, {self.p.numel()} parameters)"
+
     def with_term(self, term: ca.MX) -> NLP:
         """The program with a term added to the objective, in its unit."""
         old = self.hessian
@@ -115,6 +118,9 @@ class NLPResult:
     f: float
     iterations: int
     message: str
+
+    def __repr__(self) -> str:
+        return f"NLPResult({self.status.value}, f={self.f:.9g}, {self.iterations} iterations, {self.message!r})"
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,12 @@ class Statement:
         self.costs: list[ca.MX] = []
         self._symbols: dict[int, ca.MX] = {}
 
+    @property
+    def in_words(self) -> str:
+        """How much there is of it: ``2 unknowns, 1 constraint, 1 term to minimise``."""
+        counts = {"unknown": len(self.free), "constraint": len(self.required), "cost": len(self.costs)}
+        return ", ".join(f"{number} {kind}{'' if number == 1 else 's'}" for kind, number in counts.items())
+
     def known(self, symbol: ca.MX) -> ca.MX:
         """Register a symbol that expressions may contain, and return it."""
         # Kept, so that no other symbol gets its hash.
@@ -204,6 +210,9 @@ class Problem:
     """
 
     statement: Statement
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.statement.in_words})"
 
     def subject_to(self, *relations: ca.MX, name: str = "") -> None:
         """Add constraints: ``x == 2``, ``x <= 3``, ``-1 <= (x <= 1)``, element by element.

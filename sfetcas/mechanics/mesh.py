@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import tolerances
+from ..description.records import brief, counted
 from ..description.scene import Scene, check_scene
 from ..description.sections import breaks as kinks
+from ..description.showing import first_lines, shown
 from ..mathematics.arrays import Array, first_of_largest
 from .carried import carried
 
@@ -115,6 +117,10 @@ class Mesh:
     stops: tuple[tuple[str, str], ...] = ()
     cushions: tuple[Cushion, ...] = ()
     places: bool = False
+
+    def __repr__(self) -> str:
+        cuts = first_lines(self.cuts, lambda name: f"{brief(name)}: {counted(len(self.cuts[name]) - 1, 'element')}")
+        return shown(self, [f"order={self.order}", counted(self.elements, "element")], cuts)
 
     @property
     def elements(self) -> int:

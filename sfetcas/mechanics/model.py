@@ -14,8 +14,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..description.records import counted, enumerated
+from ..description.records import brief, counted, enumerated
 from ..description.scene import Scene, check_scene
+from ..description.showing import named, shown
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
@@ -106,6 +107,22 @@ class Model:
     def reason(self) -> str:
         """A sentence why it is in the plane or in space."""
         return self.scene.dimension_reason
+
+    @property
+    def elements_in_words(self) -> str:
+        """The elements of flexible members, ``4 elements SFET5``: a rigid or small one is cut into none."""
+        cuts, members = self.mesh.cuts, self.scene.members
+        count = sum(len(cuts[name]) - 1 for name, member in members.items() if member.type == "flexible")
+        return f"{counted(count, 'element')} {self.element.name}" if count else "no flexible member"
+
+    @property
+    def size_in_words(self) -> str:
+        """``4 elements SFET5, 12 unknowns, closing assembly``."""
+        return f"{self.elements_in_words}, {counted(self.unknowns, 'unknown')}, {self.assembly} assembly"
+
+    def __repr__(self) -> str:
+        title = brief(self.scene.title) if self.scene.title else ""
+        return shown(self, [title, self.dimension, self.size_in_words], [named(self.nodes, "node")])
 
     @functools.cached_property
     def terms(self) -> tuple[Group, ...]:

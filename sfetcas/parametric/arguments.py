@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from .. import tolerances
 from ..description import records
+from ..description.changes import FACTOR, branch_of, carry_ends, with_entries
 from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
-from ..description.shapes import end_of
+from ..description.showing import named
 from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
@@ -36,13 +37,12 @@ __all__ = [
     "argument",
     "asked_for",
     "default_arguments",
+    "in_words",
     "single_numbers",
     "with_cuts",
     "with_numbers",
+    "with_values",
 ]
-
-FACTOR = "factor"
-"""The argument that multiplies all loads and motions without a history."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Parameter:
     """
 
     value: float
-    numbers: Callable[[float], Mapping[str, ArrayLike]]
+    numbers: Callable[[float], Mapping[str, ArrayLike]] = field(repr=False)
     low: float | None = None
     high: float | None = None
     unit: str = ""
@@ -97,7 +97,7 @@ class Argument:
     low: float | None = None
     high: float | None = None
     components: tuple[int, ...] | None = None
-    numbers: Callable[[float], Mapping[str, ArrayLike]] | None = None
+    numbers: Callable[[float], Mapping[str, ArrayLike]] | None = field(default=None, repr=False)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -530,6 +530,12 @@ class Arguments:
         return ca.Function(name, [p], [ca.densify(self.given(p))], ["arguments"], ["given"])
 
 
+def in_words(arguments: Arguments, results: Results) -> list[str]:
+    """The names of arguments and of results, a line of each."""
+    parameters, answers = [one.name for one in arguments.arguments], [one.name for one in results.results]
+    return [named(parameters, "parameter"), named(answers, "answer")]
+
+
 def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
     """The mesh with symbolic ends of elements that move with the places of loads along their members."""
     cuts = dict(mesh.cuts)
@@ -610,25 +616,32 @@ def _at_values(value: Any) -> Any:
     return value
 
 
-def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
-    """The scene with other values of single numbers, ``{"nodes.B.position.0": 1.2}``; plane or space as before.
+def with_values(scene: Scene, values: Mapping[str, ArrayLike]) -> Scene:
+    """The scene with other values of numbers, and of lists of numbers, in the plane or in space as before.
 
-    Where a shape changes that determines its own end, as a given curvature does, a free node there moves along.  The
-    expectations of the scene are dropped.
+    Values are given as for ``parametric``: in a plane scene vectors have two components.
 
     Raises
     ------
     SceneError
-        The changed scene is not valid.
+        The scene has no such number, or does not accept the value.
     """
-    found = _with(scene, _tree(scene, {name: float(value) for name, value in numbers.items()}), _checked)
-    assert isinstance(found, Scene)
-    return found
+    return with_numbers(scene, single_numbers(scene, values))
+
+
+def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
+    """As :func:`with_values`, of single numbers: ``{"nodes.B.position.0": 1.2}``."""
+    whole = [name for name in numbers if name != FACTOR and _is_factor(name)]
+    if whole:
+        raise SceneError(f"{whole[0]}: found a whole history, accepted: its numbers, as histories.NAME.value.0")
+    return scene.replace({**numbers, "dimension": scene.resolved_dimension, "expect": ()})
 
 
 def depending(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """As :func:`with_numbers`, with symbols in place of numbers; the scene is not validated again."""
-    found = _with(scene, _tree(scene, numbers), _unchecked)
+    new = branch_of(numbers, {"dimension": scene.resolved_dimension, "expect": ()})
+    carry_ends(scene, new, _unchecked)
+    found = with_entries(scene, new, _unchecked)
     assert isinstance(found, Scene)
     # Which is not asked of symbols.
     vars(found)["_out_of_plane"] = scene._out_of_plane
@@ -644,66 +657,6 @@ def _plain_scene(scene: Scene) -> Scene:
     return vars(scene).get(PLAIN, scene)
 
 
-def _tree(scene: Scene, numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """New entries of a scene by their keys."""
-    tree: dict[str, Any] = {}
-    for name, value in numbers.items():
-        *path, last = name.split(".")
-        branch = tree
-        for key in path:
-            branch = branch.setdefault(key, {})
-        branch[last] = value
-    tree |= {"dimension": scene.resolved_dimension, "expect": ()}
-    _carry_ends(scene, tree, numbers)
-    return tree
-
-
-def _carry_ends(scene: Scene, tree: dict[str, Any], numbers: Mapping[str, Any]) -> None:
-    """Take free nodes to where the shapes end that numbers change."""
-    for name, member in scene.members.items():
-        first, last = member.nodes[0], member.nodes[-1]
-        moved = any(n.startswith((f"members.{name}.shape.", f"nodes.{first}.position.")) for n in numbers)
-        others = [n for n, other in scene.members.items() if last in other.nodes and n != name]
-        listed = any(n.startswith(f"nodes.{last}.position.") for n in numbers)
-        if not moved or listed or others or scene.nodes[last].support != "free":
-            continue
-        make = _unchecked if any(isinstance(value, Active) for value in numbers.values()) else _checked
-        shape = _with(member.shape, tree.get("members", {}).get(name, {}).get("shape", {}), make)
-        begin = _with(scene.nodes[first].position, tree.get("nodes", {}).get(first, {}).get("position", {}), make)
-        end = end_of(shape, [*begin, 0.0][:3], member.b2)
-        if end is not None:
-            place = {str(i): x for i, x in enumerate(end.tolist()[: len(scene.nodes[last].position)])}
-            tree.setdefault("nodes", {}).setdefault(last, {})["position"] = place
-
-
-Making = Callable[[Record, dict[str, Any]], Record]
-"""A record with other entries."""
-
-
-def _checked(record: Record, entries: dict[str, Any]) -> Record:
-    return record.replace(**entries)
-
-
-def _unchecked(record: Record, entries: dict[str, Any]) -> Record:
+def _unchecked(record: Record, entries: Mapping[str, Any]) -> Record:
     kept = {name: getattr(record, name) for name in type(record).model_fields}
     return type(record).model_construct(record.model_fields_set, **{**kept, **entries})
-
-
-def _with(here: Any, tree: Any, make: Making) -> Any:
-    """A record, table or list with other entries; of records only those are made anew that change."""
-    if not isinstance(tree, dict):
-        # What counts, as elements, is a whole number.
-        return int(tree) if type(here) is int and isinstance(tree, float) and tree.is_integer() else tree
-    entries: Any
-    if isinstance(here, Record):
-        entries = {key: getattr(here, key) for key in tree}
-    else:
-        entries = dict(here) if isinstance(here, Mapping) else list(here)
-    listed = isinstance(entries, list)
-    for key, branch in tree.items():
-        place = int(key) if listed else key
-        try:
-            entries[place] = _with(entries[place], branch, make)
-        except SceneError as error:
-            raise error.within(key) from None
-    return make(here, entries) if isinstance(here, Record) else tuple(entries) if listed else entries

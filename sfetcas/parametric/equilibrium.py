@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ..description.scene import Scene
+from ..description.showing import shown
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
@@ -22,7 +23,7 @@ from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
 from ..solvers.globalised import Code, Globalised, Outcome, Rules
 from ..solvers.prepared import Prepared
-from .arguments import Arguments, Asked, asked_for
+from .arguments import Arguments, Asked, asked_for, in_words
 from .results import Results, default_results
 
 __all__ = ["EquilibriumSolver", "Place", "asked_mesh", "chosen_places", "equilibrium_solver", "refuse_search"]
@@ -63,6 +64,9 @@ class EquilibriumSolver:
     rules: Rules
     start: Array | None
     answer: Equilibrium
+
+    def __repr__(self) -> str:
+        return shown(self, [self.name, self.model.size_in_words], in_words(self.arguments, self.results))
 
     @property
     def model(self) -> Model:

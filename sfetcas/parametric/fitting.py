@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.answers import AnswerName, answer_name
+from ..description.records import counted
 from ..description.scene import Scene, check_scene
+from ..description.showing import few, first_lines, notes_in_words, shown
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import TINY, Array
@@ -181,6 +183,10 @@ class Fitting:
         self._row, self._cases = np.concatenate(rows).astype(np.intp), np.array(self._case)
         self._own = self._columns()
         self._check()
+
+    def __repr__(self) -> str:
+        measured = f"{counted(len(self.values), 'measured number')} of {counted(len(self.cases), 'load case')}"
+        return shown(self, [measured, *(f"fits {few(self.numbers)}",)])
 
     # -- what was measured --------------------------------------------------------------------------
 
@@ -403,6 +409,19 @@ class Fit:
     scale: Array
     minimum: Any
     answers: tuple[ParametricAnswer, ...]
+
+    def __repr__(self) -> str:
+        deviations = dict(zip(self.of.numbers, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        return shown(
+            self,
+            [f"chi_square={self.chi_square:.6g}", f"freedom={self.freedom}"],
+            [
+                *first_lines(
+                    self.estimates, lambda name: f"{name}: {self.estimates[name]:.6g} +- {deviations[name]:.2g}"
+                ),
+                *notes_in_words(self.notes),
+            ],
+        )
 
     @property
     def estimates(self) -> dict[str, float]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..description.records import unknown
 from ..description.scene import Scene, check_scene
+from ..description.showing import shown, stability_in_words, values_in_words
 from ..equilibria.settings import Settings
 from ..equilibria.solution import Equilibrium
 from ..equilibria.statics import solve
@@ -25,7 +26,7 @@ from ..mechanics.model import assemble
 from ..solvers.globalised import MEANINGS, NOT_DEFINED, Code, Globalised, Outcome
 from ..solvers.prepared import Prepared
 from ..solvers.program import Program
-from .arguments import Argument, Asked
+from .arguments import Argument, Asked, in_words
 from .equilibrium import EquilibriumSolver, Place, equilibrium_solver, refuse_search
 from .implicit import Implicit, Slopes
 from .results import Result, Results
@@ -113,6 +114,10 @@ class ParametricEquilibrium:
 
     solver: EquilibriumSolver
     settings: Settings
+
+    def __repr__(self) -> str:
+        solver = self.solver
+        return shown(self, [solver.model.size_in_words], in_words(solver.arguments, solver.results))
 
     @property
     def parameters(self) -> tuple[Argument, ...]:
@@ -239,6 +244,17 @@ class ParametricAnswer:
     of: ParametricEquilibrium
     numbers: Array
     outcome: Outcome
+
+    def __repr__(self) -> str:
+        stable = stability_in_words(self.stable, self.outcome.negative)
+        return shown(
+            self,
+            [stable, f"residual {self.residual:.1e}"],
+            [
+                *values_in_words(self.values, {one.name: one.unit for one in self.of.parameters}),
+                *values_in_words(self.answers, {one.name: one.unit for one in self.of.answers}),
+            ],
+        )
 
     @property
     def values(self) -> dict[str, Array]:

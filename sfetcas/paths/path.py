@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibria.solution import Configuration, Equilibrium, heading
+from ..description.records import counted
+from ..description.showing import error_in_words, few, first_lines, notes_in_words, shown, stability_in_words
+from ..equilibria.solution import Configuration, Equilibrium, heading, heading_in_words
 from ..errors import Status
 from ..mathematics.arrays import Array
 from ..mechanics.equations import State
@@ -32,7 +34,7 @@ FLUTTER = (
 """A note as :data:`NO_POTENTIAL` where modes are asked for, which find flutter points."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FlutterPoint(Equilibrium):
     """An equilibrium at which a motion starts to grow while it oscillates; without damping two frequencies coincide
     there.
@@ -90,6 +92,10 @@ class PathPoint:
     omega: Array | None = field(repr=False, default=None)
     growth: Array | None = field(repr=False, default=None)
 
+    def __repr__(self) -> str:
+        stable = self.kind or stability_in_words(self.stable, self.negative)
+        return shown(self, [f"factor={self.factor:.9g}", stable, f"arc {self.arc:.6g}"])
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:
@@ -118,6 +124,24 @@ class Branch:
     bifurcation: int = 0
     side: int = 0
     flutter_points: tuple[FlutterPoint, ...] = ()
+
+    def __repr__(self) -> str:
+        return shown(self, [self.name, counted(len(self.points), "point")], self.lines())
+
+    @property
+    def name(self) -> str:
+        """``path``, or from which bifurcation it starts and to which side."""
+        return f"branch at bifurcation {self.bifurcation}, side {self.side:+d}" if self.side else "path"
+
+    def lines(self) -> list[str]:
+        """Range, critical points and end in words."""
+        lines = [f"factors {self.factors.min():.6g} to {self.factors.max():.6g}; {self.end}"]
+        for kind in ("limit_points", "bifurcations", "flutter_points"):
+            factors = [f"{entry.factor:.9g}" for entry in getattr(self, kind)]
+            if factors:
+                number = counted(len(factors), kind.replace("_", " ")[:-1])
+                lines.append(f"{number}: factor {few(factors)}")
+        return lines
 
     @property
     def factors(self) -> Array:
@@ -176,6 +200,14 @@ class Path:
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
     massive: Prepared | None = field(repr=False, default=None)
+
+    def __repr__(self) -> str:
+        branches = first_lines(self.branches[1:], lambda branch: f"{branch.name}: {'; '.join(branch.lines())}")
+        return shown(
+            self,
+            [*heading_in_words(self, self.model), counted(len(self.points), "point")],
+            [*self.main.lines(), *branches, error_in_words(self.error_estimate), *notes_in_words(self.notes)],
+        )
 
     @property
     def model(self) -> Model:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.answers import answer_name
-from ..description.records import nearest
+from ..description.records import brief, counted, nearest
+from ..description.showing import named, shown, values_in_words
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
 from ..mathematics.nlp import NLP, Ipopt, NLPResult, Solver
@@ -72,6 +73,10 @@ class OpenProblem:
     parts: EquilibriumProblem
     extended: NLP | None = None
     added: tuple[tuple[str, float, int], ...] = field(default=())
+
+    def __repr__(self) -> str:
+        added = named((name for name, _, _ in self.added), "constraint")
+        return shown(self, [f"factor={self.factor:g}"], [repr(self.nlp), f"added {added}" if added else ""])
 
     @property
     def nlp(self) -> NLP:
@@ -206,6 +211,11 @@ class OpenAnswer:
 
     problem: OpenProblem
     result: NLPResult
+
+    def __repr__(self) -> str:
+        values = {f"multiplier of {brief(name)}": self.multiplier(name) for name, _, _ in self.problem.added}
+        head = [self.result.status.value, counted(self.result.iterations, "iteration")]
+        return shown(self, head, values_in_words(values))
 
     def value(self, expression: ca.MX) -> Array:
         """Value of an expression of the problem, in the unit and (squeezed) shape of the expression."""

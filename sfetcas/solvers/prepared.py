@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.records import counted
+from ..description.showing import shown
 from ..errors import SolveError, Status
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array
@@ -73,6 +74,9 @@ class Prepared:
         self._evaluations = evaluations
         self.kernels: Kernels = kernels
         self._spent = 0
+
+    def __repr__(self) -> str:
+        return shown(self, [f"kernels={self.kernels!r}"], repr(self.model).splitlines())
 
     @functools.cached_property
     def equations(self) -> Equations:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,22 +12,19 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..description.columns import read_columns
 from ..description.records import counted, say, whole
 from ..description.scene import Scene
+from ..description.showing import ranges_in_words, shown
 from ..errors import SceneError
-from ..files import UnreadableError, read_file
 from ..mathematics.arrays import Array
-from ..parametric.arguments import argument
-from ..parametric.changing import changed
+from ..parametric.arguments import argument, with_values
 from .distributions import Distribution
 
 __all__ = ["MOST_CASES", "Cases", "cases_from", "grid", "read_cases", "sampled"]
 
 MOST_CASES = 10_000_000
 """Largest number of cases."""
-
-LARGEST = 200_000_000
-"""Largest size of a table file in bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +63,10 @@ class Cases:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
+    def __repr__(self) -> str:
+        sample = "a random sample" if self.random else ""
+        return shown(self, [counted(len(self), "case"), sample], ranges_in_words(self.columns))
+
     def single(self, scene: Scene) -> Cases:
         """The cases with a column for each single number: ``loads.tip.value.0``, ... instead of ``loads.tip.value``.
 
@@ -81,7 +80,7 @@ class Cases:
             try:
                 known = argument(scene, name)
                 # What is accepted by name alone shows with the scene's own numbers.
-                changed(scene, {name: known.default})
+                with_values(scene, {name: known.default})
             except SceneError as error:
                 raise SceneError(error.bare, ("cases", name)) from None
             rows = column.reshape(len(column), -1)
@@ -181,40 +180,11 @@ def read_cases(path: Path) -> Cases:
     SceneError
         There is no such file, or something else in it.
     """
-    where = (str(path),)
-    try:
-        text = read_file(path, LARGEST, "a CSV table").decode("utf-8-sig")
-        lines = [line for line in csv.reader(io.StringIO(text, newline=""), strict=True) if line]
-    except FileNotFoundError:
-        raise SceneError("there is no such file, accepted: a CSV table", where) from None
-    except UnreadableError as error:
-        raise SceneError(str(error), where) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise SceneError(f"could not be read as a CSV table: {error}", where) from None
-    if len(lines) < 2:
-        accepted = "a line of names and a line of numbers for each case"
-        raise SceneError(f"found {counted(len(lines), 'line')}, accepted: {accepted}", where)
-    names = [name.strip() for name in lines[0]]
-    if len(set(names)) < len(names):
-        raise SceneError("found a name twice in the first line, accepted: each once", where)
-    columns: dict[str, list[float]] = {name: [] for name in names}
-    for number, line in enumerate(lines[1:], start=1):
-        if len(line) != len(names):
-            message = f"found {counted(len(line), 'cell')} in case {number} and {len(names)} in the first line"
-            raise SceneError(f"{message}, accepted: as many", where)
-        for name, cell in zip(names, line, strict=True):
-            columns[name].append(_cell(cell, (*where, f"case {number}", name)))
+    columns = read_columns(path, "case")
     try:
         return Cases({name: np.array(column) for name, column in columns.items()})
     except SceneError as error:
-        raise error.within(*where) from None
-
-
-def _cell(text: str, where: tuple[str, ...]) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise SceneError(f"found {text!r}, accepted: a number", where) from None
+        raise error.within(str(path)) from None
 
 
 def _name(name: object) -> str:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ..description.answers import selected
 from ..description.records import counted, say, unknown
 from ..description.scene import Scene
+from ..description.showing import first_lines, ranges_in_words, shown
 from ..errors import SceneError
 from ..files import write_file
 from ..mathematics.arrays import Array
@@ -80,6 +81,20 @@ class Sweep:
 
     def __len__(self) -> int:
         return len(self.outcomes)
+
+    def __repr__(self) -> str:
+        return shown(
+            self,
+            [f"{counted(len(self), 'case')}, {int(self.solved.sum())} solved in {self.wall:.3g} s"],
+            [
+                "interrupted" if self.interrupted else "",
+                *ranges_in_words(self.cases.columns),
+                *ranges_in_words(self.quantities),
+                *first_lines(
+                    self.failures, lambda one: f"case {one.case}: {one.status}: {one.reason}", "more failures"
+                ),
+            ],
+        )
 
     @property
     def solved(self) -> Array:

@@ -36,9 +36,10 @@ def sweep(
 ) -> Sweep:
     """Solve a scene with other numbers in each of many cases.
 
-    Each case is ``solve(changed(scene, case), settings)``, independent of all others, so that results are the same to
-    the last bit in any order and on any process.  Failures are recorded with their reason.  Without an executor
-    processes are started: a script has to call this below ``if __name__ == "__main__":``.
+    Each case is ``solve(changed(scene, case), settings)``, in the plane or in space as the scene itself, independent of
+    all others, so that results are the same to the last bit in any order and on any process.  Failures are recorded
+    with their reason.  Without an executor processes are started: a script has to call this below
+    ``if __name__ == "__main__":``.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from ..dynamics.motion import Trajectory
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
-from ..parametric.changing import changed
+from ..parametric.arguments import with_values
 from ..paths.path import Path
 from .quantities import Wanted
 
@@ -105,7 +105,7 @@ def _outcome(job: Job, values: Sequence[float]) -> Outcome:
     begin = time.perf_counter()
     try:
         with np.errstate(over="raise"):
-            scene = changed(job.scene, dict(zip(job.names, values, strict=True)))
+            scene = with_values(job.scene, dict(zip(job.names, values, strict=True)))
             # What is expected says at which times and factors there are answers.
             scene = scene.model_copy(update={"expect": job.scene.expect})
             begin = time.perf_counter()

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.loads import History
-from ..description.records import unknown
+from ..description.records import counted, unknown
+from ..description.showing import error_in_words, notes_in_words, ranges_in_words, shown, values_in_words
 from ..dynamics.motion import Trajectory
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
-from ..parametric.changing import changed
+from ..parametric.arguments import with_values
 from .replay import HALVINGS, Response, respond
 from .transcription import GridMotion, Transcription
 
@@ -49,6 +50,13 @@ class Check:
     error_estimate: float
     integrator: str
     residual_vibration: float
+
+    def __repr__(self) -> str:
+        return shown(
+            self,
+            [f"differs by {self.difference:.1e} of the size from the replay by {self.integrator}"],
+            [f"{error_in_words(self.error_estimate)}; {self.residual_vibration:.3g} m of residual vibration"],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +96,24 @@ class ControlledMotion:
     x: Array = field(repr=False)
     check: Check | None = None
 
+    def __repr__(self) -> str:
+        checked = [] if self.check is None else repr(self.check).splitlines()
+        return shown(
+            self,
+            [self.status.value, f"time={self.time:.6g} s", f"cost={self.cost:.6g}"],
+            [
+                *ranges_in_words({name: self.control(name) for name in self._names}),
+                *values_in_words(self.variables),
+                counted(self.iterations, "iteration"),
+                *checked,
+                *notes_in_words(self.notes),
+            ],
+        )
+
+    @property
+    def _names(self) -> list[str]:
+        return [one.name for one in self.transcription.statement.controls]
+
     # -- times ------------------------------------------------------------------------------------------
 
     @property
@@ -112,7 +138,7 @@ class ControlledMotion:
         SceneError
             There is no such control.
         """
-        names = [one.name for one in self.transcription.statement.controls]
+        names = self._names
         if name not in names:
             raise SceneError(f"control: {unknown(name, names, 'such controls')}")
         return self.course.controls[:, names.index(name)]
@@ -246,4 +272,4 @@ class ControlledMotion:
         for one in self.transcription.statement.variables:
             value = self.variables[one.name]
             found |= {one.name: value} if one.parameter is None else one.parameter.numbers(value)
-        return changed(scene, found) if found else scene
+        return with_values(scene, found) if found else scene

@@ -19,6 +19,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.scene import Scene, check_scene
+from ..description.showing import few, shown
 from ..dynamics.index_one import LINEAR, IndexOne
 from ..equilibria.settings import Settings
 from ..errors import SceneError
@@ -91,6 +92,12 @@ class MotionFunctions:
     dae: ca.Function = field(repr=False)
     outputs_of: ca.Function = field(repr=False)
     invariants: ca.Function = field(repr=False)
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{name}: {size}" for name, size in self.sizes.items())
+        kinds = {"u": self.inputs, "p": self.parameters, "y": self.outputs}
+        lines = [f"{symbol}: {few(names)}" for symbol, names in kinds.items() if names]
+        return shown(self, [f"sizes of {sizes}"], [*lines, "functions dae(x, z, u, p), explicit(x, u, p), ..."])
 
     def _symbols(self) -> list[ca.MX]:
         return [ca.MX.sym(name, self.sizes[name]) for name in ("x", "z", "u", "p")]

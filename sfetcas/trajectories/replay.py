@@ -15,8 +15,9 @@ import numpy as np
 
 from .. import tolerances
 from ..description.loads import History
-from ..description.records import plain, unknown
+from ..description.records import counted, plain, unknown
 from ..description.scene import Scene, check_scene
+from ..description.showing import error_in_words, shown
 from ..dynamics.motion import MotionState, Trajectory
 from ..dynamics.simulation import Simulation
 from ..equilibria.settings import Settings
@@ -62,6 +63,15 @@ class Response:
     end: float
     error_estimate: float
     count: int
+
+    def __repr__(self) -> str:
+        span = f"{counted(len(self.times), 'answer')} from {self.times[0]:g} to {self.times[-1]:g} s"
+        _, *last = repr(self.instants[-1]).splitlines()
+        return shown(
+            self,
+            [span, f"end={self.end:g} s", counted(self.count, "time step"), error_in_words(self.error_estimate)],
+            [f"at {self.instants[-1].time:g} s", *last],
+        )
 
     def positions(self, node: str) -> Array:
         """Positions of a node, (times, 3) m; SceneError if there is no such node."""
