@@ -26,6 +26,8 @@ __all__ = ["History", "Load", "Motion"]
 class History(Record):
     """A factor as a function of time, or in statics of the load factor; constant before the first t and after the last.
 
+    :meth:`of` makes one from a Python function.
+
     Parameters
     ----------
     t : (n,), s, or in statics load factors
@@ -39,8 +41,6 @@ class History(Record):
         smooth history.  It goes through all values; smooth measured ones before where they are noisy.
     polynomial : (n - 1, any)
         Instead of values: for each interval coefficients c0, c1, ... in the fraction of the interval, from 0 to 1.
-
-    :meth:`of` makes a history from a function.
 
     Examples
     --------
@@ -75,8 +75,8 @@ class History(Record):
         SceneError
             The function has values that are no finite numbers, jumps, or changes too fast.
 
-        Example
-        -------
+        Examples
+        --------
         >>> import math
         >>> wave = History.of(lambda t: (1 - math.cos(t)) / 2, 0.0, math.pi)
         >>> round(wave.factor(1.0), 6), wave.rate(0.0)

@@ -181,8 +181,8 @@ class Scene(Record):
         SceneError
             There is no such key, or the scene does not accept the value; the sentence begins with the key.
 
-        Example
-        -------
+        Examples
+        --------
         >>> strip, nodes = {"EI3": 1.0}, {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}}
         >>> beam, tip = {"nodes": ["A", "B"], "section": "strip"}, {"type": "force", "node": "B", "value": [0, 1]}
         >>> scene = Scene(sections={"strip": strip}, nodes=nodes, members={"beam": beam}, loads={"tip": tip})
