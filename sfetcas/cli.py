@@ -15,7 +15,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
@@ -127,35 +127,156 @@ def _print_no_more() -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="sfetcas", description="Equilibria of very flexible beams under large motion."
+        prog="sfetcas",
+        description="Equilibria, paths, vibrations and motions of very flexible beams and mechanisms.",
+        epilog="Each command has a help of its own: sfetcas run --help",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    run = commands.add_parser("run", help="solve a scene and print a short report")
-    run.add_argument("file", type=Path, help="scene file, .toml or .json")
-    run.add_argument("--json", type=Path, metavar="OUT", help="write the whole answer as JSON")
-    run.add_argument("--plot", type=Path, metavar="OUT.png", help="write a picture")
-    run.add_argument("--animate", type=Path, metavar="OUT.gif", help="write a moving picture, .gif or .mp4")
-    run.add_argument("--vtk", type=Path, metavar="DIR", help="write files for ParaView into a folder")
-    run.add_argument("--matrices", type=Path, metavar="OUT", help="modes: write the matrices, .npz or a new folder")
-    _add_overrides(run)
-    run.set_defaults(command=_run)
-    checks = commands.add_parser("check", help="solve scenes and compare with their expect tables")
-    checks.add_argument("files", type=Path, nargs="+", metavar="file")
-    _add_overrides(checks)
-    checks.set_defaults(command=_check)
-    info = commands.add_parser("info", help="show the model: blocks, unknowns, why plane or space")
-    info.add_argument("file", type=Path)
-    _add_overrides(info)
-    info.set_defaults(command=_info)
-    trading = commands.add_parser("trade", help="measure accuracy against time: which discretisation for which error")
-    trading.add_argument("file", type=Path)
-    trading.add_argument("--markdown", type=Path, metavar="OUT.md", help="write the table of all settings")
-    trading.add_argument("--csv", type=Path, metavar="OUT.csv", help="write all numbers as lines")
-    trading.add_argument("--json", type=Path, metavar="OUT", help="write everything as JSON")
-    trading.add_argument("--plot", type=Path, metavar="OUT.png", help="write a work-precision picture")
-    trading.add_argument("--against", choices=("refined", "file"), default="refined", help="what errors are against")
-    trading.add_argument("--accuracy-of", metavar="NAME", help="errors of a quantity, as reactions.A.moment")
+    for add in (_add_run, _add_check, _add_info, _add_sweep, _add_trade, _add_export):
+        add(commands)
+    return parser
+
+
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def _command(
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], what: str, *examples: str
+) -> argparse.ArgumentParser:
+    """A command with a sentence of what it does and examples of calls; its scene file is left to add."""
+    calls = "\n".join(f"  sfetcas {name} {example}" for example in examples)
+    found = commands.add_parser(
+        name,
+        help=f"{what[0].lower()}{what[1:]}",
+        description=f"{what}.",
+        epilog=f"examples:\n{calls}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    found.set_defaults(command=run)
+    return found
+
+
+def _add_file(command: argparse.ArgumentParser) -> None:
+    command.add_argument("file", type=Path, help="scene file, .toml or .json")
+
+
+def _add_run(commands: Commands) -> None:
+    run = _command(
+        commands,
+        "run",
+        _run,
+        "Run the analysis of a scene and print a short report",
+        "arch.toml",
+        "arch.toml --accuracy 1e-8 --json answer.json --plot answer.png",
+    )
+    _add_file(run)
+    files = run.add_argument_group("files that are written")
+    files.add_argument("--json", type=Path, metavar="OUT", help="the whole answer as JSON")
+    files.add_argument("--plot", type=Path, metavar="OUT.png", help="a picture, in the format of its ending")
+    files.add_argument("--animate", type=Path, metavar="OUT.gif", help="a moving picture, .gif or .mp4")
+    files.add_argument("--vtk", type=Path, metavar="DIR", help="a folder of files for ParaView")
+    files.add_argument(
+        "--matrices", type=Path, metavar="OUT", help="matrices of the small vibrations (modes): .npz or a new folder"
+    )
+    _add_settings(run)
+
+
+def _add_check(commands: Commands) -> None:
+    checks = _command(
+        commands,
+        "check",
+        _check,
+        "Solve scenes and compare the answers with the expect tables of the files",
+        "problems/*.toml",
+        "arch.toml --elements 32",
+    )
+    checks.add_argument("files", type=Path, nargs="+", metavar="file", help="scene files, .toml or .json")
+    _add_settings(checks)
+
+
+def _add_info(commands: Commands) -> None:
+    info = _command(
+        commands,
+        "info",
+        _info,
+        "Show how a scene is modelled: its unknowns and equations, and why it is plane or in space",
+        "arch.toml",
+    )
+    _add_file(info)
+    _add_settings(info)
+
+
+def _add_sweep(commands: Commands) -> None:
+    many = _command(
+        commands,
+        "sweep",
+        _sweep,
+        "Solve many cases of a scene, each with other numbers",
+        "arch.toml --vary loads.tip.value.1=0:10:101 --out cases.csv",
+        "arch.toml --sample sections.strip.EI3=normal:1:0.05 --count 1000 --quantity nodes.tip.position.y",
+        "arch.toml --cases table.csv --quantity 'members.beam.moment at 0.5'",
+    )
+    _add_file(many)
+    cases = many.add_argument_group("cases, by one of --vary, --sample and --cases")
+    cases.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=LOW:HIGH:COUNT",
+        help="evenly spaced values of a number, or a list as in sections.strip.EI3=1,2,5; given several times, all "
+        "combinations are solved",
+    )
+    cases.add_argument(
+        "--sample",
+        action="append",
+        default=[],
+        metavar="NAME=KIND:A:B",
+        help="random values of a number: normal:MEAN:DEVIATION, lognormal:MEAN:DEVIATION or uniform:LOW:HIGH",
+    )
+    cases.add_argument(
+        "--cases", type=Path, metavar="TABLE.csv", help="a table with names of numbers in its first line, a line a case"
+    )
+    cases.add_argument("--count", type=int, default=100, help="number of random samples (default: %(default)s)")
+    cases.add_argument("--seed", type=int, default=0, help="seed of the random samples (default: %(default)s)")
+    cases.add_argument("--latin", action="store_true", help="draw the samples as a Latin hypercube")
+    many.add_argument(
+        "--quantity",
+        action="append",
+        metavar="NAME",
+        help="quantity of the answer that is kept, as nodes.tip.position; may be given several times (default: "
+        "positions of the nodes that can move; frequencies of modes)",
+    )
+    many.add_argument(
+        "--out", type=Path, action="append", default=[], metavar="TABLE", help="write all cases: .csv, .json or .npz"
+    )
+    many.add_argument("--workers", type=int, metavar="N", help="number of processes (default: that of the processors)")
+    _add_settings(many)
+
+
+def _add_trade(commands: Commands) -> None:
+    trading = _command(
+        commands,
+        "trade",
+        _trade,
+        "Measure which discretisation gives which error in which time",
+        "arch.toml --markdown table.md --plot diagram.png",
+    )
+    _add_file(trading)
+    files = trading.add_argument_group("files that are written")
+    files.add_argument("--markdown", type=Path, metavar="OUT.md", help="a table of all settings")
+    files.add_argument("--csv", type=Path, metavar="OUT.csv", help="all numbers as lines")
+    files.add_argument("--json", type=Path, metavar="OUT", help="everything as JSON")
+    files.add_argument("--plot", type=Path, metavar="OUT.png", help="a work-precision diagram")
+    trading.add_argument(
+        "--against",
+        choices=("refined", "file"),
+        default="refined",
+        help="measure errors against a refined answer, or against the expect table of the file (default: %(default)s)",
+    )
+    trading.add_argument(
+        "--accuracy-of", metavar="NAME", help="errors of this quantity, as reactions.A.moment (default: positions)"
+    )
     trading.add_argument(
         "--peer",
         action="append",
@@ -167,78 +288,94 @@ def _parser() -> argparse.ArgumentParser:
         "--repeats",
         type=int,
         default=argparse.SUPPRESS,
-        help="whole runs of each setting after the first, 0 to 1000 (5)",
+        metavar="N",
+        help="runs of each setting after the first, 0 to 1000 (default: 5)",
     )
-    trading.add_argument("--longest", type=float, default=argparse.SUPPRESS, metavar="S", help="seconds of each (10)")
     trading.add_argument(
-        "--budget", type=float, default=argparse.SUPPRESS, metavar="S", help="seconds of all, and of each peer (300)"
+        "--longest", type=float, default=argparse.SUPPRESS, metavar="S", help="seconds for each setting (default: 10)"
     )
-    trading.set_defaults(command=_trade)
-    many = commands.add_parser("sweep", help="solve many cases of a scene at once, each with other numbers")
-    many.add_argument("file", type=Path)
-    many.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="NAME=LOW:HIGH:COUNT",
-        help="values of a number, as loads.tip.value.1=0:10:101 or sections.strip.EI3=1,2,5; of several all",
+    trading.add_argument(
+        "--budget",
+        type=float,
+        default=argparse.SUPPRESS,
+        metavar="S",
+        help="seconds for all settings, and for each peer (default: 300)",
     )
-    many.add_argument(
-        "--sample",
-        action="append",
-        default=[],
-        metavar="NAME=KIND:A:B",
-        help="a number at random: normal:MEAN:DEVIATION, lognormal:MEAN:DEVIATION, uniform:LOW:HIGH",
+
+
+def _add_export(commands: Commands) -> None:
+    code = _command(
+        commands,
+        "export",
+        _export,
+        "Write a solver for the scene as C code that needs no other library",
+        "arch.toml solver --argument loads.tip.value --result nodes.tip.position",
+        "arch.toml solver --argument sections.strip.EI3=0.5:2 --sensitivities",
     )
-    many.add_argument("--cases", type=Path, metavar="TABLE.csv", help="a column for each number, a line for each case")
-    many.add_argument("--count", type=int, default=100, help="number of samples (100)")
-    many.add_argument("--seed", type=int, default=0, help="of samples (0)")
-    many.add_argument("--latin", action="store_true", help="samples as a Latin hypercube")
-    many.add_argument(
-        "--quantity",
-        action="append",
-        metavar="NAME",
-        help="what is kept, as nodes.tip.position or 'members.beam.moment at 0'; else positions of nodes",
-    )
-    many.add_argument(
-        "--out", type=Path, action="append", default=[], metavar="TABLE", help="write all cases: .csv, .json or .npz"
-    )
-    many.add_argument("--workers", type=int, metavar="N", help="processes; as many as processors without it")
-    _add_overrides(many)
-    many.set_defaults(command=_sweep)
-    code = commands.add_parser("export", help="write an equilibrium solver of the scene as C without dependencies")
-    code.add_argument("file", type=Path)
-    code.add_argument("folder", type=Path, metavar="DIR", help="a new folder")
-    code.add_argument("--name", help="of the files and of all names in C; that of the scene file without one")
+    _add_file(code)
+    code.add_argument("folder", type=Path, metavar="DIR", help="the folder that is made")
+    code.add_argument("--name", help="prefix of the files and of all names in C (default: that of the scene file)")
     code.add_argument(
         "--argument",
         action="append",
         metavar="NAME[=LOW:HIGH]",
-        help="a number of the scene, as loads.tip.value; without any the factor, all loads and all motions",
+        help="number of the scene that is an argument, as loads.tip.value; may be given several times (default: the "
+        "load factor, all loads and all motions)",
     )
-    code.add_argument("--result", action="append", metavar="NAME", help="as nodes.tip.position or stiffness.tip")
     code.add_argument(
-        "--places", action="append", metavar="MEMBER=X,X,...", help="fractions of a member where it is told of"
+        "--result",
+        action="append",
+        metavar="NAME",
+        help="quantity that is computed, as nodes.tip.position or stiffness.tip; may be given several times (default: "
+        "positions, rotations, reactions, section forces, springs and energies)",
     )
-    code.add_argument("--sensitivities", action="store_true", help="derivatives of results by arguments, too")
     code.add_argument(
-        "--derivatives", action="store_true", help="no solver, but energy, constraints and their derivatives"
+        "--places", action="append", metavar="MEMBER=X,X,...", help="fractions of a member's length for its results"
     )
-    code.add_argument("--overwrite", action="store_true", help="replace an earlier export")
-    _add_overrides(code)
-    code.set_defaults(command=_export)
-    return parser
+    code.add_argument("--sensitivities", action="store_true", help="also derivatives of the results by the arguments")
+    code.add_argument(
+        "--derivatives",
+        action="store_true",
+        help="in place of a solver: energy and constraints with their derivatives",
+    )
+    code.add_argument("--overwrite", action="store_true", help="replace an earlier export in this folder")
+    _add_settings(code)
 
 
-def _add_overrides(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--accuracy", type=float, help="wanted error of positions over the size of the scene")
-    parser.add_argument("--accuracy-of", metavar="NAME", help="a quantity that it is of instead: reactions.A.moment")
-    parser.add_argument("--element", choices=ELEMENTS, metavar="SFETn", help="element of all members: SFET2 to SFET9")
-    parser.add_argument("--elements", type=int, metavar="N", help="number of elements of each member")
-    parser.add_argument("--integration", choices=("nodes", "gauss"), default="nodes", help="quadrature in elements")
-    parser.add_argument("--assembly", choices=("auto", "closing", "nodal"), default="auto")
-    parser.add_argument(
-        "--solver", choices=("ipopt", "newton"), default="ipopt", help="what finds an equilibrium first"
+def _add_settings(command: argparse.ArgumentParser) -> None:
+    settings = command.add_argument_group("settings, in place of those of the scene")
+    settings.add_argument(
+        "--accuracy",
+        type=float,
+        metavar="E",
+        help="wanted error of the positions over the size of the scene (default: that of the scene, else 1e-4)",
+    )
+    settings.add_argument(
+        "--accuracy-of", metavar="NAME", help="quantity that the accuracy is of instead, as reactions.A.moment"
+    )
+    settings.add_argument(
+        "--element", choices=ELEMENTS, metavar="SFETn", help="element type, SFET2 to SFET9 (default: by the accuracy)"
+    )
+    settings.add_argument(
+        "--elements", type=int, metavar="N", help="number of elements of each member (default: by the accuracy)"
+    )
+    settings.add_argument(
+        "--integration",
+        choices=("nodes", "gauss"),
+        default="nodes",
+        help="integration points within elements: their nodes, or Gauss points (default: %(default)s)",
+    )
+    settings.add_argument(
+        "--assembly",
+        choices=("auto", "closing", "nodal"),
+        default="auto",
+        help="unknowns: rotations only (closing), or displacements of nodes too (nodal) (default: %(default)s)",
+    )
+    settings.add_argument(
+        "--solver",
+        choices=("ipopt", "newton"),
+        default="ipopt",
+        help="solver that is tried first for an equilibrium (default: %(default)s)",
     )
 
 

@@ -1,12 +1,15 @@
 """``help`` of all that is public is readable: no addresses, no machinery, every key of a record."""
 
+import argparse
 import inspect
 import pydoc
+import shlex
 
 import pytest
 
 import sfetcas
 from sfetcas import Arc, Load
+from sfetcas.cli import _parser
 from sfetcas.description.records import Record
 
 PUBLIC = {name: getattr(sfetcas, name) for name in sfetcas.__all__}
@@ -48,3 +51,43 @@ def test_keys_and_methods_are_completed_and_nothing_else():
     assert {"follows", "vector", "replace"} <= set(dir(Load))
     assert not any("model" in key for key in dir(Load))
     assert str(inspect.signature(Load)).startswith("(*, type, node=None, ")
+
+
+# -- of the command line ----------------------------------------------------------------------------
+
+
+def commands():
+    (found,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
+    return found.choices
+
+
+@pytest.mark.parametrize("name", commands())
+def test_help_of_a_command_has_a_sentence_examples_that_are_accepted_and_all_defaults(name, capsys):
+    command = commands()[name]
+    assert command.description.endswith(".")
+    assert command.description[0].isupper()
+    head, *examples = command.epilog.splitlines()
+    assert head == "examples:"
+    assert examples
+    for example in examples:
+        program, *words = shlex.split(example)
+        assert program == "sfetcas"
+        assert _parser().parse_args(words).command is command.get_default("command")
+    for action in command._actions:
+        assert action.help, action.dest
+        text = " ".join(action.help.split())
+        # Lists are empty and switches off unless they are given.
+        if action.default not in (None, [], False, argparse.SUPPRESS):
+            assert "(default: %(default)s)" in text, action.dest
+    with pytest.raises(SystemExit):
+        command.parse_args(["--help"])
+    printed = capsys.readouterr().out
+    assert command.description in " ".join(printed.split())
+    assert "examples:\n  sfetcas" in printed
+
+
+def test_help_of_the_program_names_all_commands(capsys):
+    with pytest.raises(SystemExit):
+        _parser().parse_args(["--help"])
+    printed = capsys.readouterr().out
+    assert all(f"    {name} " in printed for name in commands())
