@@ -26,6 +26,11 @@ extensions = [
 ]
 exclude_patterns = ["extensions", "**/generated"]
 nitpicky = True
+# Names of other libraries have no page here, and what validates keys is part of their types.
+nitpick_ignore_regex = [
+    ("py:.*", r"(casadi|collections|concurrent|multiprocessing|numpy|pydantic)\b.*"),
+    ("py:.*", r"sfetcas\.description\.records\.(_\w+|T)|lambda"),
+]
 # The domain of the command line knows no references of its own.
 suppress_warnings = ["myst.domains"]
 
@@ -36,6 +41,8 @@ numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+# Each object in the table of contents of each page would take most of the time of a build.
+toc_object_entries = False
 
 html_theme = "furo"
 html_math_renderer = "svg"

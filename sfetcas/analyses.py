@@ -1,4 +1,4 @@
-"""The entry point :func:`solve`: runs the analysis that a scene asks for, and imports only what that analysis needs."""
+"""The entry point :func:`~sfetcas.solve`: runs the analysis that a scene asks for, and imports only what it needs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["LATER", "solve"]
 
 LATER = ("sfetcas.dynamics.modes", "sfetcas.dynamics.simulation", "sfetcas.paths.paths")
-"""Modules that :func:`solve` imports for some analyses only; servers that start worker processes preload them."""
+"""What :func:`~sfetcas.solve` imports for some analyses only; servers that start worker processes preload it."""
 
 
 def solve(

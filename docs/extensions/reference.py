@@ -174,12 +174,27 @@ def module_pages() -> dict[str, str]:
     folders: dict[str, list[str]] = {}
     for module in pkgutil.walk_packages(sfetcas.__path__, "sfetcas."):
         folder = module.name.split(".")[1] if module.name.count(".") > 1 or module.ispkg else "sfetcas"
-        shown = module.ispkg or module.name.endswith("__main__") or folder == "pictures"
+        shown = module.ispkg or module.name in ("sfetcas.__main__", "sfetcas.tolerances") or folder == "pictures"
         folders.setdefault(folder, []).extend([] if shown else [module.name])
     pages = {
         folder: f"# {folder}\n\n" + "\n".join(map(_module, names)) for folder, names in sorted(folders.items()) if names
     }
     return {**pages, "index": "# Modules\n\n" + _toctree(pages)}
+
+
+def _is_alias(app: Sphinx, what: str, name: str, value: object, skip: bool, options: object) -> bool | None:
+    """Whether a member is left out: names of types have no signature that could be shown."""
+    return True if typing.get_origin(value) is not None else None
+
+
+def _set_formulas(app: Sphinx, what: str, name: str, value: object, options: object, lines: list[str]) -> None:
+    """Keep the formulas of docstrings, indented lines before the first section, as they are written."""
+    end = next((i for i, line in enumerate(lines) if line and set(line) == {"-"}), len(lines))
+    for i in range(end - 1, 0, -1):
+        begins = lines[i].startswith("    ") and not lines[i - 1].strip()
+        before = next((line for line in reversed(lines[:i]) if line.strip()), "")
+        if begins and not before.startswith("    ") and not before.startswith(("- ", "* ", "..", ">>>")):
+            lines[i:i] = ["::", ""]
 
 
 def _write(folder: Path, pages: dict[str, str]) -> None:
@@ -202,4 +217,7 @@ def _generate(app: Sphinx) -> None:
 def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages before Sphinx looks which there are."""
     app.connect("builder-inited", _generate)
+    app.connect("autodoc-skip-member", _is_alias)
+    # Before sections are made of them.
+    app.connect("autodoc-process-docstring", _set_formulas, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

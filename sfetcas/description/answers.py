@@ -63,7 +63,7 @@ class AnswerKind:
         SI unit; empty for dimensionless quantities.
     meaning : str
     where : tuple of str
-        The kinds of answers that have it, see :data:`EVERYWHERE`.
+        The kinds of answers that have it, see ``EVERYWHERE``.
     components : tuple of str
         Names of the components of a vector; empty for a single value.
     along : bool
@@ -365,7 +365,7 @@ def check_answer(scene: Any, name: AnswerName, where: str = "") -> None:
     Parameters
     ----------
     where : str
-        The kind of answer, see :data:`EVERYWHERE`; empty: that of the scene's analysis.
+        The kind of answer, see ``EVERYWHERE``; empty: that of the scene's analysis.
 
     Raises
     ------

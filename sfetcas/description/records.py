@@ -251,7 +251,7 @@ Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]
 
 
 class Record(Described):
-    """Frozen data with known keys only; a wrong value raises :class:`SceneError` at construction."""
+    """Frozen data with known keys only; a wrong value raises :class:`~sfetcas.SceneError` at construction."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 

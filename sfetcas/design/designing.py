@@ -263,7 +263,7 @@ class Design(Cases):
         SceneError
             Bounds and constraints contradict each other.
         SolveError
-            No solution was found; ``last`` is a :class:`DesignIterate`.
+            No solution was found; ``last`` is a :class:`.DesignIterate`.
         """
         solving = Solving(self.statement, solver, self._kernels)
         try:

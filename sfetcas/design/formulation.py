@@ -133,7 +133,7 @@ class Formulation(Statement):
         return found
 
     def bounds(self, label: str, name: str, given: Bounds | Parameter, guess: ArrayLike | None) -> Bounds:
-        """Lower and upper bound of a variable; registers a :class:`Parameter`.
+        """Lower and upper bound of a variable; registers a :class:`~sfetcas.Parameter`.
 
         Raises
         ------
@@ -149,7 +149,7 @@ class Formulation(Statement):
         return bounds_of(label, given)
 
     def tie(self, name: str, tied: Parameter, guess: float, bounds: Bounds) -> None:
-        """Register a :class:`Parameter`, a name on which several numbers of the scene depend.
+        """Register a :class:`~sfetcas.Parameter`, a name on which several numbers of the scene depend.
 
         Raises
         ------

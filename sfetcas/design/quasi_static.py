@@ -278,7 +278,7 @@ class QuasiStatic(Cases):
         SceneError
             Bounds and constraints contradict each other.
         SolveError
-            No solution was found; ``last`` is a :class:`QuasiStaticIterate`.
+            No solution was found; ``last`` is a :class:`.QuasiStaticIterate`.
         """
         solving = Solving(self.statement, solver, self._kernels)
         try:

@@ -48,7 +48,7 @@ class Conserving(Method):
     polished = True
 
     def iteration(self, system: StageEquations) -> ca.Function:
-        """One Newton iteration for the end of a step, as of :meth:`Method.iteration`.
+        """One Newton iteration for the end of a step, as of :meth:`.Method.iteration`.
 
         Raises
         ------

@@ -100,7 +100,7 @@ class Idas(Integrator):
     """Integration by IDAS (variable-order backward differentiation formulas) through CasADi."""
 
     def samples(self, begun: InitialState, course: TimeGrid) -> Iterator[Sample]:
-        """States at the times of the answer, projected onto the constraints; as of :meth:`Integrator.samples`.
+        """States at the times of the answer, projected onto the constraints; as of :meth:`.Integrator.samples`.
 
         Raises
         ------

@@ -117,7 +117,7 @@ class MotionState(Configuration):
         return found
 
     def along(self, member: str, at: Any) -> dict[str, Array]:
-        """As :meth:`Configuration.along`, with ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
+        """As :meth:`.Configuration.along`, with ``velocity`` (n, 3) m/s and ``angular_velocity`` (n, 3) rad/s.
 
         Small members have no velocities along them: their interior is not integrated in time.
         """
@@ -147,7 +147,7 @@ class MotionState(Configuration):
         return {"linear": linear * scales.force * time, "angular": angular * scales.moment * time}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As :meth:`Configuration.table`; also for the kinds ``energy`` and ``momentum``."""
+        """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``momentum``."""
         if kind == "momentum":
             return dict(self.momentum)
         return self.energy if kind == "energy" else super().table(kind, name)

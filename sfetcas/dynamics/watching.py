@@ -92,6 +92,6 @@ FINER = 8
 
 
 def finer(times: Array) -> Array:
-    """Times (n,), s, with :data:`FINER` parts to each spacing."""
+    """Times (n,), s, with ``FINER`` parts to each spacing."""
     parts = np.arange(FINER) / FINER
     return np.append((times[:-1, None] + np.diff(times)[:, None] * parts).ravel(), times[-1])

@@ -30,7 +30,7 @@ def solve_model(
     Parameters
     ----------
     model : Model or Prepared
-        Pass the same :class:`Prepared` for repeated solves, so that its functions and factorisations are reused.
+        Pass the same :class:`~sfetcas.Prepared` for repeated solves, so that functions and factorisations are reused.
     factor : float
         Factor of loads and prescribed displacements.
     start : Equilibrium, optional
@@ -41,7 +41,7 @@ def solve_model(
     Raises
     ------
     SceneError
-        The scene has contacts or springs with stops, which only :func:`solve` can treat.
+        The scene has contacts or springs with stops, which only :func:`~sfetcas.solve` can treat.
     SolveError
         No equilibrium was found.
     """
@@ -96,7 +96,7 @@ UNJUDGED = Stability("not defined", 0, np.nan, np.zeros(0), np.zeros(0))
 
 
 def unjudged(found: Solved) -> Equilibrium:
-    """What was solved as an :class:`Equilibrium` without a stability test."""
+    """What was solved as an :class:`~sfetcas.Equilibrium` without a stability test."""
     return finished(found, UNJUDGED)
 
 
@@ -110,7 +110,7 @@ HIDDEN = (
 def finished(
     found: Solved, stability: Stability | None = None, *, notes: tuple[str, ...] = (), **more: Any
 ) -> Equilibrium:
-    """What was solved as an :class:`Equilibrium`, with a note where its stability is hidden.
+    """What was solved as an :class:`~sfetcas.Equilibrium`, with a note where its stability is hidden.
 
     ``stability`` is the result of another test than its own; ``more`` are as of
     :func:`~sfetcas.equilibria.solution.equilibrium`.

@@ -188,7 +188,7 @@ class Configuration:
         return self.fields.spring(self._known(name, tuple(self.model.scene.springs), "spring"))
 
     def motion(self, name: str) -> dict[str, Any]:
-        """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`Fields.drive`."""
+        """What enforces a prescribed motion: ``moment`` (N m) or ``force`` (N), see :meth:`.Fields.drive`."""
         return self.fields.drive(self._known(name, tuple(self.model.scene.motions), "motion"))
 
     def along(self, member: str, at: Any) -> dict[str, Array]:
@@ -203,7 +203,7 @@ class Configuration:
         -------
         dict of ndarray
             ``position`` (n, 3) m, ``force`` (n, 3) N, ``moment`` (n, 3) N m, ``curvature`` (n, 3) 1/m as of
-            :meth:`Fields.along`; ``quaternion`` (n, 4) of the rotation since the undeformed scene; in the plane also
+            :meth:`.Fields.along`; ``quaternion`` (n, 4) of the rotation since the undeformed scene; in the plane also
             ``angle`` (n,) rad; of a flexible member whose section has a shape the largest ``bending_strain`` (n,) and
             ``bending_stress`` (n,) N/m2 of its fibres.
 
@@ -354,7 +354,7 @@ class Equilibrium(Configuration):
         return {"elastic": elastic, "loads": total - elastic, "total": total}
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As :meth:`Configuration.table`; also for the kinds ``energy`` and ``certificate``."""
+        """As :meth:`.Configuration.table`; also for the kinds ``energy`` and ``certificate``."""
         if kind == "certificate":
             return self.certificate.to_dict()
         if kind == "energy":

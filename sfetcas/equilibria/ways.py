@@ -92,7 +92,7 @@ WAYS = {
     "retreat": "obstacles come back from where they do not reach the state without them",
     "cushions": "obstacles are cushions that become hard",
 }
-"""The ways to an equilibrium, in the words of :attr:`~sfetcas.equilibria.solution.Equilibrium.way`; in which order they
+"""The ways to an equilibrium, in the words of ``Equilibrium.way``; in which order they
 are tried say :meth:`Ways.result`, :meth:`Ways.on_pilot` and, in contact,
 :meth:`~sfetcas.contact.contact_statics.ContactRun.reached`."""
 

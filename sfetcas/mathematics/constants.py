@@ -12,7 +12,7 @@ __all__ = ["added", "by_axes", "constant", "hanging", "mapped", "picked", "spars
 
 
 def constant(matrix: SparseMap) -> ca.DM:
-    """A :class:`SparseMap` as a CasADi matrix."""
+    """A :class:`.SparseMap` as a CasADi matrix."""
     order = np.lexsort((matrix.row, matrix.column))
     row, column = matrix.row[order], matrix.column[order]
     starts = np.searchsorted(column, np.arange(matrix.shape[1] + 1))
@@ -26,7 +26,7 @@ def sparse(row: Array, column: Array, value: Array, shape: tuple[int, int]) -> c
 
 
 def mapped(matrix: ca.DM) -> SparseMap:
-    """A CasADi matrix as a :class:`SparseMap`."""
+    """A CasADi matrix as a :class:`.SparseMap`."""
     return SparseMap(*places_of(matrix.sparsity()), np.array(matrix.nonzeros()), matrix.shape)
 
 

@@ -66,7 +66,7 @@ class SparseMap:
         return found
 
     def full(self) -> Array:
-        """The dense matrix, an array of :attr:`shape`."""
+        """The dense matrix, an array of :attr:`.shape`."""
         matrix = np.zeros(self.shape)
         matrix[self.row, self.column] = self.value
         return matrix

@@ -169,7 +169,7 @@ class Element(Term):
     # by constant matrices, are a tenth of the code, and as fast.
 
     def rotation_gradient(self) -> ca.Function:
-        """As :meth:`Term.rotation_gradient`; in space assembled from the derivatives of single points."""
+        """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().rotation_gradient()
         symbols, q, stiffness, tangent, load, pull = self._large_symbols()
@@ -191,7 +191,7 @@ class Element(Term):
         return self._function("rotation_gradient", symbols, results)
 
     def rotation_forces(self) -> ca.Function:
-        """As :meth:`Term.rotation_forces`; in space assembled from the derivatives of single points."""
+        """As :meth:`.Term.rotation_forces`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().rotation_forces()
         symbols, q, stiffness, tangent, _, pull = self._large_symbols()
@@ -200,7 +200,7 @@ class Element(Term):
         return self._function("forces", symbols, {"rows": ca.sum2(tangents - tangent), "gradient": ca.densify(moments)})
 
     def slopes(self) -> ca.Function:
-        """As :meth:`Term.slopes`; in space assembled from the derivatives of single points."""
+        """As :meth:`.Term.slopes`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().slopes()
         symbols, q, stiffness, tangent, load, _ = self._large_symbols()
@@ -209,7 +209,7 @@ class Element(Term):
         return self._function("slopes", symbols[:4], results)
 
     def curvatures(self) -> ca.Function:
-        """As :meth:`Term.curvatures`; in space assembled from the derivatives of single points."""
+        """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().curvatures()
         symbols, q, stiffness, tangent, load, _ = self._large_symbols()

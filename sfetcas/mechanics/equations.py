@@ -71,7 +71,7 @@ class Point:
         Reference for the rounding error of each residual: the sum of the magnitudes of moments and forces at the node,
         plus a hundredth of its stiffness; 1 for gaps.
     entries : ndarray
-        Entries of the Newton matrix, in the order of :attr:`Equations.row` and :attr:`Equations.column`.
+        Entries of the Newton matrix, in the order of ``Equations.row`` and ``Equations.column``.
     rotation_jacobian : ndarray (elements, moments of the nodes, axes)
         Derivatives of the chords of elements by rotations of their nodes.
     """

@@ -61,7 +61,7 @@ class Observables:
     at: Index | None = None
 
     def put(self, moments: Array, couple: Array, jump: Array) -> None:
-        """Add moments (n, 3), in place and as :attr:`at` says, to ``couple`` (places, 3) and ``jump`` (elements, 3)."""
+        """Add moments (n, 3), in place and as ``at`` says, to ``couple`` (places, 3) and ``jump`` (elements, 3)."""
         for sums, number in () if self.at is None else zip((couple, jump), self.at.T, strict=True):
             np.add.at(sums, number[number >= 0], moments[number >= 0])
 

@@ -2,7 +2,7 @@
 
 Everything here is dimensionless: lengths are over that of the longest member, energies over the largest stiffness
 divided by that length, so that micrometres and kilometres are the same problem.  All displacements are from the
-undeformed scene.  A model has only the unknowns that its scene requires; :attr:`Model.blocks` lists them with reasons.
+undeformed scene.  A model has only the unknowns that its scene requires; :attr:`.Model.blocks` lists them with reasons.
 """
 
 from __future__ import annotations

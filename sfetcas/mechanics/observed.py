@@ -110,5 +110,5 @@ class SpringTravel(Term):
         return turns, places, 1, data, 0
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """As :meth:`Term.travel` of the spring."""
+        """As :meth:`.Term.travel` of the spring."""
         return [self.spring.travel(q, u, data)]

@@ -501,7 +501,7 @@ class Arguments:
         return flags
 
     def undeformed(self, p: ca.MX) -> ca.MX:
-        """Undeformed positions as :meth:`Results.rest` gives them, for numbers (numbers,)."""
+        """Undeformed positions as :meth:`.Results.rest` gives them, for numbers (numbers,)."""
         return self._undeformed.at(picked(p, np.array(self._own, dtype=np.intp)))
 
     def given(self, p: ca.MX) -> ca.MX:

@@ -68,7 +68,7 @@ def fit(
     ----------
     scene : Scene
         Its numbers are the start of the search, and determine the mesh.
-    parameters : as of :func:`~sfetcas.parametric.solving.parametric`
+    parameters : as of :func:`~sfetcas.parametric`
         Ranges are bounds of the search.
     measurements : sequence of Measurement
     start : mapping, optional
@@ -278,7 +278,7 @@ class Fitting:
         Parameters
         ----------
         values : (measured,), SI units, optional
-            Replace the measured numbers, in the order of :attr:`values`.
+            Replace the measured numbers, in the order of ``values``.
         start : mapping, optional
             Start of the search; by default the numbers of the scene.
 

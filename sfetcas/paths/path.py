@@ -48,7 +48,7 @@ class FlutterPoint(Equilibrium):
     omega: float = field(kw_only=True)
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
-        """As :meth:`Equilibrium.table`; the table of the whole state also has the frequency ``omega``."""
+        """As :meth:`.Equilibrium.table`; the table of the whole state also has the frequency ``omega``."""
         found = super().table(kind, name)
         return found if kind else {**found, "omega": self.omega}
 

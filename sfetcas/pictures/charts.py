@@ -48,7 +48,7 @@ def save_chart(path: Path, file: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`.
+        The ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
     save_figure(chart(path), file)

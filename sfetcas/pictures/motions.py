@@ -47,7 +47,7 @@ def save_motion(motion: Trajectory, file: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`.
+        The ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
     save_figure(motion_picture(motion), file)
@@ -59,7 +59,7 @@ def save_histories(motion: Trajectory, file: str | os.PathLike[str], nodes: Sequ
     Raises
     ------
     SceneError
-        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`, or there is no such node.
+        The ending is none of ``files.ENDINGS``, or there is no such node.
     """
     check_ending(file)
     save_figure(histories(motion, nodes), file)

@@ -1,9 +1,9 @@
 """Pictures of answers: the deformed structure over the undeformed one, with supports, loads and reactions.
 
 The order of the stages: centre lines are sampled, all else is sketched as marks and labels in fixed axes
-(:mod:`~sfetcas.pictures.sketch`, :mod:`~sfetcas.pictures.glyphs`); axes are made and filled, marks are drawn and
-labels put where they hide least (:mod:`~sfetcas.pictures.sheet`).  How lines tell steps or equilibria apart stands in
-:mod:`~sfetcas.pictures.looks`.
+(``pictures.sketch``, ``pictures.glyphs``); axes are made and filled, marks are drawn and
+labels put where they hide least (``pictures.sheet``).  How lines tell steps or equilibria apart stands in
+``pictures.looks``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def save_picture(solution: Solution, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`.
+        The ending is none of ``files.ENDINGS``.
     """
     check_ending(path)
     save_figure(picture(solution), path)

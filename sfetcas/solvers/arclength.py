@@ -85,7 +85,7 @@ class Standing(Solved):
     arc : float
         Arc length from the start of the curve.
     doubtful : bool
-        Whether an eigenvalue may vanish here: the response to a probing load exceeds :data:`DOUBT`.
+        Whether an eigenvalue may vanish here: the response to a probing load exceeds ``DOUBT``.
     """
 
     tangent: Tangent

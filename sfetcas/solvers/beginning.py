@@ -113,7 +113,7 @@ def check_slack(curve: Curve, traced: Traced) -> None:
     Raises
     ------
     SolveError
-        Rows are redundant at the first point, and multipliers at the last exceed :data:`TAUT` times the loads.
+        Rows are redundant at the first point, and multipliers at the last exceed ``TAUT`` times the loads.
     """
     equations, (first, *_, last) = curve.equations, traced.points
     loose = loose_rows(equations, first.point)

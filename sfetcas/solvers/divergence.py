@@ -35,7 +35,7 @@ class TangentTest:
     ----------
     equations : Equations
     softest : float
-        Ratio of weights to :attr:`Equations.mass`, see :attr:`~sfetcas.solvers.stability.StabilityTest.softest`.
+        Ratio of weights to :attr:`.Equations.mass`, see :attr:`~sfetcas.solvers.stability.StabilityTest.softest`.
     """
 
     def __init__(self, equations: Equations, softest: float) -> None:
@@ -98,7 +98,7 @@ class TangentTest:
         return bool((np.abs(nearest.imag) <= ON_THE_AXIS).all())
 
     def depth(self, point: Point, near: float = 0.0) -> float:
-        """Minus the lowest real part, as an eigenvalue by :attr:`Equations.mass`; zero if none is below zero."""
+        """Minus the lowest real part, as an eigenvalue by :attr:`.Equations.mass`; zero if none is below zero."""
         tangent, limit, free = self._tangent(point)
         lowest = float(self._eigenvalues(tangent)[0].real) if free else 0.0
         return -lowest * self._softest if lowest < -limit else 0.0

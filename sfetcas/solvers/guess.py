@@ -58,7 +58,7 @@ def restore(equations: Equations, state: State, loading: Loading, weight: Array)
     """A state near the given one that satisfies closings, motions and joints, and its largest gap, dimensionless.
 
     Each step closes the linearised gaps with the least elastic energy by the stiffness of the undeformed scene, and is
-    shortened to :data:`LONGEST`.  ``weight`` is that of the rotation unknowns; the multipliers of the state are zero.
+    shortened to ``LONGEST``.  ``weight`` is that of the rotation unknowns; the multipliers of the state are zero.
     """
     state = replace(equations.holding(state, loading), lam=np.zeros(equations.rows))
     n, rows = equations.unknowns, equations.rows

@@ -55,7 +55,7 @@ class Neutral:
         return cls(right, answer @ np.linalg.inv(right.T @ answer)), values.real
 
     def moved(self, answer: Array) -> Neutral:
-        """The motions at another state, from the solution (total, motions) of its matrix for :attr:`weighted`."""
+        """The motions at another state, from the solution (total, motions) of its matrix for ``weighted``."""
         return Neutral(self.weighted, answer @ np.linalg.inv(self.weighted.T @ answer))
 
     def without(self, step: Array) -> Array:

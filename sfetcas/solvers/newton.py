@@ -113,7 +113,7 @@ class Moving:
     longest : float
         Largest rotation of a node in a step, rad.
     convex : bool
-        As of :meth:`Equations.at`.
+        As of :meth:`.Equations.at`.
     """
 
     equations: Equations

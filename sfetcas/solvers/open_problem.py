@@ -1,6 +1,6 @@
 """The equilibrium problem, open to a user's own terms, rows and bounds in CasADi.
 
-:func:`equilibrium_nlp` gives the potential energy of a model with its constraints as a plain
+:func:`.equilibrium_nlp` gives the potential energy of a model with its constraints as a plain
 :class:`~sfetcas.mathematics.nlp.NLP`, and expressions for what the scene names: positions, angles, curvatures.  Add to
 it, solve it with any nlpsol plugin, read the answer by name.
 """

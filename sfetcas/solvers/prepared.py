@@ -171,9 +171,9 @@ class Prepared:
         return self._test.inertia(point, doubtful=doubtful) if self.model.conservative else self._tangent.inertia(point)
 
     def around_zero(self, point: Point, *, sharp: bool = True) -> tuple[int, Array, Array]:
-        """Eigenvalues (n,) around zero, dimensionless, and shapes, see :meth:`StabilityTest.around_zero`.
+        """Eigenvalues (n,) around zero, dimensionless, and shapes, see :meth:`.StabilityTest.around_zero`.
 
-        For loads without potential their real parts, see :meth:`TangentTest.around_zero`.
+        For loads without potential their real parts, see :meth:`.TangentTest.around_zero`.
         """
         return self._tester.around_zero(point, sharp=sharp)
 
@@ -198,7 +198,7 @@ class Prepared:
 
     @property
     def softest(self) -> float:
-        """Ratio of :attr:`weight` to :attr:`Equations.mass`, see :attr:`StabilityTest.softest`."""
+        """Ratio of :attr:`weight` to :attr:`.Equations.mass`, see :attr:`.StabilityTest.softest`."""
         return self._test.softest
 
     def minimise(self, loading: Loading, state: State) -> tuple[Solved, int]:
@@ -435,7 +435,7 @@ class Solved:
 
     @property
     def negative(self) -> int:
-        """Number of negative eigenvalues, at less cost; 0 if :attr:`Prepared.switches_branch` is false."""
+        """Number of negative eigenvalues, at less cost; 0 if :attr:`.Prepared.switches_branch` is false."""
         return self.prepared._test.negative(self.point) if self.prepared.switches_branch else 0
 
     @property
@@ -444,7 +444,7 @@ class Solved:
         return self.prepared._tangent.below(self.point) if self.prepared.countable else None
 
     def spectrum(self, count: int) -> tuple[Array, Array]:
-        """All eigenvalues, dimensionless, and lowest shapes, see :meth:`StabilityTest.spectrum`."""
+        """All eigenvalues, dimensionless, and lowest shapes, see :meth:`.StabilityTest.spectrum`."""
         return self.prepared._test.spectrum(self.point, count)
 
     @property

@@ -59,7 +59,7 @@ def flow(
         Start of the flow.
     loading : Loading
     depth : callable
-        (point, last value) -> minus the lowest eigenvalue by :attr:`Equations.mass`, or a bound not much larger; zero
+        (point, last value) -> minus the lowest eigenvalue by :attr:`.Equations.mass`, or a bound not much larger; zero
         if no eigenvalue is negative.
     """
     diagonal = equations.diagonal[: equations.rotation_unknowns]
@@ -97,7 +97,7 @@ class Drag:
     equations : Equations
     since : State
     size : float
-        Ratio of the moment on a rotation unknown to its rotation times :attr:`Equations.mass`, dimensionless.
+        Ratio of the moment on a rotation unknown to its rotation times :attr:`.Equations.mass`, dimensionless.
     """
 
     equations: Equations

@@ -33,7 +33,7 @@ __all__ = [
 def loose_rows(equations: Equations, point: Point, slack: float | None = None) -> Array:
     """Combinations of rows whose derivative by the unknowns vanishes at this state: orthonormal columns, (rows, n).
 
-    Left singular vectors of the Jacobian with singular values below ``slack`` (by default :data:`SLACK`) times the
+    Left singular vectors of the Jacobian with singular values below ``slack`` (by default ``SLACK``) times the
     largest.
     """
     slack = SLACK if slack is None else slack

@@ -173,5 +173,5 @@ class Sides:
 
 
 def alike(values: Array) -> int:
-    """Number of the rising eigenvalues (n,), dimensionless, that equal the lowest one to :data:`tolerances.ALIKE`."""
+    """Number of the rising eigenvalues (n,), dimensionless, that equal the lowest one to :data:`.tolerances.ALIKE`."""
     return int((values - values[0] <= tolerances.ALIKE * max(1.0, abs(float(values[0])))).sum())

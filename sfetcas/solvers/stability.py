@@ -62,7 +62,7 @@ class Stability:
     negative : int
         Number of negative eigenvalues: independent directions in which the potential falls.
     smallest : float
-        Smallest eigenvalue by :attr:`Equations.mass`, dimensionless; inf if nothing can move, nan if not computed.
+        Smallest eigenvalue by :attr:`.Equations.mass`, dimensionless; inf if nothing can move, nan if not computed.
     shape : ndarray (rotation unknowns,)
         Eigenvector of the smallest eigenvalue (the unstable mode), largest entry 1 rad, with the sign that
         :mod:`~sfetcas.solvers.sides` chooses.
@@ -125,7 +125,7 @@ class StabilityTest:
     def softest(self) -> float:
         """Smallest ratio of stiffness (bending, torsion) to squared length of all members, dimensionless.
 
-        It is the ratio of :attr:`weight` to :attr:`Equations.mass`.
+        It is the ratio of :attr:`weight` to :attr:`.Equations.mass`.
         """
         model = self.equations.model
         x, softest = np.linspace(0.0, 1.0, 5), np.inf
@@ -202,7 +202,7 @@ class StabilityTest:
         return int((known[0] < -known[1]).sum())
 
     def depth(self, point: Point, near: float = 0.0) -> float:
-        """Minus the lowest eigenvalue by :attr:`Equations.mass`, dimensionless; zero if none is negative.
+        """Minus the lowest eigenvalue by :attr:`.Equations.mass`, dimensionless; zero if none is negative.
 
         In large models a bound of it by the signs of pivots alone; the search begins at ``near``, an earlier value.
         """
@@ -317,7 +317,7 @@ class StabilityTest:
         int
             Number of eigenvalues below the first listed; -1 if not counted.
         ndarray (n,)
-            Eigenvalues, rising: in small models all, in large ones the :data:`NEAREST` to zero.
+            Eigenvalues, rising: in small models all, in large ones the ``NEAREST`` to zero.
         ndarray (rotation unknowns, n)
             Modes as columns, rad.
 
@@ -507,7 +507,7 @@ class StabilityTest:
         raise SolveError(Status.FAILED, "the tangent stays singular however it is shifted")
 
     def _inverse_iterated(self, point: Point, entries: Array, *, sharp: bool) -> tuple[Array, Array]:
-        """The :data:`NEAREST` eigenvalues to zero, rising, and their vectors as columns, by inverse iteration."""
+        """The ``NEAREST`` eigenvalues to zero, rising, and their vectors as columns, by inverse iteration."""
         equations, n = self.equations, self._n
         root, width = np.sqrt(self._weights)[:, None], min(2 * NEAREST, n)
         block = np.random.default_rng(0).standard_normal((n, width))

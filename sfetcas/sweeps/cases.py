@@ -34,7 +34,7 @@ class Cases:
     Attributes
     ----------
     columns : mapping of ndarray
-        By the names of :func:`~sfetcas.parametric.changing.changed`, in the units of the scene: (cases,) for a number,
+        By the names of :func:`~sfetcas.changed`, in the units of the scene: (cases,) for a number,
         (cases, k) for a list of k numbers.
     random : bool
         Whether the cases are a random sample, so that statistics over them have a meaning.

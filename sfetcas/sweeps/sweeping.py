@@ -46,7 +46,7 @@ def sweep(
     scene : Scene
         With any analysis; its expectations are ignored.
     cases : Cases or mapping
-        Columns of numbers by name; see :func:`~sfetcas.sweeps.cases.grid`, :func:`~sfetcas.sweeps.cases.sampled`.
+        Columns of numbers by name; see :func:`~sfetcas.grid`, :func:`~sfetcas.sampled`.
     quantities : sequence of str
         Quantities of each answer: ``nodes.tip.position``, ``members.beam.moment at 0.5``, ``reactions.A.force``,
         ``modes.omega``, ``factor limit_point 1``, ``nodes.tip.velocity time 0.5``.

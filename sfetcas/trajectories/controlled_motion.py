@@ -196,7 +196,7 @@ class ControlledMotion:
         tail : time after the end during which the motion is followed, s; by default as long as the motion
         accuracy : wanted error by the time steps of the replay, over the size of the scene
         integrator : by default ``conserving``, or radau-3 where that is refused or its order is too low
-        more : further arguments of :func:`~sfetcas.trajectories.replay.respond`
+        more : further arguments of :func:`~sfetcas.respond`
         """
         system = self.transcription.system
         tail = self.time if tail is None else tail
