@@ -71,7 +71,7 @@ def number_in_words(value: Any, unit: str = "", digits: int = 6) -> str:
     """
     values = np.asarray(value, dtype=float)
     texts = [f"{x + 0.0:.{digits}g}" for x in values.ravel().tolist()]
-    text = texts[0] if values.ndim == 0 else f"({few(texts)})"
+    text = texts[0] if values.size == 1 else f"({few(texts)})"
     return f"{text} {unit}" if unit else text
 
 
