@@ -26,6 +26,7 @@ from sfetcas import (
     Prepared,
     QuasiStatic,
     Scene,
+    Settings,
     Spring,
     Table,
     assemble,
@@ -67,6 +68,12 @@ def test_a_record_prints_as_it_would_be_made(record, text):
     assert repr(record) == str(record) == text
     assert eval(text, vars(sfetcas)) == record
     assert repr(pickle.loads(pickle.dumps(record))) == text
+
+
+def test_settings_and_parameters_print_what_differs():
+    assert repr(Settings()) == "Settings()"
+    assert repr(Settings(accuracy=1e-3, element="SFET4")) == "Settings(accuracy=0.001, element='SFET4')"
+    assert repr(Parameter(np.float64(1.0), lambda x: {}, low=0.5)) == "Parameter(value=1.0, low=0.5)"
 
 
 def test_long_lists_and_texts_are_cut():

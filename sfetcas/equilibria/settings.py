@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from ..description.records import say, unknown
+from ..description.showing import made
 from ..description.task import Analysis, checked_accuracy
 from ..errors import SceneError
 from ..mathematics.kernels import Kernels
@@ -54,6 +55,9 @@ class Settings:
     solver: SolverName = "ipopt"
     kernels: Kernels = "auto"
     runs: int | None = None
+
+    def __repr__(self) -> str:
+        return made(self)
 
     def __post_init__(self) -> None:
         if self.accuracy is not None:
