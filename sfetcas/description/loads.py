@@ -261,6 +261,20 @@ class History(Record):
         return tuple(found)
 
     @cached_property
+    def knots(self) -> tuple[float, ...]:
+        """Values of t over which no step goes that follows it: all of linear ones, else kinks and where it turns back.
+
+        A spline through measured values has thousands of intervals, which are no corners.
+        """
+        if self.polynomial is None and self.interpolation == "linear":
+            return self.t
+        values = [self.factor(t) for t in self.t]
+        turns = {
+            t for t, a, b, c in zip(self.t[1:], values, values[1:], values[2:], strict=False) if (b - a) * (c - b) < 0.0
+        }
+        return tuple(sorted({*self.kinks, *turns}))
+
+    @cached_property
     def rounding(self) -> tuple[float, float]:
         """Bounds below which a jump is rounding of the coefficients: of the factor, and of its rate in 1/s."""
         size, rate = abs(self.factor(self.t[0])), 0.0

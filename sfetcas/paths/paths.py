@@ -188,7 +188,7 @@ class PathTracing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
-        knots = {t for h in scene.histories.values() for t in h.t if self.span[0] < t < self.span[1]}
+        knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
 
     # -- meshes ---------------------------------------------------------------------------------
