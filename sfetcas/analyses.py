@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .description.scene import Scene, check_loaded, check_scene
 from .equilibria import statics, stops
-from .equilibria.statics import Settings
+from .equilibria.settings import Settings, settings_with
 from .errors import SceneError
 from .mechanics.resistance import check_resistance
 
@@ -58,7 +57,7 @@ def solve(
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
     check_scene(scene, "solve({})")
-    settings = replace(settings or Settings(), **changes)
+    settings = settings_with(settings, changes)
     if settings.accuracy_of and scene.analysis.type in ("path", "modes"):
         raise SceneError(f"accuracy_of: found with type {scene.analysis.type!r}, accepted: static or dynamic")
     if scene.analysis.type == "dynamic":

@@ -34,6 +34,35 @@ def test_a_spline_goes_through_its_values_smoothly_and_rests_at_its_ends():
     assert SPLINE.kinks == (T[0], T[-1])
 
 
+def test_what_follows_a_history_stops_where_it_turns_back_or_has_a_corner():
+    # Of the values of the spline the third is the largest.
+    assert SPLINE.knots == (0.0, 1.0, 2.0)
+    assert SPLINE.replace(interpolation="linear").knots == tuple(T)
+    assert History(t=[0, 1, 2], polynomial=[[0, 0, 1], [1, 2, 1]]).knots == (0.0, 2.0)
+    assert History(t=[0, 1, 2], polynomial=[[0, 0, 1], [2, 2]]).knots == (0.0, 1.0, 2.0)
+
+
+def test_a_path_along_many_measured_values_has_few_points():
+    t = np.linspace(0, 2, 2001)
+    table = {
+        "sections": {"strip": {"EI3": 1.0}},
+        "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+        "members": {"beam": {"nodes": ["A", "B"], "section": "strip"}},
+        "loads": {"tip": {"type": "force", "node": "B", "value": [0, 1], "history": "on"}},
+        "histories": {"on": {"t": t, "value": np.sin(t) ** 2, "interpolation": "spline"}},
+        "analysis": {"type": "path", "range": [0, 2], "accuracy": 1e-2},
+    }
+    path = solve(Scene.from_dict(table))
+    assert path.points[-1].factor == 2.0
+    # Steps of a path that has no corners; there would be one for each value.
+    assert len(path.points) < 100
+
+
+def test_a_history_is_evaluated_at_many_times_at_once():
+    t = np.linspace(-1, 3, 12).reshape(3, 4)
+    np.testing.assert_array_equal(SPLINE.factor(t), [[SPLINE.factor(x) for x in row] for row in t])
+
+
 def test_a_spline_is_exact_for_a_cubic_at_rest_at_both_ends():
     rest = History(t=np.linspace(0, 2, 6), value=[3 * x**2 - 2 * x**3 for x in np.linspace(0, 1, 6)])
     for history in (rest.replace(interpolation="spline"), History(t=[0, 2], value=[0, 1], interpolation="spline")):
@@ -55,6 +84,7 @@ def test_a_spline_is_exact_for_a_cubic_at_rest_at_both_ends():
             "interpolation: found t or values too",
         ),
         ({"table": "none.csv"}, "table.none.csv: there is no such file, accepted: a CSV table"),
+        ({"t": [0, 1], "value": math.sin}, "value: found a function, accepted: a list of numbers; History.of(function"),
         ({"table": 3}, "table: found 3, accepted: the name of a CSV file"),
         ({"table": "none.csv", "t": [0, 1]}, "found 'table' and 't', accepted: one of them"),
     ],
@@ -97,7 +127,11 @@ def test_a_table_beside_the_scene_file_drives_a_motion(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("t,x\n0,1\n", "found the columns t, x, accepted: with t and value"),
+        ("t,x\n0,1\n", "found the columns t, x, accepted: columns t and value with these names in the first line"),
+        (
+            "t;value\n0;1\n",
+            "found the columns t;value, accepted: columns t and value with these names in the first line, s",
+        ),
         ("t,value\n0,a\n", "row 1.value: found 'a', accepted: a number"),
         ("t,value\n", "found 1 line, accepted: a line of names and a line of numbers for each row"),
         ("t,value\n0,nan\n", "value: found nan, accepted: a finite number"),

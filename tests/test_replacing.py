@@ -200,3 +200,20 @@ def test_a_changed_scene_is_written_and_read(tmp_path):
     other = SCENE.replace({"loads.tip.value": np.array([0.0, 2.0]), "loads.more": {**STRIP["loads"]["tip"]}})
     dump(other, tmp_path / "other.json")
     assert load(tmp_path / "other.json") == other
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: solve(SCENE, acuracy=1e-5), "settings: found 'acuracy', accepted: accuracy, "),
+        (
+            lambda: solve(SCENE, steps=[1, 2]),
+            "settings: found 'steps', a key of the analysis, accepted: in the scene, as",
+        ),
+        (lambda: solve(SCENE, 1e-5), "settings: found 1e-05, accepted: Settings(...), or keywords, as accuracy=1e-8"),
+    ],
+)
+def test_settings_that_do_not_exist_are_told(call, message):
+    with pytest.raises(SceneError) as refused:
+        call()
+    assert str(refused.value).startswith(message)

@@ -112,7 +112,7 @@ class ContactRun:
     def _factors(self, begin: float, end: float) -> list[float]:
         """Factors from one to another, where histories have knots."""
         low, high = min(begin, end), max(begin, end)
-        knots = {t for history in self.scene.histories.values() for t in history.t if low < t < high}
+        knots = {t for history in self.scene.histories.values() for t in history.knots if low < t < high}
         return [begin, *sorted(knots, reverse=end < begin), end]
 
     def _through(self, base: Mesh, begin: float, end: float, start: Held | tuple[Touch, ...]) -> Held | None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import os
+from collections.abc import Sequence
 
 from ..errors import SceneError
 from ..files import UnreadableError, read_file
-from .records import counted
+from .records import counted, enumerated
 
 __all__ = ["read_columns"]
 
@@ -16,7 +17,7 @@ LARGEST = 200_000_000
 """Bytes of a table: ten million numbers with all their digits."""
 
 
-def read_columns(path: str | os.PathLike[str], row: str = "row") -> dict[str, list[float]]:
+def read_columns(path: str | os.PathLike[str], row: str = "row", needed: Sequence[str] = ()) -> dict[str, list[float]]:
     """The columns of a CSV file by the names in its first line.
 
     Parameters
@@ -24,6 +25,8 @@ def read_columns(path: str | os.PathLike[str], row: str = "row") -> dict[str, li
     path
     row : str
         What a line of numbers is, for messages.
+    needed : sequence of str
+        Columns that there have to be.
 
     Raises
     ------
@@ -46,6 +49,9 @@ def read_columns(path: str | os.PathLike[str], row: str = "row") -> dict[str, li
     names = [name.strip() for name in lines[0]]
     if len(set(names)) < len(names):
         raise SceneError("found a name twice in the first line, accepted: each once", where)
+    if not set(needed) <= set(names):
+        accepted = f"columns {' and '.join(needed)} with these names in the first line, separated by commas"
+        raise SceneError(f"found the columns {enumerated(names)}, accepted: {accepted}", where)
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, line in enumerate(lines[1:], start=1):
         if len(line) != len(names):

@@ -8,16 +8,17 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
 from math import isfinite, perm
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
+import numpy as np
 from pydantic import model_validator
 
 from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import TINY
+from ..mathematics.arrays import TINY, Array
 from ..mathematics.interpolation import cubic_spline, fitted_spline
 from .columns import read_columns
-from .records import Fraction, Numbers, Record, Turn, Vector, enumerated, number, say
+from .records import Fraction, Numbers, Record, Turn, Vector, number, say
 from .sections import Varying
 
 __all__ = ["History", "Load", "Motion"]
@@ -109,7 +110,12 @@ class History(Record):
     @classmethod
     def _from_table(cls, values: Any) -> Any:
         """Columns of a file in place of t and value."""
-        if not isinstance(values, Mapping) or "table" not in values:
+        if not isinstance(values, Mapping):
+            return values
+        if callable(values.get("value")):
+            accepted = "a list of numbers; History.of(function, start, end) follows a function"
+            raise SceneError(f"found a function, accepted: {accepted}", ("value",))
+        if "table" not in values:
             return values
         name, twice = values["table"], [key for key in ("t", "value", "polynomial") if key in values]
         if twice:
@@ -117,13 +123,9 @@ class History(Record):
         if not isinstance(name, (str, os.PathLike)):
             raise SceneError(f"found {say(name)}, accepted: the name of a CSV file", ("table",))
         try:
-            columns = read_columns(name)
+            columns = read_columns(name, needed=("t", "value"))
         except SceneError as error:
             raise error.within("table") from None
-        missing = [key for key in ("t", "value") if key not in columns]
-        if missing:
-            message = f"found the columns {enumerated(list(columns))}, accepted: with t and value"
-            raise SceneError(message, ("table", os.fspath(name)))
         others = {key: value for key, value in values.items() if key != "table"}
         return {**others, "t": columns["t"], "value": columns["value"]}
 
@@ -164,17 +166,25 @@ class History(Record):
             return tuple((left, right - left) for left, right in pairwise(self.value))
         return tuple(map(tuple, cubic_spline(self.t, self.value).tolist()))
 
-    def factor(self, t: float) -> float:
+    @overload
+    def factor(self, t: float) -> float: ...
+
+    @overload
+    def factor(self, t: Array) -> Array: ...
+
+    def factor(self, t: float | Array) -> float | Array:
         """The factor at t.
 
         Parameters
         ----------
-        t : s, or the step's factor in statics
+        t : s, or the step's factor in statics; a number, or an array of any shape
 
         Returns
         -------
-        factor : dimensionless
+        factor : dimensionless, in the shape of t
         """
+        if isinstance(t, np.ndarray) and t.ndim:
+            return np.array([self.factor(each) for each in t.ravel().tolist()]).reshape(t.shape)
         t = min(max(t, self.t[0]), self.t[-1])
         i = min(bisect_right(self.t, t), len(self.t) - 1) - 1
         if i < 0:
@@ -253,6 +263,20 @@ class History(Record):
             if max(map(abs, (step, *jumps))) > SMOOTH * size:
                 found.append(t)
         return tuple(found)
+
+    @cached_property
+    def knots(self) -> tuple[float, ...]:
+        """Values of t over which no step goes that follows it: all of linear ones, else kinks and where it turns back.
+
+        A spline through measured values has thousands of intervals, which are no corners.
+        """
+        if self.polynomial is None and self.interpolation == "linear":
+            return self.t
+        values = [self.factor(t) for t in self.t]
+        turns = {
+            t for t, a, b, c in zip(self.t[1:], values, values[1:], values[2:], strict=False) if (b - a) * (c - b) < 0.0
+        }
+        return tuple(sorted({*self.kinks, *turns}))
 
     @cached_property
     def rounding(self) -> tuple[float, float]:

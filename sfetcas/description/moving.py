@@ -192,5 +192,5 @@ def _check_course(motion: str, history: History, end: float) -> None:
                 f"accepted: {accepted}"
             )
         so = f"so that the velocity of the motion {motion!r} would jump"
-        accepted = "intervals whose rates meet, as polynomials can"
+        accepted = "intervals whose rates meet, as polynomials can, or interpolation = 'spline'"
         raise SceneError(f"its rate jumps by {kink:g} 1/s at t = {t:g} s, {so}, accepted: {accepted}")

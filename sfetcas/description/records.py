@@ -62,13 +62,16 @@ def brief(value: object) -> str:
     if isinstance(value, Mapping):
         entries = [f"{key!r}: {brief(entry)}" for key, entry in list(value.items())[:LISTED]]
         return "{" + _cut(entries, len(value)) + "}"
-    if isinstance(value, tuple):
-        rows = len(value) > 1 and all(isinstance(entry, tuple) and len(entry) > 1 for entry in value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (tuple, list)):
+        rows = len(value) > 1 and all(isinstance(entry, (tuple, list)) and len(entry) > 1 for entry in value)
         if rows and sum(map(len, value)) > LISTED:
             return f"({counted(len(value), 'row')} of numbers)"
         most = LISTED if len(value) <= LISTED else LISTED // 2
         entries = [brief(entry) for entry in value[:most]]
-        return f"({_cut(entries, len(value))}{',' if len(value) == 1 else ''})"
+        listed = _cut(entries, len(value))
+        return f"[{listed}]" if isinstance(value, list) else f"({listed}{',' if len(value) == 1 else ''})"
     text = repr(value)
     # A record is brief by itself.
     return text if isinstance(value, BaseModel) or len(text) <= LONGEST else repr(str(value)[: LONGEST - 3] + "...")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +16,7 @@ __all__ = [
     "error_in_words",
     "few",
     "first_lines",
+    "made",
     "named",
     "notes_in_words",
     "number_in_words",
@@ -40,6 +42,13 @@ def shown(thing: object, head: Iterable[str], lines: Iterable[str] = ()) -> str:
     """
     first = f"{type(thing).__name__}({', '.join(filter(None, head))})"
     return "\n".join(map(printable, [first, *(f"  {line}" for line in lines if line)]))
+
+
+def made(thing: Any) -> str:
+    """A dataclass as it would be made, without what stands at its default."""
+    given = {one.name: getattr(thing, one.name) for one in fields(thing) if one.repr}
+    differing = {one.name for one in fields(thing) if one.default is MISSING or given.get(one.name) != one.default}
+    return f"{type(thing).__name__}({', '.join(f'{key}={brief(x)}' for key, x in given.items() if key in differing)})"
 
 
 def few(texts: Iterable[str], most: int = MOST) -> str:
@@ -71,7 +80,7 @@ def number_in_words(value: Any, unit: str = "", digits: int = 6) -> str:
     """
     values = np.asarray(value, dtype=float)
     texts = [f"{x + 0.0:.{digits}g}" for x in values.ravel().tolist()]
-    text = texts[0] if values.ndim == 0 else f"({few(texts)})"
+    text = texts[0] if values.size == 1 else f"({few(texts)})"
     return f"{text} {unit}" if unit else text
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
 
-from ..description.task import checked_accuracy
+from ..description.records import say, unknown
+from ..description.showing import made
+from ..description.task import Analysis, checked_accuracy
 from ..errors import SceneError
 from ..mathematics.kernels import Kernels
 from ..mechanics.elements import ELEMENTS
 from .single import SolverName
 
-__all__ = ["Settings"]
+__all__ = ["Settings", "settings_with"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,9 @@ class Settings:
     kernels: Kernels = "auto"
     runs: int | None = None
 
+    def __repr__(self) -> str:
+        return made(self)
+
     def __post_init__(self) -> None:
         if self.accuracy is not None:
             try:
@@ -71,3 +77,24 @@ class Settings:
             raise SceneError(f"kernels: found {self.kernels!r}, accepted: auto, compiled, interpreted")
         if self.assembly not in ("auto", "closing", "nodal"):
             raise SceneError(f"assembly: found {self.assembly!r}, accepted: auto, closing, nodal")
+
+
+def settings_with(settings: Settings | None, changes: Mapping[str, Any]) -> Settings:
+    """The settings, or the default ones, with other values of some.
+
+    Raises
+    ------
+    SceneError
+        Something that is no settings, or no setting of this name.
+    """
+    if settings is not None and not isinstance(settings, Settings):
+        raise SceneError(f"settings: found {say(settings)}, accepted: Settings(...), or keywords, as accuracy=1e-8")
+    known = [field.name for field in fields(Settings)]
+    for name in changes:
+        if name in known:
+            continue
+        if name in Analysis.model_fields:
+            accepted = f"in the scene, as scene.replace({{'analysis.{name}': ...}})"
+            raise SceneError(f"found {name!r}, a key of the analysis, accepted: {accepted}", ("settings",))
+        raise SceneError(unknown(name, known), ("settings",))
+    return replace(settings or Settings(), **changes)

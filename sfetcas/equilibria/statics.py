@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..description.scene import Scene
@@ -21,7 +20,7 @@ from ..solvers.prepared import Prepared
 from ..solvers.unrestrained import refuse_unrestrained
 from .meshing import EquilibriumResult, Meshing
 from .refinement import Refinement
-from .settings import Settings
+from .settings import Settings, settings_with
 from .single import solve_model
 from .solution import Equilibrium, Solution, at_factor
 from .ways import Ways
@@ -60,7 +59,7 @@ def solve(
     >>> scene = load("problems/cantilever_tip_force.toml")      # doctest: +SKIP
     >>> solve(scene).last.position("tip")                       # doctest: +SKIP
     """
-    settings = replace(settings or Settings(), **changes)
+    settings = settings_with(settings, changes)
     return LoadSteps(scene, settings, stops).solution()
 
 

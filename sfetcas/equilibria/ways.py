@@ -326,7 +326,10 @@ class Ways:
     ) -> EquilibriumResult | None:
         """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
         knots = {
-            t for history in self.scene.histories.values() for t in history.t if min(begin, end) < t < max(begin, end)
+            t
+            for history in self.scene.histories.values()
+            for t in history.knots
+            if min(begin, end) < t < max(begin, end)
         }
         stops = [begin, *sorted(knots, reverse=end < begin), end]
         found: EquilibriumResult | None = None

@@ -16,7 +16,7 @@ from ..description import records
 from ..description.changes import FACTOR, branch_of, carry_ends, with_entries
 from ..description.records import Record, plain, unknown
 from ..description.scene import History, Scene
-from ..description.showing import named
+from ..description.showing import made, named
 from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
@@ -69,6 +69,9 @@ class Parameter:
     high: float | None = None
     unit: str = ""
     meaning: str = "a number that others follow"
+
+    def __repr__(self) -> str:
+        return made(self)
 
 
 @dataclass(frozen=True)

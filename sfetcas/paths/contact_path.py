@@ -82,7 +82,7 @@ class ContactPath:
         analysis = scene.analysis.model_copy(update={"steps": tuple(factor for factor in self.span if factor)})
         self.meshes = Meshing(scene.model_copy(update={"analysis": analysis}), settings)
         self.scene, self.settings = scene, settings
-        knots = {t for h in scene.histories.values() for t in h.t if self.span[0] < t < self.span[1]}
+        knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
 
     def path(self) -> Path:

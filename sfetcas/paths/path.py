@@ -34,7 +34,7 @@ FLUTTER = (
 """A note as :data:`NO_POTENTIAL` where modes are asked for, which find flutter points."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class FlutterPoint(Equilibrium):
     """An equilibrium at which a motion starts to grow while it oscillates; without damping two frequencies coincide
     there.
@@ -46,6 +46,10 @@ class FlutterPoint(Equilibrium):
     """
 
     omega: float = field(kw_only=True)
+
+    def __repr__(self) -> str:
+        head = [f"factor={self.factor:.9g}", f"omega={self.omega:.9g} rad/s", self.certificate.in_words]
+        return shown(self, head, self.lines())
 
     def table(self, kind: str, name: str = "") -> dict[str, Any]:
         """As :meth:`.Equilibrium.table`; the table of the whole state also has the frequency ``omega``."""

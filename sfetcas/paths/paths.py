@@ -16,8 +16,9 @@ import numpy as np
 
 from .. import tolerances
 from ..description.scene import Scene
+from ..equilibria.settings import Settings, settings_with
 from ..equilibria.solution import Equilibrium, equilibrium
-from ..equilibria.statics import Settings, pilot_of
+from ..equilibria.statics import pilot_of
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
@@ -85,8 +86,8 @@ def follow_path(scene: Scene, settings: Settings | None = None, **changes: Any) 
     if scene.analysis.type != "path":
         raise SceneError(f"found {scene.analysis.type!r}, accepted: 'path' to follow one", ("analysis", "type"))
     if scene.contacts:
-        return follow_in_contact(scene, replace(settings or Settings(), **changes))
-    settings = replace(settings or Settings(), **changes)
+        return follow_in_contact(scene, settings_with(settings, changes))
+    settings = settings_with(settings, changes)
     path = PathTracing(scene, settings).path()
     return with_modes(path, settings) if scene.analysis.count_of_modes else path
 
@@ -187,7 +188,7 @@ class PathTracing:
         self.seconds = {"model": 0.0, "solve": 0.0}
         self.assembly: Any = settings.assembly
         self.model: Model | None = None
-        knots = {t for h in scene.histories.values() for t in h.t if self.span[0] < t < self.span[1]}
+        knots = {t for h in scene.histories.values() for t in h.knots if self.span[0] < t < self.span[1]}
         self.knots = tuple(sorted(knots))
 
     # -- meshes ---------------------------------------------------------------------------------

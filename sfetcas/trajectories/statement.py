@@ -14,7 +14,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from ..description.records import unknown
+from ..description.records import counted, unknown
 from ..dynamics.methods import RADAU
 from ..errors import SceneError
 from ..mathematics.arrays import Array
@@ -134,6 +134,12 @@ class MotionStatement(Statement):
         self.rests: dict[str, ca.MX] = {}
         self.resting = False
         self.constants = {one.name: self.known(ca.MX.sym(one.name)) for one in variables}
+
+    @property
+    def in_words(self) -> str:
+        """How much there is of it, with controls and variables."""
+        own = f"{counted(len(self.controls), 'control')}, {counted(len(self.variables), 'variable')}"
+        return f"{own}, {super().in_words}"
 
     @property
     def fractions(self) -> Array:
