@@ -19,7 +19,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "numpydoc",
     "plots",
-    "sphinxarg.ext",
     "formulas",
     "reference",
     "gallery",
@@ -31,8 +30,6 @@ nitpick_ignore_regex = [
     ("py:.*", r"(casadi|collections|concurrent|multiprocessing|numpy|pydantic)\b.*"),
     ("py:.*", r"sfetcas\.description\.records\.(_\w+|T)|lambda"),
 ]
-# The domain of the command line knows no references of its own.
-suppress_warnings = ["myst.domains"]
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3

@@ -38,7 +38,7 @@ from .reports import print_checks, report, report_sweep
 from .solvers.prepared import Prepared
 from .stopping import COMMAND, INTERRUPTED, SENTENCE, arrived, asked, heard
 
-__all__ = ["main"]
+__all__ = ["main", "parser"]
 
 T = TypeVar("T")
 
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if getattr(sys, name) is None:
             # Whoever closed it wants to see nothing.
             setattr(sys, name, io.StringIO())
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # Names have characters that not every terminal has.
@@ -125,17 +125,18 @@ def _print_no_more() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """What reads the command line, with the help of each command."""
+    found = argparse.ArgumentParser(
         prog="sfetcas",
         description="Equilibria, paths, vibrations and motions of very flexible beams and mechanisms.",
         epilog="Each command has a help of its own: sfetcas run --help",
     )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    found.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    commands = found.add_subparsers(required=True, metavar="COMMAND")
     for add in (_add_run, _add_check, _add_info, _add_sweep, _add_trade, _add_export):
         add(commands)
-    return parser
+    return found
 
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"

@@ -9,7 +9,7 @@ import pytest
 
 import sfetcas
 from sfetcas import Arc, Load
-from sfetcas.cli import _parser
+from sfetcas.cli import parser
 from sfetcas.description.records import Record
 
 PUBLIC = {name: getattr(sfetcas, name) for name in sfetcas.__all__}
@@ -57,7 +57,7 @@ def test_keys_and_methods_are_completed_and_nothing_else():
 
 
 def commands():
-    (found,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
+    (found,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
     return found.choices
 
 
@@ -72,7 +72,7 @@ def test_help_of_a_command_has_a_sentence_examples_that_are_accepted_and_all_def
     for example in examples:
         program, *words = shlex.split(example)
         assert program == "sfetcas"
-        assert _parser().parse_args(words).command is command.get_default("command")
+        assert parser().parse_args(words).command is command.get_default("command")
     for action in command._actions:
         assert action.help, action.dest
         text = " ".join(action.help.split())
@@ -88,6 +88,6 @@ def test_help_of_a_command_has_a_sentence_examples_that_are_accepted_and_all_def
 
 def test_help_of_the_program_names_all_commands(capsys):
     with pytest.raises(SystemExit):
-        _parser().parse_args(["--help"])
+        parser().parse_args(["--help"])
     printed = capsys.readouterr().out
     assert all(f"    {name} " in printed for name in commands())

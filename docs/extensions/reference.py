@@ -3,17 +3,20 @@
 Each function gives the text of a page; :func:`setup` writes them before Sphinx reads.
 """
 
+import argparse
 import importlib
 import json
 import pkgutil
 import typing
 from dataclasses import dataclass
+from os import environ
 from pathlib import Path
 
 from numpydoc.docscrape import NumpyDocString
 from sphinx.application import Sphinx
 
 import sfetcas
+from sfetcas import cli
 from sfetcas.description.answers import answers_table
 from sfetcas.description.records import Record, plain
 from sfetcas.description.scene import Scene
@@ -117,6 +120,15 @@ def scene_tables() -> str:
     return "\n".join(lines)
 
 
+def command_help() -> str:
+    """What each command says of itself."""
+    environ["COLUMNS"] = "100"
+    root = cli.parser()
+    (commands,) = (action for action in root._actions if isinstance(action, argparse._SubParsersAction))
+    named = {"sfetcas": root} | {f"sfetcas {name}": parser for name, parser in commands.choices.items()}
+    return "\n".join(f"## {name}\n\n```text\n{parser.format_help()}```\n" for name, parser in named.items())
+
+
 GROUPS = {
     "scenes": ("Scenes", ("description",)),
     "solving": ("Solving", ("analyses", "checks", "equilibria", "errors")),
@@ -208,7 +220,7 @@ def _write(folder: Path, pages: dict[str, str]) -> None:
 
 def _generate(app: Sphinx) -> None:
     reference = Path(app.srcdir) / "reference"
-    tables = {"scene": scene_tables(), "answers": answers_table()}
+    tables = {"scene": scene_tables(), "answers": answers_table(), "commands": command_help()}
     _write(reference / "generated", tables)
     _write(reference / "api", api_pages())
     _write(reference / "modules", module_pages())
