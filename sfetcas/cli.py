@@ -135,6 +135,17 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("file", type=Path, help="scene file, .toml or .json")
     run.add_argument("--json", type=Path, metavar="OUT", help="write the whole answer as JSON")
     run.add_argument("--plot", type=Path, metavar="OUT.png", help="write a picture")
+    run.add_argument(
+        "--quantity",
+        action="append",
+        metavar="NAME",
+        help="what --plot draws over the factor or time, as nodes.tip.position.y; may be given several times",
+    )
+    run.add_argument(
+        "--colour",
+        metavar="NAME",
+        help="what colours tell: moment, magnitude, twist, curvature, tension, shear, stress, none",
+    )
     run.add_argument("--animate", type=Path, metavar="OUT.gif", help="write a moving picture, .gif or .mp4")
     run.add_argument("--vtk", type=Path, metavar="DIR", help="write files for ParaView into a folder")
     run.add_argument("--matrices", type=Path, metavar="OUT", help="modes: write the matrices, .npz or a new folder")

@@ -18,6 +18,7 @@ from ..description.loads import History
 from ..description.records import plain, unknown
 from ..description.scene import Scene, check_scene
 from ..dynamics.motion import MotionState, Trajectory
+from ..dynamics.sampling import StepRecord
 from ..dynamics.simulation import Simulation
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
@@ -54,6 +55,8 @@ class Response:
         Estimated error of the positions by the time steps, over the size of the scene.
     count : int
         Number of steps of the last run.
+    record : StepRecord or None
+        The time steps of that run.
     """
 
     times: Array
@@ -62,6 +65,7 @@ class Response:
     end: float
     error_estimate: float
     count: int
+    record: StepRecord | None = field(repr=False, default=None)
 
     def positions(self, node: str) -> Array:
         """Positions of a node, (times, 3) m; SceneError if there is no such node."""
@@ -87,6 +91,7 @@ class Response:
             error_estimate=self.error_estimate,
             error_of="",
             violation={},
+            record=self.record,
         )
 
     @property
@@ -233,7 +238,7 @@ def respond(
             off = _apart(against, {n: best[n][: len(one)] for n, one in against.items()}) / scene.size
         if error <= max(accuracy, 0.1 * off):
             break
-    return Response(replays.times, best, tuple(run.instants), end, error, run.count)
+    return Response(replays.times, best, tuple(run.instants), end, error, run.count, run.record)
 
 
 @dataclass
