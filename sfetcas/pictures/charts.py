@@ -26,9 +26,9 @@ from .curves import FREQUENCIES, Curve, clipped, leave, quantities_named, said, 
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
-from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, plot_line, title_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
 from .showing import Picture, new_figure
-from .sketch import REST, Course, Sketch, course_of, view_of, with_prefix
+from .sketch import REST, Course, Sketch, course_of, unit_for, view_of
 
 __all__ = ["chart", "save_chart"]
 
@@ -36,9 +36,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
 STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-.", "not defined": ":"}
 KINDS = ((True, "stable"), (False, "unstable"), ("neutral", "neutral"), ("not defined", "stability not defined"))
 MARKS = {"limit point": "o", "bifurcation": "s"}
+FREQUENCY, FLUTTERING = "angular frequency", "d"
+"""Of the lowest motions, and the mark where one of them starts to grow."""
 LOADED = 5.0
 """A loaded node is told of unless another one moves by more than this many times as far."""
 
+NARROW = 0.01
+"""Half the width of the axis where nothing moves, over the size of the scene."""
 SHAPES, OVER_EACH_OTHER = 6, 2e-3
 """Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
 SAMPLES = np.linspace(0.0, 1.0, 61)
@@ -101,7 +105,7 @@ def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Pict
             panel.sharex(panels[-1])
             panel.tick_params(labelbottom=False)
             panel.set_xlabel("")
-    legend_above(panels[0], list(_legend(path)))
+    legend_above(panels[0], list(_legend(path, frequencies=any(quantity.name == FREQUENCY for quantity in found))))
     title = title_of(path.scene.title)
     if title:
         figure.suptitle(title, fontsize=11, parse_math=False)
@@ -160,7 +164,7 @@ def _frequencies(path: Path) -> _Quantity:
             if point.omega is not None:
                 row[: len(point.omega)] = np.sort(point.omega)
         tables.append(table)
-    return _Quantity("angular frequency", "rad/s", tables, upright=True)
+    return _Quantity(FREQUENCY, "rad/s", tables, upright=True)
 
 
 def _telling(path: Path) -> _Quantity:
@@ -190,7 +194,8 @@ def _telling(path: Path) -> _Quantity:
 def _displacements(path: Path) -> Iterator[_Quantity]:
     scene = path.scene
     moved = {motion.node for motion in scene.motions.values()}
-    for name, node in scene.nodes.items():
+    # Where nothing moves the first is told of: one that could.
+    for name, node in sorted(scene.nodes.items(), key=lambda entry: entry[1].support != "free"):
         if name not in moved:
             rest = np.asarray(node.position)
             tables = [path.positions(name, i) - rest for i in range(len(path.branches))]
@@ -226,13 +231,17 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity, shapes: Sequence[_
     """Draw a quantity of all branches, and dots where the shapes are."""
     limits = clipped(quantity.every) if quantity.upright else None
     seen = quantity.every if limits is None else np.clip(quantity.every, *limits)
-    unit, letters = with_prefix(float(np.nanmax(np.abs(seen), initial=0.0)), quantity.unit)
+    still = np.array([NARROW * _size(path)])
+    unit, letters = unit_for(still if _still(path, quantity) else seen, quantity.unit)
     ends = list[Curve]()
     for number, branch in enumerate(path.branches):
         colour = _colour(number)
         for column in (quantity.values[number] / unit).T:
             _draw_branch(axes, branch, column, colour, upright=quantity.upright)
             ends.append(Curve(branch.factors, column * unit, colour))
+        if quantity.name == FREQUENCY:
+            for point in branch.flutter_points:
+                axes.plot(point.factor, point.omega / unit, FLUTTERING, color=colour, markersize=7, gid="flutter point")
     for shape in shapes:
         point = quantity.values[shape.branch][shape.index] / unit
         factor = np.full(len(point), path.branches[shape.branch].factors[shape.index])
@@ -242,7 +251,7 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity, shapes: Sequence[_
     names = ("factor", f"{quantity.name}, {letters}".rstrip(", "))
     names = names if quantity.upright else names[::-1]
     axes.set_xlabel(drawn_text(names[0]), parse_math=False)
-    axes.set_ylabel(drawn_text(names[1]), parse_math=False)
+    name_upright(axes, names[1])
     axes.grid(color="#EBEBEB", linewidth=0.6)
     # More numbers like -0.0075 would run into each other.
     axes.locator_params(axis="x", nbins=6)
@@ -266,7 +275,7 @@ def _calm(axes: Axes, path: Path, quantity: _Quantity, unit: float) -> None:
     """Where nothing moves rounding shall not fill the chart."""
     if _still(path, quantity):
         size, values = _size(path) / unit, quantity.every / unit
-        axes.set_xlim(float(values.mean()) - 0.01 * size, float(values.mean()) + 0.01 * size)
+        axes.set_xlim(float(values.mean()) - NARROW * size, float(values.mean()) + NARROW * size)
 
 
 def _still(path: Path, quantity: _Quantity) -> bool:
@@ -280,7 +289,7 @@ def _size(path: Path) -> float:
     return float(np.ptp(points, axis=0).max())
 
 
-def _legend(path: Path) -> Iterator[Line2D]:
+def _legend(path: Path, *, frequencies: bool) -> Iterator[Line2D]:
     seen = {stable for branch in path.branches for stable, _, _ in branch.stretches()}
     for stable, name in KINDS:
         if stable in seen:
@@ -289,6 +298,8 @@ def _legend(path: Path) -> Iterator[Line2D]:
     for kind, mark in MARKS.items():
         if kind in kinds:
             yield Line2D([], [], color="#333333", marker=mark, linestyle="", fillstyle="none", label=kind)
+    if frequencies and path.flutter_points:
+        yield Line2D([], [], color="#333333", marker=FLUTTERING, linestyle="", label="flutter point")
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,9 +20,9 @@ from ..errors import SceneError
 from ..trajectories.controlled_motion import ControlledMotion
 from .curves import COMPONENTS
 from .files import check_ending, save_figure
-from .sheet import drawn_text, legend_above, title_of
+from .sheet import legend_above, name_upright, title_of
 from .showing import Picture, new_figure
-from .sketch import SUPPORT, prefix, with_prefix
+from .sketch import SUPPORT, prefix, unit_for, with_prefix
 
 __all__ = ["control_picture", "save_controls"]
 
@@ -131,7 +131,7 @@ def _unit(motion: ControlledMotion, name: str) -> str:
 def _draw_positions(panel: Axes, motion: ControlledMotion, replay: Trajectory | None, node: str, time: float) -> None:
     """Components of the position of a node over time."""
     times, way = motion.interpolated(node)
-    factor, unit = with_prefix(float(np.abs(way).max()), "m")
+    factor, unit = unit_for(way, "m")
     axes = 3 if motion.transcription.system.model.space else 2
     for i, letter in enumerate("xyz"[:axes]):
         panel.plot(times / time, way[:, i] / factor, color=COMPONENTS[i], linewidth=2.2, label=letter, gid="position")
@@ -147,7 +147,7 @@ def _draw_positions(panel: Axes, motion: ControlledMotion, replay: Trajectory | 
 
 
 def _finish(panel: Axes, name: str) -> None:
-    panel.set_ylabel(drawn_text(name), parse_math=False, fontsize=9)
+    name_upright(panel, name)
     panel.grid(color="#EBEBEB", linewidth=0.6)
     panel.margins(x=0.01)
     legend_above(panel)

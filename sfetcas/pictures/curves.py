@@ -23,9 +23,9 @@ from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .files import check_ending, save_figure
-from .sheet import drawn_text, legend_above, title_of
+from .sheet import legend_above, name_upright, title_of
 from .showing import Picture, new_figure
-from .sketch import with_prefix
+from .sketch import unit_for
 
 __all__ = [
     "COMPONENTS",
@@ -197,13 +197,13 @@ def draw_panel(panel: Axes, name: AnswerName, found: Sequence[Curve]) -> None:
     values = np.concatenate([curve.values for curve in found])
     limits = clipped(values)
     seen = values if limits is None else np.clip(values, *limits)
-    factor, unit = with_prefix(float(np.nanmax(np.abs(seen), initial=0.0)), name.kind.unit)
+    factor, unit = unit_for(seen, name.kind.unit)
     for curve in found:
         style: dict[str, Any] = {"linewidth": 1.5, "color": curve.colour, "gid": f"curve-{name.text}", **curve.look}
         if len(curve.at) == 1:
             style |= {"marker": "o", "markersize": 4.0}
         panel.plot(curve.at, curve.values / factor, label=curve.name or None, **style)
-    panel.set_ylabel(drawn_text(", ".join(filter(None, (said(name), unit)))), parse_math=False, fontsize=9)
+    name_upright(panel, ", ".join(filter(None, (said(name), unit))))
     panel.grid(color="#EBEBEB", linewidth=0.6)
     panel.margins(x=0.01)
     if limits is not None:
@@ -253,4 +253,4 @@ def leave(panel: Axes, found: Sequence[Curve], limits: tuple[float, float], fact
                 panel.plot(curve.at[places], np.full(len(places), edge / factor), marker, color=curve.colour, **style)
                 extremes.append(float(curve.values[beyond][np.argmax(np.abs(curve.values[beyond]))]))
     text = " and ".join(f"{value / factor:.2g}" for value in sorted({min(extremes), max(extremes)}))
-    panel.set_title(f"leaves the axes: up to {text} {unit}".rstrip(), fontsize=8, loc="right", parse_math=False)
+    panel.set_title(f"leaves the axes: up to {text} {unit}".rstrip(), fontsize=8, loc="left", parse_math=False)

@@ -105,6 +105,7 @@ class ModePanels:
         rest = modes.last
         course = course_of(modes.scene, [rest])
         places = [np.linspace(0.0, 1.0, max(SAMPLES, len(line))) for line in course.last]
+        self._unit = course.unit
         self._base = [
             rest.along(name, x)["position"] / course.unit for name, x in zip(course.members, places, strict=True)
         ]
@@ -129,7 +130,7 @@ class ModePanels:
         moved, turned = (
             np.concatenate([np.asarray(f[key], complex) for f in fields]) for key in ("position", "rotation")
         )
-        extent = norm(np.ptp(np.vstack(list(self._base)), axis=0))
+        extent = norm(np.ptp(np.vstack(self._base), axis=0)) * self._unit
         only = np.abs(moved).max() < TWISTING * np.abs(turned).max() * max(extent, TINY)
         of = turned if only else moved
         # The phase at which the sum of squares of the real parts is largest.

@@ -27,9 +27,9 @@ from ..mathematics.arrays import Array
 from .curves import COMPONENTS, draw_panel, quantities_named, table_of, told
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
-from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, plot_line, title_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
 from .showing import Picture, new_figure
-from .sketch import REST, Ink, Sketch, course_of, prefix, view_of
+from .sketch import REST, Ink, Sketch, course_of, prefix, unit_for, view_of
 
 __all__ = ["draw_strobes", "evenly", "histories", "most_moving", "motion_picture", "save_histories", "save_motion"]
 
@@ -199,20 +199,20 @@ def _look_of_answers(motion: Trajectory) -> dict[str, Any]:
 
 def _draw_history(axes: Axes, motion: Trajectory, node: str, quantity: str) -> None:
     values = motion.positions(node) if quantity == "position" else motion.velocities(node)
-    factor, letter = prefix(float(np.abs(values).max()), 0.1)
-    for i, name in enumerate("xyz" if motion.last.model.space else "xy"):
+    letters = "xyz" if motion.last.model.space else "xy"
+    factor, unit = unit_for(values[:, : len(letters)], "m" if quantity == "position" else "m/s")
+    for i, name in enumerate(letters):
         _draw_values(axes, motion, values[:, i] / factor, name, COMPONENTS[i])
-    unit = "m" if quantity == "position" else "m/s"
-    _finish(axes, f"{quantity} of {node}, {letter}{unit}")
+    _finish(axes, f"{quantity} of {node}, {unit}")
 
 
 def _draw_energies(axes: Axes, motion: Trajectory) -> None:
     values = {kind: motion.energies(kind) for kind in ENERGIES}
-    factor, letter = prefix(max(float(np.abs(column).max()) for column in values.values()), 0.1)
+    factor, unit = unit_for(np.array(list(values.values())), "N m")
     for kind, colour in ENERGIES.items():
         # Where one energy is nearly all, it is seen below the dashes of the total.
         _draw_values(axes, motion, values[kind] / factor, kind, colour, "--" if kind == "total" else "-")
-    _finish(axes, f"energy, {letter}N m")
+    _finish(axes, f"energy, {unit}")
 
 
 def _draw_values(axes: Axes, motion: Trajectory, values: Array, name: str, colour: str, dashes: str = "-") -> None:
@@ -223,7 +223,7 @@ def _draw_values(axes: Axes, motion: Trajectory, values: Array, name: str, colou
 
 
 def _finish(axes: Axes, name: str) -> None:
-    axes.set_ylabel(drawn_text(name), parse_math=False)
+    name_upright(axes, name)
     axes.grid(color="#EBEBEB", linewidth=0.6)
     axes.margins(x=0.01)
     legend_above(axes)

@@ -56,6 +56,7 @@ __all__ = [
     "axes_on",
     "drawn_text",
     "legend_above",
+    "name_upright",
     "pieces_of",
     "plot_line",
     "sheet_of",
@@ -139,11 +140,24 @@ def title_of(text: str) -> str:
 
 
 def legend_above(axes: Axes, handles: Sequence[Any] | None = None, columns: int = 4) -> None:
-    """The legend above the frame, where it hides nothing."""
-    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.98), "borderaxespad": 0.2}
+    """The legend above the frame, where it hides nothing; at its left axes tell numbers to be added."""
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
     given = axes.get_legend_handles_labels()[0] if handles is None else handles
     if given:
         axes.legend(handles=given, ncols=columns, fontsize=8, frameon=False, **place)
+
+
+def name_upright(axes: Axes, text: str) -> None:
+    """Write what an upright axis tells, in as many lines as its height asks for, three at most."""
+    part = axes.get_subplotspec()
+    rows = 1 if part is None else part.get_gridspec().nrows
+    letters = max(12, int(72.0 * (axes.figure.bbox.height / axes.figure.dpi / rows - NO_FRAME) / (0.56 * FONT)))
+    lines = textwrap.wrap(drawn_text(text), letters, max_lines=3, placeholder=" ...")
+    axes.set_ylabel("\n".join(lines), parse_math=False, fontsize=FONT)
+
+
+NO_FRAME = 0.45
+"""Inch of the height of a panel that its frame does not have."""
 
 
 def _fill_plane(axes: Axes, sketch: Sketch) -> None:

@@ -44,6 +44,7 @@ __all__ = [
     "rounded",
     "tangents_of",
     "thinned",
+    "unit_for",
     "view_of",
     "with_prefix",
 ]
@@ -81,6 +82,19 @@ def with_prefix(value: float, unit: str, least: float = 0.1) -> tuple[float, str
         return factor, f"{letter}{unit}"
     power = _ten_to(round(math.log10(factor)))
     return factor, f"{power}{unit[1:]}" if unit.startswith("1/") else f"{power} {unit}".rstrip()
+
+
+def unit_for(values: Array, unit: str) -> tuple[float, str]:
+    """Factor and unit for an axis on which values are drawn; of values far from zero that of differences."""
+    known = values[np.isfinite(values)]
+    size = float(np.abs(known).max(initial=0.0))
+    spread = float(np.ptp(known)) if len(known) else 0.0
+    return with_prefix(spread if ROUNDING * size < spread < OFFSET * size else size, unit)
+
+
+ROUNDING, OFFSET = 1e-12, 1e-3
+"""Values that differ by less than the first share of their size are the same; by less than the second, axes tell a
+number to be added."""
 
 
 def _ten_to(power: int) -> str:
