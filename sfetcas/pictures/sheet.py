@@ -151,12 +151,12 @@ def name_upright(axes: Axes, text: str) -> None:
     """Write what an upright axis tells, in as many lines as its height asks for, three at most."""
     part = axes.get_subplotspec()
     rows = 1 if part is None else part.get_gridspec().nrows
-    letters = max(12, int(72.0 * (axes.figure.bbox.height / axes.figure.dpi / rows - NO_FRAME) / (0.56 * FONT)))
+    letters = max(12, int(72.0 * (axes.figure.bbox.height / axes.figure.dpi / rows - NO_FRAME) / (0.6 * FONT)))
     lines = textwrap.wrap(drawn_text(text), letters, max_lines=3, placeholder=" ...")
     axes.set_ylabel("\n".join(lines), parse_math=False, fontsize=FONT)
 
 
-NO_FRAME = 0.45
+NO_FRAME = 0.6
 """Inch of the height of a panel that its frame does not have."""
 
 
