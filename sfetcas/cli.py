@@ -175,6 +175,18 @@ def _add_run(commands: Commands) -> None:
     files = run.add_argument_group("files that are written")
     files.add_argument("--json", type=Path, metavar="OUT", help="the whole answer as JSON")
     files.add_argument("--plot", type=Path, metavar="OUT.png", help="a picture, in the format of its ending")
+    files.add_argument(
+        "--quantity",
+        action="append",
+        metavar="NAME",
+        help="what --plot draws over the load factor or time, as nodes.tip.position.y; may be given several times",
+    )
+    files.add_argument(
+        "--colour",
+        metavar="NAME",
+        help="what the colours of members show: moment, magnitude, twist, curvature, tension, shear, stress or none "
+        "(default: moment)",
+    )
     files.add_argument("--animate", type=Path, metavar="OUT.gif", help="a moving picture, .gif or .mp4")
     files.add_argument("--vtk", type=Path, metavar="DIR", help="a folder of files for ParaView")
     files.add_argument(

@@ -67,10 +67,11 @@ def outputs_of(options: argparse.Namespace, scene: Scene) -> list[Output]:
     SceneError
         A path cannot be written, or there is no such output for this type of analysis.
     """
+    _check_drawn(options, scene)
     makers: dict[str, Callable[[Path, Scene], Writer]] = {
         "json": _json,
-        "plot": _plot,
-        "animate": _animate,
+        "plot": lambda path, scene: _plot(path, scene, options.colour, options.quantity),
+        "animate": lambda path, scene: _animate(path, scene, options.colour),
         "vtk": _vtk,
     }
     found: list[Output] = []
@@ -166,23 +167,51 @@ def _json(path: Path, scene: Scene) -> Writer:
     return lambda answer, there: there.write_text(json.dumps(answer.to_dict(), allow_nan=False) + "\n")
 
 
-def _plot(path: Path, scene: Scene) -> Writer:
+def _check_drawn(options: argparse.Namespace, scene: Scene) -> None:
+    """Refuse what is said of pictures where it changes none that is asked for."""
+    kind = scene.analysis.type
+    if options.quantity and (options.plot is None or kind == "modes"):
+        raise SceneError("--quantity: found without effect, accepted: with --plot of steps, of a path or of a motion")
+    if options.colour is None:
+        return
+    if options.plot is not None and options.quantity and options.animate is None:
+        raise SceneError("--colour: found with --quantity, accepted: one of them, as curves have no such colours")
+    drawn = (options.plot is not None and kind == "static") or (options.animate is not None and kind != "modes")
+    if not drawn:
+        accepted = "with --plot of equilibria, or with --animate of steps, a path or a motion"
+        raise SceneError(f"--colour: found without effect, accepted: {accepted}")
+
+
+def _plot(path: Path, scene: Scene, colour: str | None, quantities: list[str] | None) -> Writer:
     # Matplotlib costs more than most solves: only a picture pays for it.
     from .pictures.charts import save_chart
+    from .pictures.colours import coloured
+    from .pictures.curves import quantities_named, save_curves
     from .pictures.files import check_ending
+    from .pictures.modeshapes import save_modes
     from .pictures.motions import save_motion
     from .pictures.plotting import save_picture
 
     _placed(path, lambda: check_ending(path))
-    writers: dict[str, Writer] = {"path": save_chart, "dynamic": save_motion}
-    return writers.get(scene.analysis.type, save_picture)
+    kind = scene.analysis.type
+    if quantities:
+        _placed("--quantity", lambda: quantities_named(scene, quantities))
+        writers: dict[str, Callable[..., Any]] = {"path": save_chart, "dynamic": save_motion, "static": save_curves}
+        return lambda answer, there: writers[kind](answer, there, quantities=quantities)
+    if kind == "static" and colour is not None:
+        _placed("--colour", lambda: coloured(scene, colour))
+        return lambda answer, there: save_picture(answer, there, colour=colour)
+    usual: dict[str, Writer] = {"path": save_chart, "dynamic": save_motion, "modes": save_modes}
+    return usual.get(kind, save_picture)
 
 
-def _animate(path: Path, scene: Scene) -> Writer:
+def _animate(path: Path, scene: Scene, colour: str | None) -> Writer:
     from .pictures.animation import check_animation, save_animation
+    from .pictures.colours import NONE, coloured
 
     _placed(path, lambda: check_animation(scene, path))
-    return save_animation
+    _placed("--colour", lambda: coloured(scene, colour or NONE))
+    return lambda answer, there: save_animation(answer, there, colour=colour or NONE)
 
 
 def _vtk(path: Path, scene: Scene) -> Writer:
@@ -196,12 +225,12 @@ def _vtk(path: Path, scene: Scene) -> Writer:
     return save_vtk
 
 
-def _placed(path: Path, check: Callable[[], object]) -> None:
-    """Do a check, with the file at the beginning of the message if it fails."""
+def _placed(place: Path | str, check: Callable[[], object]) -> None:
+    """Do a check, with the file or the option at the beginning of the message if it fails."""
     try:
         check()
     except SceneError as error:
-        raise SceneError(str(error), (str(path),)) from None
+        raise SceneError(str(error) if isinstance(place, Path) else error.bare, (str(place),)) from None
 
 
 def _check_writable(path: Path) -> None:

@@ -3,6 +3,7 @@ holds; which of them are fast, and which run only where they are asked for (`dur
 
 import gc
 import os
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -16,6 +17,14 @@ COLLECTED = pytest.StashKey()
 
 # Thousands of tests and the records of their scenes are looked through again and again for nothing.
 gc.set_threshold(20_000, 20, 20)
+
+
+@pytest.fixture(autouse=True)
+def _pictures_closed():
+    """Figures that a test asked for are registered with pyplot, and would stay there."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
 
 
 def durations():

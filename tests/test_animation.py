@@ -1,5 +1,6 @@
 """Animations and files for ParaView: frames and points where the answer says, and every refusal."""
 
+import base64
 import builtins
 import json
 import re
@@ -45,15 +46,15 @@ def made(table):
 # -- animations -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("table", "frames"), [(ENDED, 4), (STEPS, 3), (PATH, 5)], ids=["motion", "steps", "path"])
-def test_a_frame_for_each_answer(write, tmp_path, table, frames):
+@pytest.mark.parametrize(("table", "frames"), [(ENDED, 101), (STEPS, 3), (PATH, 5)], ids=["motion", "steps", "path"])
+def test_a_frame_for_each_step_and_many_of_a_motion(write, tmp_path, table, frames):
     out = tmp_path / "out.gif"
     assert main(["run", str(write(table)), "--animate", str(out)]) == 0
     with Image.open(out) as image:
         assert image.n_frames == frames
         assert image.size == (700, 500)
         shots = []
-        for number in range(frames):
+        for number in range(0, frames, 1 + frames // 10):
             image.seek(number)
             shots.append(np.asarray(image.convert("L"), float))
     assert all(np.abs(a - b).max() > 100 for a, b in zip(shots, shots[1:]))
@@ -62,10 +63,10 @@ def test_a_frame_for_each_answer(write, tmp_path, table, frames):
 @pytest.mark.parametrize("table", [ENDED, {**SPACE, "analysis": {**SPACE["analysis"], "end": 0.1}}])
 def test_a_frame_shows_its_answer_and_supports_keep_their_sides(table):
     motion = made(table)
-    film = _Film(motion.steps, "", gravity=1.0)
+    film = _Film(motion.steps, ["now"] * len(motion.steps), 10, "", gravity=1.0)
     axes, seen = (3 if motion.last.model.space else 2), []
     for number, step in enumerate(motion.steps):
-        film.show(number, "now")
+        film.show(number)
         lines = [line for line in film.figure.findobj() if getattr(line, "get_gid", lambda: None)() == "deformed"]
         for line, member in zip(lines, motion.scene.members.values(), strict=True):
             drawn = np.stack(line.get_data_3d() if axes == 3 else line.get_data(), axis=1)
@@ -77,25 +78,23 @@ def test_a_frame_shows_its_answer_and_supports_keep_their_sides(table):
 
 
 @pytest.mark.parametrize(
-    ("times", "count", "rate", "said"),
+    ("span", "count", "rate", "said"),
     [
-        (np.linspace(0, 4, 81), 81, 20, ""),
-        (np.linspace(0, 4, 1001), 101, 25, ""),
-        (np.linspace(0, 0.02, 101), 101, 25, " (slowed 200 times)"),
-        (np.linspace(0, 100, 101), 101, 10, " (sped up 10 times)"),
-        (np.linspace(0, 100, 5001), 200, 10, " (sped up 5 times)"),
-        (np.array([0.0]), 1, 25, ""),
+        (4.0, 101, 25, ""),
+        (1.0, 26, 25, ""),
+        (16.0, 200, 12, ""),
+        (0.02, 101, 25, " (slowed 200 times)"),
+        (100.0, 200, 10, " (sped up 5 times)"),
+        (0.0, 1, 25, ""),
     ],
 )
-def test_pace(times, count, rate, said):
-    chosen, found, text = _paced(times)
-    assert (len(chosen), found, text) == (count, rate, said)
-    assert chosen[-1] == len(times) - 1
+def test_pace(span, count, rate, said):
+    assert _paced(span) == (count, rate, said)
 
 
 REFUSED = {
     "ending": (FALLING, "out.avi", "found the ending '.avi' of an animation, accepted: .gif, .mp4"),
-    "one step": (scenes.cantilever(), "out.gif", "found one step to animate, accepted: a motion, a path"),
+    "one step": (scenes.cantilever(), "out.gif", "found one step to animate, accepted: a motion, modes, a path"),
     "all": (scenes.cantilever(analysis={"equilibria": "all", "steps": [1, 2]}), "out.gif", "found equilibria = 'all'"),
 }
 
@@ -146,7 +145,34 @@ def test_what_a_failed_motion_reached_is_animated(write, tmp_path):
     struck = {**STRUCK, "analysis": {**STRUCK["analysis"], "output": 0.05}}
     assert main(["run", str(write(struck)), "--animate", str(out)]) == 3
     with Image.open(out) as image:
-        assert image.n_frames == 3
+        assert image.n_frames == 101
+
+
+def test_colours_move_with_one_scale(tmp_path):
+    solution = made(STEPS)
+    steps, names = solution.steps, [f"{step.factor}" for step in solution.steps]
+    film = _Film(steps, names, 10, "", gravity=0.0, colour="moment")
+    for number, step in enumerate(steps):
+        film.show(number)
+        (pieces,) = [one for one in film.figure.findobj() if getattr(one, "get_gid", lambda: None)() == "deformed"]
+        moments = step.along("m", np.linspace(0, 1, 1 + len(pieces.get_array())))["moment"][:, 2]
+        np.testing.assert_allclose(pieces.get_array(), 0.5 * (moments[1:] + moments[:-1]), rtol=1e-6, atol=1e-9)
+        assert pieces.norm.vmax == pytest.approx(steps[-1].along("m", [0.0])["moment"][0, 2], rel=0.02)
+
+
+def test_an_animation_shows_itself_in_a_notebook_and_writes_a_file(tmp_path):
+    solution = made(STEPS)
+    shown = solution.animate()._repr_html_()
+    head, _, content = shown.partition("base64,")
+    assert head == '<img alt="animation" src="data:image/gif;'
+    assert base64.b64decode(content.removesuffix('">')).startswith(b"GIF89a")
+    file = solution.animate(tmp_path / "out.gif", colour="moment")
+    assert file == tmp_path / "out.gif"
+    assert file.read_bytes().startswith(b"GIF89a")
+    with pytest.raises(SceneError, match="found one step to animate"):
+        made(scenes.cantilever()).animate()
+    with pytest.raises(SceneError, match="colour: found 'red'"):
+        solution.animate(colour="red")
 
 
 # -- files for ParaView ------------------------------------------------------------------------------

@@ -239,11 +239,16 @@ ORDER = [
     "pictures.limits",
     "pictures.glyphs",
     "pictures.looks",
+    "pictures.colours",
     "pictures.files",
+    "pictures.showing",
     "pictures.sheet",
     "pictures.plotting",
+    "pictures.curves",
     "pictures.charts",
     "pictures.motions",
+    "pictures.controls",
+    "pictures.modeshapes",
     "pictures.fronts",
     "pictures.animation",
     "pictures.paraview",
@@ -282,10 +287,14 @@ PROGRAMS = ("cli", "reports")
 
 PICTURES = (
     "pictures.files",
+    "pictures.showing",
     "pictures.sheet",
     "pictures.plotting",
+    "pictures.curves",
     "pictures.charts",
     "pictures.motions",
+    "pictures.controls",
+    "pictures.modeshapes",
     "pictures.fronts",
     "pictures.animation",
 )
@@ -294,6 +303,13 @@ PICTURES = (
 
 HEAVY = {"scipy", "tqdm"}
 """Packages that take long to import and that few runs need: they may be imported where they are used."""
+
+DRAWING = ("plot", "animate")
+"""Methods by which answers draw themselves: the only ones that import from the pictures, and only when they are called.
+"""
+
+PYPLOT = "pictures.showing"
+"""The module that imports pyplot, which looks for a window system, when a figure is to be shown."""
 
 DISPATCHERS = ("analyses", "outputs", "cli", "equilibria.statics")
 """What chooses, by a scene or by the words of a command, among much of which a run needs little: it imports what it
@@ -364,10 +380,22 @@ def taken():
 
 
 @functools.cache
+def drawn_by_methods(name):
+    """Imports of pictures in the methods that draw, and of their types for type checkers."""
+    places = [n for n in nodes(name) if isinstance(n, ast.FunctionDef) and n.name in DRAWING]
+    places += [n for n in nodes(name) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
+    found = [n for place in places for n in ast.walk(place) if isinstance(n, ast.ImportFrom)]
+    return {n for n in found if n.module == "matplotlib.figure" or str(n.module).startswith("pictures.")}
+
+
+@functools.cache
 def imported(name):
     """(own modules, other top-level packages) that a module imports, also inside functions."""
     own, other = set(), set()
+    drawing = drawn_by_methods(name)
     for node in nodes(name):
+        if node in drawing:
+            continue
         if isinstance(node, ast.ImportFrom):
             if node.level or node.module.split(".")[0] == "sfetcas":
                 own |= sources(name, node)
@@ -437,6 +465,9 @@ def test_imports_stand_at_the_top(name):
         if node in imports
     }
     # SciPy, each of whose parts takes a quarter to a half of the time in which sfetcas is imported, never at the top.
+    inside -= drawn_by_methods(name)
+    if name == PYPLOT:
+        inside = {node for node in inside if ast.unparse(node) != "from matplotlib import pyplot"}
     scipy = {node for node in imports if any(str(package).split(".")[0] == "scipy" for package in packages(node))}
     assert scipy <= inside
     if name not in DISPATCHERS:

@@ -11,6 +11,7 @@ from matplotlib.text import Text
 from moving import FALLING, SPACE
 
 from sfetcas import Scene, SceneError, solve
+from sfetcas.dynamics import sampling
 from sfetcas.pictures.files import ENDINGS
 from sfetcas.pictures.motions import histories, most_moving, motion_picture, save_histories, save_motion
 
@@ -32,21 +33,20 @@ def data(line):
 
 
 @both
-def test_positions_are_those_of_answers_evenly_over_the_time(motions, name):
+def test_positions_are_those_of_the_motion_evenly_over_the_time(motions, name):
     motion = motions[name]
     axes = 3 if motion.last.model.space else 2
     lines = named(motion_picture(motion), "strobe")
     members = list(motion.scene.members)
     assert len(lines) == 10 * len(members)
     wanted = np.linspace(0, motion.times[-1], 10)
-    for i, time in enumerate(wanted):
-        step = motion.at(time)
-        # Answers are 0.02 s apart: the nearest is drawn.
-        assert abs(step.time - time) <= 0.01 + 1e-12
+    for i, (time, step) in enumerate(zip(wanted, motion.between(wanted), strict=True)):
+        assert step.time == pytest.approx(time, abs=1e-12)
         for j, member in enumerate(members):
             drawn = data(lines[i * len(members) + j])
             for end, node in zip((0, -1), motion.scene.members[member].nodes, strict=True):
-                np.testing.assert_allclose(drawn[end], step.position(node)[:axes], atol=1e-12)
+                # Rotations along the member and displacements of nodes are interpolated each by itself.
+                np.testing.assert_allclose(drawn[end], step.position(node)[:axes], atol=1e-8)
     widths = [line.get_linewidth() for line in lines]
     assert widths == sorted(widths)
     assert widths[0] < widths[-1]
@@ -54,19 +54,23 @@ def test_positions_are_those_of_answers_evenly_over_the_time(motions, name):
     assert shades == sorted(shades, reverse=True)
 
 
-def test_way_of_the_free_end_goes_through_all_answers(motions):
+def test_way_of_the_free_end_goes_through_all_steps(motions):
     motion = motions["plane"]
     figure = motion_picture(motion)
     (way,) = named(figure, "way-B")
-    np.testing.assert_allclose(data(way), motion.positions("B")[:, :2], atol=1e-12)
+    fine = motion.resampled()
+    np.testing.assert_allclose(data(way), fine.positions("B")[:, :2], atol=1e-12)
+    assert set(motion.times) < set(fine.times)
+    # 30 steps: more than answers, and none of them is left out.
+    assert all(np.abs(fine.times - end).min() < 1e-12 for end in 0.01 * np.arange(31))
     assert [text.get_text() for text in named(figure, "way-B", Text)] == ["B"]
     assert not named(figure, "way-A")
 
 
 @both
-def test_histories_and_energies_are_those_of_the_answer(motions, name):
-    motion = motions[name]
-    figure = motion_picture(motion)
+def test_histories_and_energies_are_those_of_the_motion(motions, name):
+    figure = motion_picture(motions[name])
+    motion = motions[name].resampled()
     above, below = (axes for axes in figure.axes if axes.get_ylabel().startswith(("position", "energy")))
     node = "C" if name == "space" else "B"
     assert most_moving(motion) == node
@@ -111,6 +115,91 @@ def test_small_and_quick_motions_have_prefixes():
     assert any(label.startswith("energy, ") and label.endswith("N m") and label != "energy, N m" for label in labels)
 
 
+def few(table, output):
+    return solve(Scene.from_dict({**table, "analysis": {**table["analysis"], "output": output}}))
+
+
+@pytest.mark.parametrize("table", [FALLING, SPACE], ids=["plane", "space"])
+def test_states_between_answers_are_those_of_a_run_that_is_asked_for_them(table):
+    end = table["analysis"]["end"]
+    coarse, close = few(table, end), few(table, end / 60)
+    assert len(coarse.steps) == 2
+    found = coarse.between(close.times)
+    for one, other in zip(found, close.steps, strict=True):
+        for node in close.scene.nodes:
+            # The same steps; a run that goes on knows fewer of them beyond its first answers, and takes polynomials
+            # of stages there.
+            np.testing.assert_allclose(one.position(node), other.position(node), atol=1e-6)
+            np.testing.assert_allclose(one.velocity(node), other.velocity(node), atol=1e-4)
+        assert one.energy["total"] == pytest.approx(other.energy["total"], abs=1e-4)
+    assert found[0] is coarse.steps[0]
+    assert found[-1] is coarse.steps[1]
+    drawn = data(named(motion_picture(coarse), f"way-{most_moving(close)}")[0])
+    assert len(drawn) > 100
+
+
+def test_times_outside_the_motion_are_refused(motions):
+    for time in (-0.01, 0.31):
+        with pytest.raises(SceneError, match=r"accepted: times from 0 to 0\.3 s"):
+            motions["plane"].between([0.1, time])
+
+
+def test_a_motion_of_idas_is_drawn_through_its_answers():
+    table = {key: value for key, value in FALLING["analysis"].items() if key != "step"}
+    heavy = {"strip": {**FALLING["sections"]["strip"], "rhoI": [0.0, 0.0, 1e-3]}}
+    analysis = {**table, "integrator": "idas", "output": 0.05}
+    motion = solve(Scene.from_dict({**FALLING, "sections": heavy, "analysis": analysis}))
+    assert motion.resampled() is motion
+    with pytest.raises(SceneError, match="found integrator 'idas'"):
+        motion.between([0.01])
+    (above, *_) = (axes for axes in motion_picture(motion).axes if axes.get_ylabel().startswith("position"))
+    assert len(data(above.get_lines()[0])) == len(motion.steps)
+    assert above.get_lines()[0].get_marker() == "."
+
+
+def test_a_record_of_many_steps_keeps_its_room(monkeypatch):
+    full = few(FALLING, 0.3)
+    monkeypatch.setattr(sampling, "ROOM", full.record._bytes // 3)
+    thin = few(FALLING, 0.3)
+    assert thin.record._bytes <= full.record._bytes // 3
+    ends = thin.record.times
+    assert len(ends) < len(full.record.times)
+    assert {ends[0], full.record.times[-1]} <= {full.record.times[0], ends[-1]}
+    times = ends[ends <= full.last.time / full.last.mover.time] * full.last.mover.time
+    for one, other in zip(thin.between(times), full.between(times), strict=True):
+        # Ends of steps that are kept are nodes of the polynomials.
+        np.testing.assert_allclose(one.position("B"), other.position("B"), atol=1e-12)
+    # Between them by intervals of 0.04 s, in a fall of 0.3 s during which the beam vibrates.
+    between = 0.5 * (times[1:] + times[:-1])
+    for one, other in zip(thin.between(between), full.between(between), strict=True):
+        np.testing.assert_allclose(one.position("B"), other.position("B"), atol=2e-4)
+
+
+def test_quantities_over_time_by_name(motions):
+    motion = motions["plane"]
+    figure = motion_picture(motion, quantities=["members.beam.moment at 0.5", "energy.kinetic"])
+    panels = [axes for axes in figure.axes if axes.get_ylabel().startswith(("members", "energy"))]
+    assert [axes.get_ylabel() for axes in panels] == ["members.beam.moment at 0.5, N m", "energy.kinetic, J"]
+    fine = motion.resampled()
+    (line,) = panels[0].get_lines()
+    moments = [step.along("beam", [0.5])["moment"][0, 2] for step in fine.steps]
+    np.testing.assert_allclose(data(line), np.stack([fine.times, moments], axis=1))
+    alone = histories(motion, quantities=["nodes.B.velocity"])
+    assert [line.get_label() for line in alone.axes[0].get_lines()] == ["x", "y"]
+    for wrong, sentence in (
+        (["nodes.C.position"], "found 'C'"),
+        (["certificate.residual"], "told of statics only"),
+        (["members.beam.moment"], "accepted: members.beam.moment at 0.5, or another place"),
+        (["nodes.B.position step 2"], "accepted: nodes.B.position"),
+        ([], "accepted: a list of names"),
+        ("nodes.B.position", "accepted: a list of names"),
+    ):
+        with pytest.raises(SceneError, match=sentence):
+            motion_picture(motion, quantities=wrong)
+    with pytest.raises(SceneError, match="found nodes and quantities"):
+        histories(motion, ["B"], quantities=["energy.total"])
+
+
 @both
 @pytest.mark.parametrize("draw", [motion_picture, histories])
 def test_nothing_is_clipped_or_overlaps(motions, name, draw, monkeypatch):
@@ -142,8 +231,8 @@ def test_a_single_answer_is_drawn_without_complaint(motions):
 
 
 def test_histories_of_nodes_by_name(motions):
-    motion = motions["space"]
-    figure = histories(motion, ["C", "B"])
+    motion = motions["space"].resampled()
+    figure = histories(motions["space"], ["C", "B"])
     assert [axes.get_ylabel() for axes in figure.axes] == [
         f"{what} of {node}, {unit}" for node in "CB" for what, unit in (("position", "m"), ("velocity", "m/s"))
     ]

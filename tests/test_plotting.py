@@ -169,7 +169,7 @@ def test_size_of_the_moment_or_no_colour():
     assert named(figure, "deformed")[0].get_array().min() >= 0
     assert bar(figure).get_ylabel() == "size of bending moment, N m"
     assert len(picture(solution, colour="none").axes) == 1
-    with pytest.raises(SceneError, match="accepted: moment, magnitude, none"):
+    with pytest.raises(SceneError, match="accepted: curvature, magnitude, moment, none, shear, stress, tension, twist"):
         picture(solution, colour="red")
 
 

@@ -14,7 +14,7 @@ from ..mathematics.arrays import Array
 from ..mechanics.equations import State
 from .integrating import Memory, Stepper, Taken, integrate
 from .methods import Method
-from .sampling import Sample, Sampler
+from .sampling import Sample, Sampler, StepRecord
 from .stages import StageEquations
 
 __all__ = ["SHORTEST", "InitialState", "Integrator", "Stages", "TimeGrid"]
@@ -96,7 +96,11 @@ class Integrator(abc.ABC):
         Number of steps so far.
     gap, norm : float
         Largest error so far of the constraints, and of the unit norms of quaternions.
+    record : StepRecord or None
+        The steps so far; None where there is nothing to interpolate between them with.
     """
+
+    record: StepRecord | None = None
 
     def __init__(self, system: StageEquations, progress: Callable[[float], Any] | None = None) -> None:
         self.system, self._progress = system, progress
@@ -140,7 +144,7 @@ class Stages(Integrator):
         rates = np.zeros((method.kept, len(begun.x)))
         rates[0] = begun.v
         memory = Memory(0.0, state.q, state.y, state.lam, begun.x, rates, state.unwrapped)
-        self._sampler = Sampler(course.times, method.stages)
+        self._sampler, self.record = Sampler(course.times, method.stages), StepRecord(method.stages)
         steps = integrate(
             stepper,
             memory,
@@ -154,6 +158,7 @@ class Stages(Integrator):
             within = taken.begin.t < course.end * (1.0 - tolerances.DECIMAL)
             if within:
                 self._judge(taken)
+            self.record.feed(taken)
             yield from self._sampler.feed(taken)
             if within:
                 self.proceed(taken.after.t)

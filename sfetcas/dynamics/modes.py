@@ -8,15 +8,18 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import tolerances
-from ..description.records import counted
+from ..description.records import counted, nearest
 from ..description.scene import Scene
 from ..description.showing import notes_in_words, number_in_words, shown
 from ..description.supports import check_floating
@@ -26,6 +29,7 @@ from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..equilibria.solution import Equilibrium, heading, heading_in_words
 from ..errors import SceneError, SolveError, Status
+from ..mathematics import quaternion
 from ..mathematics.arrays import TINY, Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
 from ..mathematics.threads import single_threaded
@@ -40,6 +44,11 @@ from ..solvers.stability import Stability
 from .buckling import buckling_factors
 from .matrices import Matrices, matrices_of
 from .small_motion import Eigenmotions, SmallMotion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..pictures.animation import Animation
 
 __all__ = [
     "HALVINGS",
@@ -86,6 +95,8 @@ class Mode:
         ``rotation`` (3,) rad, both in the fixed axes; complex with damping.
     members : mapping
         For each member fractions of its length ``s`` (n,) and the displacement ``position`` (n, 3) m there.
+    change : ndarray (unknowns,)
+        The eigenvector, normalised in the same way, from which :meth:`Modes.along` takes the shape anywhere.
     """
 
     omega: float
@@ -93,6 +104,7 @@ class Mode:
     mass: float
     nodes: Mapping[str, Mapping[str, Array]] = field(repr=False)
     members: Mapping[str, Mapping[str, Array]] = field(repr=False)
+    change: Array = field(repr=False)
 
     def __repr__(self) -> str:
         damped = f"damping ratio {self.damping:.6g}" if self.damping else ""
@@ -191,6 +203,52 @@ class Modes:
     def matrices(self) -> Matrices:
         """Mass, damping, gyroscopic, stiffness and constraint matrices of the small motions, in SI units."""
         return matrices_of(self.motion)
+
+    def along(self, number: int, member: str, at: ArrayLike) -> dict[str, Array]:
+        """A mode shape at any places along a member.
+
+        Parameters
+        ----------
+        number : int
+            Of the mode, counted from 0.
+        member : str
+        at : (n,)
+            Fractions of its length.
+
+        Returns
+        -------
+        dict of ndarray
+            The displacement ``position`` (n, 3) m and the ``rotation`` (n, 3) rad of the sections, fixed axes, for the
+            shape as it is normalised in :class:`Mode`; complex with damping.
+
+        Raises
+        ------
+        SceneError
+            There is no such mode or member.
+        """
+        if not 0 <= number < len(self.modes):
+            raise SceneError(f"found mode {number}, accepted: 0 to {len(self.modes) - 1}")
+        if member not in self.scene.members:
+            raise SceneError(f"found member {member!r}; {nearest(member, self.scene.members)}")
+        shape, places = self.modes[number].change, np.atleast_1d(np.asarray(at, dtype=float))
+        parts = [shape.real] + ([shape.imag] if np.iscomplexobj(shape) else [])
+        tables = [_along(self.motion, part, member, places) for part in parts]
+        return {key: _joined([table[key] for table in tables]) for key in tables[0]}
+
+    def plot(self, **how: Any) -> Figure:
+        """The lowest mode shapes over the equilibrium, see :func:`~sfetcas.pictures.modeshapes.mode_picture`."""
+        from ..pictures.modeshapes import mode_picture
+
+        return mode_picture(self, **how)
+
+    def animate(self, file: str | os.PathLike[str] | None = None) -> Animation | File:
+        """The mode shapes moving through one period, see :func:`~sfetcas.pictures.animation.animation`.
+
+        The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
+        """
+        from ..pictures.animation import animated
+
+        return animated(self, file)
 
     def values(self) -> dict[str, Any]:
         """The quantities under ``modes`` in the JSON answer, without the shapes."""
@@ -435,6 +493,7 @@ def _mode(motion: SmallMotion, found: Eigenmotions, number: int) -> Mode:
         mass=masses.mass * scales.length**2 * kinetic / abs(unit) ** 2,
         nodes={n: {k: v / unit for k, v in e.items()} for n, e in nodes.items()},
         members={n: {"s": motion.model.along(n), "position": e["position"] / unit} for n, e in members.items()},
+        change=shape / unit,
     )
 
 
@@ -442,27 +501,45 @@ def _joined(parts: list[Array]) -> Array:
     return parts[0] if len(parts) == 1 else parts[0] + 1j * parts[1]
 
 
-def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, Array]], dict[str, dict[str, Array]]]:
-    """Displacements (m) and rotations of nodes, and displacements along members, of a change of the unknowns."""
-    equations, model = motion.equations, motion.model
+def _sides(motion: SmallMotion, shape: Array) -> tuple[Fields, Fields, float]:
+    """The state moved a little ahead and back along a change of the unknowns, and one over the step between."""
+    equations = motion.equations
     size = float(np.abs(shape).max(initial=0.0)) or 1.0
     step = np.zeros(equations.total)
     step[: motion.unknowns] = STEP / size * shape
-    sides = [Fields(equations, equations.moved(motion.state, sign * step), motion.loading) for sign in (1.0, -1.0)]
-    scale = size / (2.0 * STEP)
+    ahead, behind = (
+        Fields(equations, equations.moved(motion.state, sign * step), motion.loading) for sign in (1.0, -1.0)
+    )
+    return ahead, behind, size / (2.0 * STEP)
+
+
+def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, Array]], dict[str, dict[str, Array]]]:
+    """Displacements (m) and rotations of nodes, and displacements along members, of a change of the unknowns."""
+    equations, model = motion.equations, motion.model
+    ahead, behind, scale = _sides(motion, shape)
     nodes: dict[str, dict[str, Array]] = {}
     for name in model.nodes:
-        ahead, behind = (side.position(name) for side in sides)
-        nodes[name] = {"position": scale * (ahead - behind)}
+        nodes[name] = {"position": scale * (ahead.position(name) - behind.position(name))}
         turn = model.rotations.node_turn[name]
         if turn is not None:
             nodes[name]["rotation"] = _rotation(equations, turn, shape)
     members = {}
     for name in model.scene.members:
         places = model.along(name)
-        ahead, behind = (side.along(name, places)["position"] for side in sides)
-        members[name] = {"position": scale * (ahead - behind)}
+        moved = ahead.along(name, places)["position"] - behind.along(name, places)["position"]
+        members[name] = {"position": scale * moved}
     return nodes, members
+
+
+def _along(motion: SmallMotion, shape: Array, member: str, places: Array) -> dict[str, Array]:
+    """Displacements (n, 3) m and rotations (n, 3) rad along a member, of a change of the unknowns."""
+    ahead, behind, scale = _sides(motion, shape)
+    one, other = ahead.along(member, places), behind.along(member, places)
+    if motion.model.space:
+        turn = quaternion.rotation_vector(quaternion.multiply(one["rotation"], quaternion.conjugate(other["rotation"])))
+    else:
+        turn = np.pad(one["rotation"] - other["rotation"], ((0, 0), (2, 0)))
+    return {"position": scale * (one["position"] - other["position"]), "rotation": scale * turn}
 
 
 def _rotation(equations: Equations, turn: int, shape: Array) -> Array:

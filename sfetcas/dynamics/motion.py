@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..description.answers import MOTION
 from ..description.records import counted, plain
 from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
 from ..equilibria.solution import Configuration, heading, heading_in_words
-from ..errors import Status
+from ..errors import SceneError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.threads import single_threaded
 from ..mechanics.balance import three
 from ..mechanics.equations import Equations, State
 from ..mechanics.fields import Fields
@@ -22,8 +26,11 @@ from ..mechanics.model import Model
 from .projecting import factor_closings
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..pictures.animation import Animation
     from .inertia import Inertia
-    from .sampling import Sample
+    from .sampling import Sample, StepRecord
 
 __all__ = ["MotionState", "Mover", "Trajectory"]
 
@@ -190,6 +197,8 @@ class Trajectory:
     notes : tuple of str
     failure : str
         Why the motion ended early; empty where it did not.
+    record : StepRecord or None
+        The time steps of the integrator, which :meth:`between` and :meth:`resampled` interpolate; None of ``idas``.
     """
 
     scene: Any = field(repr=False)
@@ -203,6 +212,7 @@ class Trajectory:
     violation: Mapping[str, float]
     notes: tuple[str, ...] = ()
     failure: str = ""
+    record: StepRecord | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
         answers = f"{counted(len(self.steps), 'answer')} from {self.steps[0].time:g} to {self.last.time:g} s"
@@ -234,6 +244,59 @@ class Trajectory:
         """The state of the answer whose time is nearest to a time in s; nothing is interpolated."""
         return self.steps[int(np.abs(self.times - time).argmin())]
 
+    @single_threaded
+    def between(self, times: ArrayLike) -> tuple[MotionState, ...]:
+        """States at any times between the first and the last answer, interpolated between the time steps.
+
+        Parameters
+        ----------
+        times : (n,), s
+            At the time of an answer the state is that of the answer.
+
+        Raises
+        ------
+        SceneError
+            A time is outside, or the integrator is ``idas``, which does not tell its steps.
+        """
+        wanted, own = np.atleast_1d(np.asarray(times, dtype=float)), self.times
+        outside = [t for t in wanted if not own[0] <= t <= own[-1]]
+        if outside:
+            raise SceneError(f"found {outside[0]:g} s, accepted: times from {own[0]:g} to {own[-1]:g} s")
+        answered = np.abs(own - wanted[:, None]).argmin(axis=1) if len(wanted) else []
+        record, mover, found = self.record, self.last.mover, list[MotionState]()
+        for t, i in zip(wanted, answered, strict=True):
+            if own[i] == t:
+                found.append(self.steps[i])
+            elif record is None:
+                raise SceneError(f"found integrator {self.integrator!r}, which tells the times of the answer only")
+            else:
+                found.append(mover.instant(record.sample(t / mover.time)))
+        return tuple(found)
+
+    def resampled(self, most: int = 800, least: int = 200) -> Trajectory:
+        """The same motion told more closely: at its answers and at the ends of time steps.
+
+        Pictures are drawn from it.  Where steps are longer than a share 1 / ``least`` of the time there are states
+        between them, and of steps shorter than a share 1 / ``most`` some are passed over.  A motion integrated by
+        ``idas`` is returned as it is.
+        """
+        if self.record is None or len(self.steps) < 2:
+            return self
+        own = self.times
+        span = float(own[-1] - own[0])
+        ends = self.record.times * self.last.mover.time
+        marks = np.unique([*own, *ends[(ends > own[0]) & (ends < own[-1])]])
+        parts = np.maximum(1, np.ceil(np.diff(marks) * (least / span) * (1.0 - 1e-9))).astype(int)
+        filled = np.concatenate([np.linspace(a, b, n + 1)[1:] for a, b, n in zip(marks, marks[1:], parts)])
+        times, answers = [float(own[0])], set(own.tolist())
+        for t in filled.tolist():
+            near = t - times[-1] < span / most
+            if t in answers and near and times[-1] not in answers:
+                times[-1] = t
+            elif t in answers or not near:
+                times.append(t)
+        return replace(self, steps=self.between(times))
+
     def positions(self, node: str) -> Array:
         """Positions of a node over the times, (times, 3) m."""
         return np.array([step.position(node) for step in self.steps])
@@ -249,6 +312,21 @@ class Trajectory:
     def energies(self, kind: str = "total") -> Array:
         """Energies over the times, (times,) N m; ``kind`` is kinetic, elastic, loads or total."""
         return np.array([step.energy[kind] for step in self.steps])
+
+    def plot(self, **how: Any) -> Figure:
+        """Positions over each other and curves over time, see :func:`~sfetcas.pictures.motions.motion_picture`."""
+        from ..pictures.motions import motion_picture
+
+        return motion_picture(self, **how)
+
+    def animate(self, file: str | os.PathLike[str] | None = None, **how: Any) -> Animation | File:
+        """A moving picture, see :func:`~sfetcas.pictures.animation.animation`.
+
+        The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
+        """
+        from ..pictures.animation import animated
+
+        return animated(self, file, **how)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries; each quantity is a list over ``times``."""

@@ -17,9 +17,9 @@ from .. import tolerances
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, unit
 from ..mathematics.interpolation import differentiation, evaluation
-from .integrating import Taken
+from .integrating import Memory, Taken
 
-__all__ = ["Sample", "Sampler", "between"]
+__all__ = ["Sample", "Sampler", "StepRecord", "between"]
 
 DOUBTFUL = 10.0
 """How much more one node less may change the polynomial through ends: that of all stages does not show its error."""
@@ -96,20 +96,89 @@ class Sampler:
 
     def at(self, t: float) -> Sample:
         """The sample at a time within the steps that are there."""
-        ends = [taken.after.t for taken in self._steps]
-        k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-        found = []
-        for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // self._stages), slice(0, None))):
-            if chosen.start == 0 or len(ends) >= NODES:
-                first = max(0, min(k - (around - 1) // 2, len(ends) - around))
-                found.append(_interpolated(self._steps[first : first + around], self._steps[k], t, chosen))
-        ends_only, doubt = found[0]
-        sample = ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
-        if t != 0.0:
-            return sample
-        # How it begins is known; from rest nothing turns.
-        v = self._steps[0].begin.rates[0]
-        return replace(sample, v=v, spin=sample.spin if v.any() else np.zeros_like(sample.spin))
+        return _within(self._steps, self._stages, t)
+
+
+class StepRecord:
+    """The time steps of a motion, from which its state at any time is interpolated when it is asked for.
+
+    It keeps at most :data:`ROOM` bytes: of a motion with more steps it keeps every second one, every fourth, and so on.
+
+    Parameters
+    ----------
+    stages : int
+        Number of stages of a step.
+    """
+
+    def __init__(self, stages: int) -> None:
+        self._stages = stages
+        # Each piece is smooth; the steps of one piece are numbered from 1.
+        self._pieces: list[list[Taken]] = []
+        self._number, self._every, self._bytes = 0, 1, 0
+
+    def feed(self, taken: Taken) -> None:
+        """Keep a further step."""
+        if taken.begin.last is None:
+            self._pieces.append([])
+            self._number = 0
+        piece = self._pieces[-1]
+        if self._number and (self._number - 1) % self._every:
+            # The last step is kept only until there is a later one.
+            self._bytes -= _bytes(piece.pop())
+        self._number += 1
+        piece.append(replace(taken, begin=_alone(taken.begin), after=_alone(taken.after), lam=NOTHING))
+        self._bytes += _bytes(taken)
+        if self._bytes > ROOM:
+            self._every *= 2
+            self._pieces = [[*steps[:-1:2], steps[-1]] for steps in self._pieces]
+            self._bytes = sum(_bytes(step) for steps in self._pieces for step in steps)
+
+    @property
+    def times(self) -> Array:
+        """Begin of the first step and ends of those that are kept, rising, dimensionless; empty without a step."""
+        ends = [step.after.t for steps in self._pieces for step in steps]
+        return np.array([self._pieces[0][0].begin.t, *ends] if ends else [])
+
+    def sample(self, t: float) -> Sample:
+        """The state at a dimensionless time between the first and the last of :attr:`times`."""
+        ends = [steps[-1].after.t for steps in self._pieces]
+        piece = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
+        return _within(self._pieces[piece], self._stages, t)
+
+
+ROOM = 2**25
+"""Bytes of the steps that a motion keeps."""
+
+NOTHING = np.zeros(0)
+
+
+def _alone(memory: Memory) -> Memory:
+    """A state without the steps before it and the multipliers, which interpolation does not need."""
+    return replace(memory, last=None, lam=NOTHING)
+
+
+def _bytes(taken: Taken) -> int:
+    """Size of what is kept of a step, nearly."""
+    after = taken.after
+    return sum(part.nbytes for part in (taken.turns, taken.shifts, taken.x, after.q, after.y, after.x, after.rates))
+
+
+def _within(steps: Sequence[Taken], stages: int, t: float) -> Sample:
+    """The sample at a time within smoothly connected steps."""
+    ends = [taken.after.t for taken in steps]
+    k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
+    found = []
+    for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // stages), slice(0, None))):
+        if chosen.start == 0 or len(ends) >= NODES:
+            first = max(0, min(k - (around - 1) // 2, len(ends) - around))
+            found.append(_interpolated(steps[first : first + around], steps[k], t, chosen))
+    ends_only, doubt = found[0]
+    sample = ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
+    if t != 0.0:
+        return sample
+    # How it begins is known; from rest nothing turns.
+    v = steps[0].begin.rates[0]
+    return replace(sample, v=v, spin=sample.spin if v.any() else np.zeros_like(sample.spin))
 
 
 def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> tuple[Sample, float]:

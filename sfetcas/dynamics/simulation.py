@@ -33,6 +33,7 @@ from .inertialess import check_resisted
 from .integrators import SHORTEST, InitialState, Integrator, Stages, TimeGrid
 from .methods import GeneralisedAlpha, Radau
 from .motion import MotionState, Mover, Trajectory
+from .sampling import StepRecord
 from .stages import StageEquations
 from .watching import Watch, finer
 
@@ -93,7 +94,7 @@ def simulate(scene: Scene, settings: Settings, progress: Callable[[float], Any] 
 @dataclass
 class MeshRun:
     """The result of one run on one mesh: states, number of steps, largest errors of constraints and norms, notes,
-    times.
+    times, steps.
     """
 
     instants: list[MotionState]
@@ -104,6 +105,7 @@ class MeshRun:
     seconds: dict[str, float]
     failure: SolveError | None = None
     interrupted: bool = False
+    record: StepRecord | None = None
 
 
 class Simulation:
@@ -200,7 +202,7 @@ class Simulation:
         if watch is not None:
             run.instants = watch.up_to_end(run.instants, self.times)
             run.notes = (*run.notes, watch.note(run.instants))
-        run.count, run.gap, run.norm = integrator.count, integrator.gap, integrator.norm
+        run.count, run.gap, run.norm, run.record = integrator.count, integrator.gap, integrator.norm, integrator.record
         self.seconds["solve"] += time.perf_counter() - solving
         return run
 
@@ -333,6 +335,7 @@ class Simulation:
             violation={"norms": run.norm, "closings": run.gap},
             notes=(*run.notes, *self._unlikely(run), *self._superelement_notes(run)),
             failure="" if run.failure is None else run.failure.detail,
+            record=run.record,
         )
         if run.failure is not None:
             if motion.steps:

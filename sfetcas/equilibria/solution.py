@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -31,6 +33,11 @@ from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.prepared import Solved
 from ..solvers.stability import Stability
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..pictures.animation import Animation
 
 __all__ = [
     "Certificate",
@@ -361,6 +368,10 @@ class Equilibrium(Configuration):
             return {**self.energy, "potential": self.energy["total"]}
         return super().table(kind, name)
 
+    def plot(self, **how: Any) -> Figure:
+        """The deformed structure over the undeformed one, see :func:`~sfetcas.pictures.plotting.picture`."""
+        return Solution(self.model.scene, Status.SOLVED, (self,), {}).plot(**how)
+
     def to_dict(self) -> dict[str, Any]:
         """The equilibrium as an entry of ``steps`` in the JSON answer."""
         tables = self.tables("nodes", "reactions", "members", "springs", "motions", "contacts")
@@ -403,6 +414,21 @@ class Solution:
     def last(self) -> Equilibrium:
         """The last of the steps: the equilibrium at the last load factor."""
         return self.steps[-1]
+
+    def plot(self, **how: Any) -> Figure:
+        """The deformed structure over the undeformed one, see :func:`~sfetcas.pictures.plotting.picture`."""
+        from ..pictures.plotting import picture
+
+        return picture(self, **how)
+
+    def animate(self, file: str | os.PathLike[str] | None = None, **how: Any) -> Animation | File:
+        """A moving picture of several steps, see :func:`~sfetcas.pictures.animation.animation`.
+
+        The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
+        """
+        from ..pictures.animation import animated
+
+        return animated(self, file, **how)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +20,11 @@ from ..mechanics.fields import Fields
 from ..mechanics.loading import Loading
 from ..mechanics.model import Model
 from ..solvers.prepared import Prepared
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..pictures.animation import Animation
 
 __all__ = ["FLUTTER", "NO_POTENTIAL", "Branch", "FlutterPoint", "Path", "PathPoint", "ending"]
 
@@ -260,6 +267,21 @@ class Path:
     def positions(self, node: str, branch: int = 0) -> Array:
         """Positions of a node along the path or a branch, (points, 3) m."""
         return np.array([self.fields(point).position(node) for point in self.branches[branch].points])
+
+    def plot(self, *args: Any, **how: Any) -> Figure:
+        """The course of the path beside shapes along it, see :func:`~sfetcas.pictures.charts.chart`."""
+        from ..pictures.charts import chart
+
+        return chart(self, *args, **how)
+
+    def animate(self, file: str | os.PathLike[str] | None = None, **how: Any) -> Animation | File:
+        """A moving picture of the shapes along the path, see :func:`~sfetcas.pictures.animation.animation`.
+
+        The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
+        """
+        from ..pictures.animation import animated
+
+        return animated(self, file, **how)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries."""

@@ -1,36 +1,46 @@
-"""Moving pictures of answers: a motion in real time where that can be seen, steps and paths one after the other."""
+"""Moving pictures of answers: a motion in real time where that can be seen, steps and paths point by point, modes."""
 
 from __future__ import annotations
 
+import abc
+import base64
 import logging
 import os
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path as File
 from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.collections import LineCollection
+from mpl_toolkits.mplot3d.art3d import Line3DCollection  # type: ignore[import-untyped]
 
 from ..description.scene import Scene
-from ..dynamics.motion import Trajectory
+from ..dynamics.modes import Modes
+from ..dynamics.motion import MotionState, Trajectory
 from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
-from ..mathematics.arrays import Array, Index
 from ..paths.path import Path
+from .colours import NONE, ColourQuantity, coloured
 from .files import check_ending
 from .glyphs import sketch_supports
-from .sheet import DOTTED, Sheet, axes_on, plot_line, title_of
+from .modeshapes import PHASES, ModePanels
+from .motions import evenly
+from .sheet import DOTTED, Sheet, add_bar, axes_on, pieces_of, plot_line, title_of
+from .showing import Picture, new_figure
 from .sketch import REST, Mark, Sketch, course_of, in_short, prefix, view_of
 
-__all__ = ["check_animation", "save_animation"]
+__all__ = ["Animation", "animated", "animation", "check_animation", "save_animation"]
 
 ENDINGS = (".gif", ".mp4")
 MOST_FRAMES = 200
 SLOWEST, FASTEST = 10.0, 25.0
 """Frames a second of a motion."""
+QUICK_FRAMES = 101
+"""Frames of a motion of less than a second, which is slowed down."""
 LASTS = 5.0
 """Seconds that steps and paths take, where they are many."""
 DPI = 100
@@ -49,68 +59,153 @@ def check_animation(scene: Scene, file: str | os.PathLike[str]) -> None:
     ending = check_ending(file, ENDINGS, "an animation")
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
         raise SceneError("found the ending '.mp4', but no program ffmpeg that writes it, accepted: .gif")
+    _check_moves(scene)
+
+
+def _check_moves(scene: Scene) -> None:
     analysis = scene.analysis
-    accepted = "accepted: a motion, a path, or several steps with one equilibrium each"
-    if analysis.type not in ("static", "path", "dynamic"):
-        raise SceneError(f"found type {analysis.type!r} to animate, {accepted}")
+    accepted = "accepted: a motion, modes, a path, or several steps with one equilibrium each"
     if analysis.equilibria == "all":
         raise SceneError(f"found equilibria = 'all' to animate, {accepted}")
     if analysis.type == "static" and len(analysis.steps) < 2:
         raise SceneError(f"found one step to animate, {accepted}")
 
 
-def save_animation(answer: Solution | Path | Trajectory, file: str | os.PathLike[str]) -> None:
-    """Write a moving picture of a motion, of steps or of the points of a path (without its branches).
-
-    At most 200 frames, evenly taken.  A motion has 10 to 25 frames a second and goes in real time where these are
-    enough to see it; else the picture says how much slower or faster it goes.
+def save_animation(
+    answer: Solution | Path | Trajectory | Modes, file: str | os.PathLike[str], *, colour: str = NONE
+) -> None:
+    """Write :func:`animation` of an answer to a file, .gif or .mp4.
 
     Raises
     ------
     SceneError
-        As :func:`check_animation`, or ffmpeg fails.
+        As :func:`check_animation` and :func:`animation`, or ffmpeg fails.
     """
     check_animation(answer.scene, file)
+    animation(answer, colour=colour).save(file)
+
+
+def animated(
+    answer: Solution | Path | Trajectory | Modes, file: str | os.PathLike[str] | None = None, **how: Any
+) -> Animation | File:
+    """Write :func:`animation` to a file, whose path is returned; without a file what notebooks show.
+
+    Raises
+    ------
+    SceneError
+        As :func:`save_animation`.
+    """
+    if file is None:
+        return animation(answer, **how)
+    save_animation(answer, file, **how)
+    return File(file)
+
+
+def animation(answer: Solution | Path | Trajectory | Modes, *, colour: str = NONE) -> Animation:
+    """A moving picture of a motion, of modes, of steps or of the points of a path (without its branches).
+
+    At most 200 frames, evenly taken.  A motion has 10 to 25 frames a second and goes in real time where these are
+    enough to see it; else the picture says how much slower or faster it goes.  Modes go through one period each.
+
+    Parameters
+    ----------
+    answer : Solution, Path, Trajectory or Modes
+    colour : str
+        The quantity that colours tell, with one scale for all frames: one of
+        :data:`~sfetcas.pictures.colours.QUANTITIES`, or ``none``.  Modes have none.
+
+    Raises
+    ------
+    SceneError
+        Nothing moves, or there is no such colour.
+    """
+    _check_moves(answer.scene)
+    if isinstance(answer, Modes):
+        if colour != NONE:
+            raise SceneError(f"found {colour!r}, accepted of modes: {NONE}", ("colour",))
+        return Animation(_Waves(answer))
     if isinstance(answer, Trajectory):
-        chosen, rate, pace = _paced(answer.times)
-        steps: list[Configuration] = [answer.steps[i] for i in chosen]
-        texts = [f"{text}{pace}" for text in _times(answer, chosen)]
+        frames, rate, pace = _paced(float(answer.times[-1] - answer.times[0]))
+        instants = evenly(answer, frames)
+        steps: list[Configuration] = list(instants)
+        texts = [f"{text}{pace}" for text in _times(instants)]
     else:
         every = [answer.configuration(p) for p in answer.points] if isinstance(answer, Path) else list(answer.steps)
         numbers = np.unique(np.linspace(0, len(every) - 1, min(MOST_FRAMES, len(every))).round().astype(int))
         steps, rate = [every[i] for i in numbers], round(float(np.clip(len(numbers) / LASTS, 2.0, FASTEST)))
         texts = [f"factor {in_short(step.factor)}" for step in steps]
-    film = _Film(steps, answer.scene.title, gravity=1.0 if isinstance(answer, Trajectory) else 0.0)
-    writer: Any = (FFMpegWriter if check_ending(file, ENDINGS) == ".mp4" else PillowWriter)(fps=rate)
-    log = logging.getLogger("matplotlib.animation")
-    before, log.disabled = log.disabled, True
-    try:
-        with writer.saving(film.figure, os.fspath(file), DPI):
-            for number, text in enumerate(texts):
-                film.show(number, text)
-                writer.grab_frame()
-    except CalledProcessError as error:
-        said = (error.stderr or "").split("\n")
-        reason = next((line for line in reversed(said) if line.strip()), f"exit code {error.returncode}")
-        raise SceneError(f"the program ffmpeg failed: {reason.strip()}") from None
-    finally:
-        log.disabled = before
+    gravity = 1.0 if isinstance(answer, Trajectory) else 0.0
+    return Animation(_Film(steps, texts, rate, answer.scene.title, gravity=gravity, colour=colour))
 
 
-def _paced(times: Array) -> tuple[Index, int, str]:
-    """Which answers of a motion, how many a second, and what to say of how fast that is."""
-    span, count = float(times[-1] - times[0]), min(len(times), MOST_FRAMES)
-    if span * FASTEST >= FASTEST:
-        # Longer than a second: more frames than are shown in real time would slow it down.
-        count = min(count, 1 + int(span * FASTEST))
-    wanted = np.linspace(times[0], times[-1], count)
-    chosen = np.unique(np.abs(times - wanted[:, None]).argmin(axis=1))
-    rate = round(float(np.clip((len(chosen) - 1) / span if span > 0.0 else FASTEST, SLOWEST, FASTEST)))
-    slowed = (len(chosen) - 1) / rate / span if span > 0.0 else 1.0
+class Film(abc.ABC):
+    """A figure that shows one frame after the other: ``count`` of them, ``rate`` a second."""
+
+    figure: Picture
+    count: int
+    rate: int
+
+    @abc.abstractmethod
+    def show(self, number: int) -> None:
+        """Put the figure to a frame, counted from 0."""
+
+
+class Animation:
+    """A moving picture, which notebooks show.
+
+    Parameters
+    ----------
+    film : Film
+    """
+
+    def __init__(self, film: Film) -> None:
+        self._film = film
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write it to a file, .gif or .mp4.
+
+        Raises
+        ------
+        SceneError
+            Another ending, no ffmpeg, or ffmpeg fails.
+        """
+        film = self._film
+        writer: Any = FFMpegWriter if check_ending(file, ENDINGS, "an animation") == ".mp4" else PillowWriter
+        log = logging.getLogger("matplotlib.animation")
+        before, log.disabled = log.disabled, True
+        try:
+            one = writer(fps=film.rate)
+            with one.saving(film.figure, os.fspath(file), DPI):
+                for number in range(film.count):
+                    film.show(number)
+                    one.grab_frame()
+        except CalledProcessError as error:
+            said = (error.stderr or "").split("\n")
+            reason = next((line for line in reversed(said) if line.strip()), f"exit code {error.returncode}")
+            raise SceneError(f"the program ffmpeg failed: {reason.strip()}") from None
+        finally:
+            log.disabled = before
+
+    def _repr_html_(self) -> str:
+        """What notebooks show: the picture itself, from nowhere else."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = File(folder) / "animation.gif"
+            self.save(file)
+            content = base64.b64encode(file.read_bytes()).decode()
+        return f'<img alt="animation" src="data:image/gif;base64,{content}">'
+
+
+def _paced(span: float) -> tuple[int, int, str]:
+    """How many frames a motion of so many seconds has, how many a second, and what to say of how fast that is."""
+    count = min(MOST_FRAMES, 1 + int(span * FASTEST * (1.0 + 1e-9))) if span >= 1.0 else QUICK_FRAMES
+    if span == 0.0:
+        return 1, round(FASTEST), ""
+    rate = round(float(np.clip((count - 1) / span, SLOWEST, FASTEST)))
+    slowed = (count - 1) / rate / span
     if 0.9 < slowed < 1.1:
-        return chosen, rate, ""
+        return count, rate, ""
     return (
-        chosen,
+        count,
         rate,
         f" (slowed {_short(slowed)} times)" if slowed > 1.0 else f" (sped up {_short(1.0 / slowed)} times)",
     )
@@ -120,25 +215,48 @@ def _short(number: float) -> str:
     return f"{float(f'{number:.2g}'):.10g}"
 
 
-def _times(motion: Trajectory, chosen: Index) -> list[str]:
+def _times(instants: Sequence[MotionState]) -> list[str]:
     """Times in as many digits as tell them apart."""
-    factor, letter = prefix(motion.last.time, 0.1)
-    times = motion.times[chosen] / factor
+    factor, letter = prefix(instants[-1].time, 0.1)
+    times = np.array([instant.time for instant in instants]) / factor
     spacing = float(np.diff(times).min()) if len(times) > 1 else 1.0
     digits = int(np.clip(np.ceil(-np.log10(spacing) - 1e-9), 0, 6))
     return [f"time {time:.{digits}f} {letter}s" for time in times]
 
 
-class _Film:
+class _Waves(Film):
+    """Modes, each through one period."""
+
+    def __init__(self, modes: Modes) -> None:
+        self._panels = ModePanels(modes, shown=False, moving=True)
+        self.figure = self._panels.figure
+        self.count, self.rate = PHASES, round(PHASES / 2.0)
+
+    def show(self, number: int) -> None:
+        """A phase of the period."""
+        self._panels.show(2.0 * np.pi * number / self.count)
+
+
+class _Film(Film):
     """A figure whose structure is put where it is at one of the steps; ``gravity``: so many times it is drawn."""
 
-    def __init__(self, steps: Sequence[Configuration], title: str, *, gravity: float) -> None:
-        self._steps, self._scene = steps, steps[-1].model.scene
-        course = course_of(self._scene, steps, "none")
+    def __init__(
+        self,
+        steps: Sequence[Configuration],
+        texts: Sequence[str],
+        rate: int,
+        title: str,
+        *,
+        gravity: float,
+        colour: str = NONE,
+    ) -> None:
+        self._steps, self._texts, self._scene = steps, texts, steps[-1].model.scene
+        self.count, self.rate = len(steps), rate
+        quantity = coloured(self._scene, colour)
+        course = course_of(self._scene, steps, None if quantity is None else quantity.of, every=True)
         self._course, self._lines = course, [*course.earlier, course.last]
         self._view = view_of(steps[-1].model.space, [course.everything])
-        layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08)
-        self.figure = Figure(figsize=(7.0, 5.0), dpi=DPI, layout=layout)
+        self.figure = new_figure(7.0, 5.0, shown=False)
         if title_of(title):
             self.figure.suptitle(title_of(title), fontsize=11, parse_math=False)
         self._first = self._sketched(0)
@@ -147,12 +265,38 @@ class _Film:
         axes = axes_on(self.figure, self._paper, self._first)
         for line in course.rest:
             plot_line(axes, line, color=REST, linewidth=1.2, linestyle=DOTTED, gid="undeformed")
-        look: dict[str, Any] = {"color": "#1F3A5F", "linewidth": 2.6, "solid_capstyle": "round", "gid": "deformed"}
-        self._drawn = [plot_line(axes, line, **look) for line in self._lines[0]]
+        self._values = [*course.earlier_values, course.values]
+        self._drawn: list[Any] = []
+        self._pieces: Any = None
+        if quantity is not None and any(self._values):
+            self._colour(axes, quantity)
+        else:
+            look: dict[str, Any] = {"color": "#1F3A5F", "linewidth": 2.6, "solid_capstyle": "round", "gid": "deformed"}
+            self._drawn = [plot_line(axes, line, **look) for line in self._lines[0]]
         self._sheet = Sheet(self.figure, axes, self._paper, self._first)
         self._sheet.finish(gravity=gravity)
         # What a frame shows shall not move the frame.
         self.figure.set_layout_engine("none")
+
+    def _colour(self, axes: Any, quantity: ColourQuantity) -> None:
+        """Draw the pieces of all members in the colours of their values, with one scale for all frames."""
+        space = self._steps[-1].model.space
+        # What is rounding in one frame is zero beside the others.
+        self._values = [
+            found or [np.zeros(len(line)) for line in lines]
+            for found, lines in zip(self._values, self._lines, strict=True)
+        ]
+        kind = Line3DCollection if space else LineCollection
+        self._pieces = kind([], gid="deformed", linewidths=2.6, capstyle="round", clip_on=not space, zorder=3.5)
+        axes.add_collection(self._pieces, **({} if space else {"autolim": False}))
+        every = np.concatenate([pieces_of(*one)[1] for one in zip(self._lines, self._values, strict=True)])
+        self._unit = add_bar(self.figure, self._paper, [(self._pieces, every)], quantity, space=space)
+        self._put_pieces(0)
+
+    def _put_pieces(self, number: int) -> None:
+        pieces, values = pieces_of(self._lines[number], self._values[number])
+        self._pieces.set_segments(pieces if self._steps[-1].model.space else pieces[:, :, :2])
+        self._pieces.set_array(np.ma.masked_invalid(values / self._unit))
 
     def _sketched(self, number: int) -> Sketch:
         """What holds the structure at a step."""
@@ -161,10 +305,12 @@ class _Film:
         sketch_supports(sketch)
         return sketch
 
-    def show(self, number: int, text: str) -> None:
+    def show(self, number: int) -> None:
         """Put the structure where it is at a step."""
-        self._paper.set_title(text, fontsize=9, loc="left")
-        for drawn, line in zip(self._drawn, self._lines[number], strict=True):
+        self._paper.set_title(self._texts[number], fontsize=9, loc="left")
+        if self._pieces is not None:
+            self._put_pieces(number)
+        for drawn, line in zip(self._drawn, self._lines[number] if self._drawn else (), strict=True):
             if hasattr(drawn, "set_data_3d"):
                 drawn.set_data_3d(*line.T)
             else:

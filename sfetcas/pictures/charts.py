@@ -1,4 +1,4 @@
-"""Charts of paths: the factor against what moves most, and deformed shapes along the way.
+"""Charts of paths: the factor against what moves most, or quantities over it, and deformed shapes along the way.
 
 Stable stretches are drawn solid, unstable ones dashed; limit points are circles, bifurcations squares, and dots in
 the colours of the shapes say where these are.  Where only motions are prescribed, the largest reaction at a moved
@@ -9,7 +9,7 @@ the path, as in pictures of answers; loads are not, as they grow along the way.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,13 +18,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..description.answers import AnswerName
+from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
 from ..paths.path import Branch, Path
-from .files import DPI, check_ending, save_figure
+from .curves import FREQUENCIES, Curve, clipped, leave, quantities_named, said, shown_components, table_of
+from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
-from .sheet import DOTTED, Sheet, axes_on, drawn_text, plot_line, title_of
-from .sketch import REST, Course, Sketch, course_of, view_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
+from .showing import Picture, new_figure
+from .sketch import REST, Course, Sketch, course_of, unit_for, view_of
 
 __all__ = ["chart", "save_chart"]
 
@@ -32,9 +36,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#8F3B76", "#CC9900", "#555555")
 STYLES: dict[str, Any] = {"True": "-", "False": "--", "neutral": "-.", "not defined": ":"}
 KINDS = ((True, "stable"), (False, "unstable"), ("neutral", "neutral"), ("not defined", "stability not defined"))
 MARKS = {"limit point": "o", "bifurcation": "s"}
+FREQUENCY, FLUTTERING = "angular frequency", "d"
+"""Of the lowest motions, and the mark where one of them starts to grow."""
 LOADED = 5.0
 """A loaded node is told of unless another one moves by more than this many times as far."""
 
+NARROW = 0.01
+"""Half the width of the axis where nothing moves, over the size of the scene."""
 SHAPES, OVER_EACH_OTHER = 6, 2e-3
 """Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
 SAMPLES = np.linspace(0.0, 1.0, 61)
@@ -42,41 +50,121 @@ SHADES = ("#0B1F4B", "#134B86", "#2A7AB8", "#5DA5D6", "#9CC7E8")
 """Of the shapes along the path, in this order."""
 
 
-def save_chart(path: Path, file: str | os.PathLike[str]) -> None:
+def save_chart(path: Path, file: str | os.PathLike[str], *, quantities: Sequence[str] | None = None) -> None:
     """Write :func:`chart` of a path to a file, in the format of its ending.
 
     Raises
     ------
     SceneError
-        The ending is none of ``files.ENDINGS``.
+        As :func:`chart`, or the ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
-    save_figure(chart(path), file)
+    save_figure(_chart(path, quantities, shown=False), file)
 
 
-def chart(path: Path) -> Figure:
-    """The chart of a path with its branches, and shapes at some of its points; a figure of 10 x 5 inch."""
-    figure = Figure(figsize=(10.0, 5.0), dpi=DPI, layout="constrained")
-    left, right = figure.subplots(1, 2)
-    quantity = _telling(path)
+def chart(path: Path, quantity: str | None = None, *, quantities: Sequence[str] | None = None) -> Figure:
+    """The chart of a path with its branches, and shapes at some of its points; a figure of 10 inch.
+
+    Parameters
+    ----------
+    path : Path
+    quantity : str, optional
+        What is drawn over the load factor, as ``nodes.tip.position.y`` or ``reactions.root.force``; of a path with
+        modes also ``modes.omega``.  Default: what moves most, under the factor, and of a path with modes the
+        frequencies.
+    quantities : sequence of str, optional
+        Several of them, each component of a vector in a panel of its own.
+
+    Raises
+    ------
+    SceneError
+        There is no such quantity, or both are given.
+    """
+    if quantity is not None:
+        if quantities is not None:
+            raise SceneError("found quantity and quantities, accepted: one of them")
+        quantities = [quantity]
+    return _chart(path, quantities, shown=True)
+
+
+def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Picture:
+    names = None if quantities is None else quantities_named(path.scene, quantities)
+    found = [_telling(path)] if names is None else [one for name in names for one in _named(path, name)]
+    if names is None and path.massive is not None:
+        # What does not move says nothing beside the frequencies.
+        found = [*([] if _still(path, found[0]) else found), _frequencies(path)]
+    figure = new_figure(10.0, max(5.0, 0.9 + 2.2 * len(found)), shown=shown)
+    grid = figure.add_gridspec(len(found), 2)
+    panels = [figure.add_subplot(grid[i, 0]) for i in range(len(found))]
+    right = figure.add_subplot(grid[:, 1])
     shapes = _shapes(path)
-    _draw_course(left, path, quantity)
-    for shape in shapes:
-        _draw_dot(left, shape, quantity, path)
-    figure.suptitle(title_of(path.scene.title), parse_math=False)
+    for panel, quantity in zip(panels, found, strict=True):
+        _draw_course(panel, path, quantity, shapes)
+    if all(quantity.upright for quantity in found):
+        for panel in panels[:-1]:
+            panel.sharex(panels[-1])
+            panel.tick_params(labelbottom=False)
+            panel.set_xlabel("")
+    legend_above(panels[0], list(_legend(path, frequencies=any(quantity.name == FREQUENCY for quantity in found))))
+    title = title_of(path.scene.title)
+    if title:
+        figure.suptitle(title, fontsize=11, parse_math=False)
     _draw_shapes(right, path, shapes)
     return figure
 
 
 @dataclass(frozen=True, eq=False)
 class _Quantity:
-    """What the factor is drawn against: its name, and its values over the points of each branch."""
+    """What is drawn over the factor or, where not ``upright``, under it.
+
+    Attributes
+    ----------
+    name, unit : str
+    values : list of ndarray (points, curves)
+        Of each branch, in the SI unit.
+    node, axis
+        Of a displacement: the node, or None, and the component.
+    """
 
     name: str
+    unit: str
     values: list[Array]
     node: str | None = None
     axis: int = 0
     upright: bool = False
+
+    @property
+    def every(self) -> Array:
+        """All values."""
+        return np.concatenate([values.ravel() for values in self.values])
+
+
+def _named(path: Path, name: AnswerName) -> list[_Quantity]:
+    """A quantity by its name, each component that is not zero throughout by itself."""
+    if name.kind.name == FREQUENCIES:
+        return [_frequencies(path)]
+    tables = [table_of(name, [path.configuration(point) for point in branch.points]) for branch in path.branches]
+    together = np.vstack(tables)
+    if together.shape[1] == 1:
+        return [_Quantity(said(name), name.kind.unit, tables, upright=True)]
+    found = []
+    for column in shown_components(together):
+        one = replace(name, component=int(column))
+        found.append(_Quantity(said(one), name.kind.unit, [t[:, [column]] for t in tables], upright=True))
+    return found
+
+
+def _frequencies(path: Path) -> _Quantity:
+    """Angular frequencies of the lowest motions; those that do not oscillate have none."""
+    count = max(len(point.omega) for branch in path.branches for point in branch.points if point.omega is not None)
+    tables = []
+    for branch in path.branches:
+        table = np.full((len(branch.points), count), np.nan)
+        for row, point in zip(table, branch.points, strict=True):
+            if point.omega is not None:
+                row[: len(point.omega)] = np.sort(point.omega)
+        tables.append(table)
+    return _Quantity(FREQUENCY, "rad/s", tables, upright=True)
 
 
 def _telling(path: Path) -> _Quantity:
@@ -91,8 +179,8 @@ def _telling(path: Path) -> _Quantity:
     loaded = {load.node: np.abs(load.vector) for load in scene.loads.values() if load.type == "force"}
 
     def change(quantity: _Quantity) -> float:
-        change = float(np.ptp(np.concatenate(quantity.values)))
-        ends = np.sort([values[-1] for values in quantity.values])
+        change = float(np.ptp(quantity.every))
+        ends = np.sort([float(values[-1, 0]) for values in quantity.values])
         if len(ends) > 1 and np.diff(ends).min() < 1e-3 * change:
             change *= 0.01
         if quantity.node is None or quantity.node not in loaded:
@@ -106,7 +194,8 @@ def _telling(path: Path) -> _Quantity:
 def _displacements(path: Path) -> Iterator[_Quantity]:
     scene = path.scene
     moved = {motion.node for motion in scene.motions.values()}
-    for name, node in scene.nodes.items():
+    # Where nothing moves the first is told of: one that could.
+    for name, node in sorted(scene.nodes.items(), key=lambda entry: entry[1].support != "free"):
         if name not in moved:
             rest = np.asarray(node.position)
             tables = [path.positions(name, i) - rest for i in range(len(path.branches))]
@@ -123,7 +212,7 @@ def _middles(path: Path, branch: Branch, member: str) -> Array:
 
 def _components(name: str, tables: list[Array]) -> Iterator[_Quantity]:
     for i, letter in enumerate("xyz"):
-        yield _Quantity(f"displacement of {name} in {letter}, m", [table[:, i] for table in tables], axis=i)
+        yield _Quantity(f"displacement of {name} in {letter}", "m", [table[:, [i]] for table in tables], axis=i)
 
 
 def _reactions(path: Path) -> Iterator[_Quantity]:
@@ -134,42 +223,73 @@ def _reactions(path: Path) -> Iterator[_Quantity]:
             for branch in path.branches
         ]
         for i, letter in enumerate("xyz"):
-            name = f"{kind} at {motion.node} {'in' if number == 0 else 'about'} {letter}, {unit}"
-            yield _Quantity(name, [table[:, i] for table in tables], upright=True)
+            name = f"{kind} at {motion.node} {'in' if number == 0 else 'about'} {letter}"
+            yield _Quantity(name, unit, [table[:, [i]] for table in tables], upright=True)
 
 
-def _draw_course(axes: Axes, path: Path, quantity: _Quantity) -> None:
+def _draw_course(axes: Axes, path: Path, quantity: _Quantity, shapes: Sequence[_Shape]) -> None:
+    """Draw a quantity of all branches, and dots where the shapes are."""
+    limits = clipped(quantity.every) if quantity.upright else None
+    seen = quantity.every if limits is None else np.clip(quantity.every, *limits)
+    still = np.array([NARROW * _size(path)])
+    unit, letters = unit_for(still if _still(path, quantity) else seen, quantity.unit)
+    ends = list[Curve]()
     for number, branch in enumerate(path.branches):
         colour = _colour(number)
-        across, up = quantity.values[number], branch.factors
-        if quantity.upright:
-            across, up = up, across
-        for stable, first, last in branch.stretches():
-            part = slice(first, last + 1)
-            label = dict(KINDS)[stable]
-            axes.plot(across[part], up[part], linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
-        for kind, mark in MARKS.items():
-            here = [i for i, point in enumerate(branch.points) if point.kind == kind]
-            axes.plot(across[here], up[here], mark, color=colour, fillstyle="none", markersize=7, gid=kind)
-    _calm(axes, path, quantity)
-    names = ("factor", quantity.name) if quantity.upright else (quantity.name, "factor")
+        for column in (quantity.values[number] / unit).T:
+            _draw_branch(axes, branch, column, colour, upright=quantity.upright)
+            ends.append(Curve(branch.factors, column * unit, colour))
+        if quantity.name == FREQUENCY:
+            for point in branch.flutter_points:
+                axes.plot(point.factor, point.omega / unit, FLUTTERING, color=colour, markersize=7, gid="flutter point")
+    for shape in shapes:
+        point = quantity.values[shape.branch][shape.index] / unit
+        factor = np.full(len(point), path.branches[shape.branch].factors[shape.index])
+        places = (factor, point) if quantity.upright else (point, factor)
+        axes.plot(*places, "o", color=shape.colour, markersize=5, zorder=3, gid="shape", clip_on=limits is not None)
+    _calm(axes, path, quantity, unit)
+    names = ("factor", f"{quantity.name}, {letters}".rstrip(", "))
+    names = names if quantity.upright else names[::-1]
     axes.set_xlabel(drawn_text(names[0]), parse_math=False)
-    axes.set_ylabel(drawn_text(names[1]), parse_math=False)
+    name_upright(axes, names[1])
     axes.grid(color="#EBEBEB", linewidth=0.6)
     # More numbers like -0.0075 would run into each other.
     axes.locator_params(axis="x", nbins=6)
-    axes.legend(handles=list(_legend(path)), fontsize=8)
+    if limits is not None:
+        leave(axes, ends, limits, unit, letters)
 
 
-def _calm(axes: Axes, path: Path, quantity: _Quantity) -> None:
-    """Where nothing moves by more than a ten-thousandth of the scene, rounding shall not fill the chart."""
+def _draw_branch(axes: Axes, branch: Branch, values: Array, colour: str, *, upright: bool) -> None:
+    """Draw values (points,) of a branch, stretch by stretch, with its critical points."""
+    across, up = (branch.factors, values) if upright else (values, branch.factors)
+    for stable, first, last in branch.stretches():
+        part = slice(first, last + 1)
+        label = dict(KINDS)[stable]
+        axes.plot(across[part], up[part], linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
+    for kind, mark in MARKS.items():
+        here = [i for i, point in enumerate(branch.points) if point.kind == kind]
+        axes.plot(across[here], up[here], mark, color=colour, fillstyle="none", markersize=7, gid=kind)
+
+
+def _calm(axes: Axes, path: Path, quantity: _Quantity, unit: float) -> None:
+    """Where nothing moves rounding shall not fill the chart."""
+    if _still(path, quantity):
+        size, values = _size(path) / unit, quantity.every / unit
+        axes.set_xlim(float(values.mean()) - NARROW * size, float(values.mean()) + NARROW * size)
+
+
+def _still(path: Path, quantity: _Quantity) -> bool:
+    """Whether a displacement is nowhere more than a ten-thousandth of the scene."""
+    return not quantity.upright and float(np.ptp(quantity.every)) < 1e-4 * _size(path)
+
+
+def _size(path: Path) -> float:
+    """Largest extent of the undeformed scene along an axis, m."""
     points = np.vstack([line.positions(SAMPLES) for line in path.scene.center_lines.values()])
-    size, values = float(np.ptp(points, axis=0).max()), np.concatenate(quantity.values)
-    if not quantity.upright and np.ptp(values) < 1e-4 * size:
-        axes.set_xlim(float(values.mean()) - 0.01 * size, float(values.mean()) + 0.01 * size)
+    return float(np.ptp(points, axis=0).max())
 
 
-def _legend(path: Path) -> Iterator[Line2D]:
+def _legend(path: Path, *, frequencies: bool) -> Iterator[Line2D]:
     seen = {stable for branch in path.branches for stable, _, _ in branch.stretches()}
     for stable, name in KINDS:
         if stable in seen:
@@ -178,6 +298,8 @@ def _legend(path: Path) -> Iterator[Line2D]:
     for kind, mark in MARKS.items():
         if kind in kinds:
             yield Line2D([], [], color="#333333", marker=mark, linestyle="", fillstyle="none", label=kind)
+    if frequencies and path.flutter_points:
+        yield Line2D([], [], color="#333333", marker=FLUTTERING, linestyle="", label="flutter point")
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,17 +338,10 @@ def _colour(branch: int) -> str:
     return COLOURS[branch % len(COLOURS)]
 
 
-def _draw_dot(axes: Axes, shape: _Shape, quantity: _Quantity, path: Path) -> None:
-    """Where on the course a shape is."""
-    across, up = quantity.values[shape.branch][shape.index], path.branches[shape.branch].factors[shape.index]
-    place = (up, across) if quantity.upright else (across, up)
-    axes.plot(*place, "o", color=shape.colour, markersize=5, zorder=3, gid="shape")
-
-
 def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     """The shapes over the undeformed one, with what holds them as at the end of the path."""
     points = [*(path.branches[shape.branch].points[shape.index] for shape in shapes), path.points[-1]]
-    course = course_of(path.scene, [path.configuration(point) for point in points], "none")
+    course = course_of(path.scene, [path.configuration(point) for point in points])
     view = view_of(path.model.space, [course.everything])
     sketch = Sketch(path.scene, path.configuration(path.points[-1]), course, view)
     sketch_supports(sketch)

@@ -28,7 +28,7 @@ def save_front(trade: Trade, file: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The ending is none of :data:`~sfetcas.pictures.files.ENDINGS`.
+        The ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
     save_figure(front_picture(trade), file)

@@ -334,7 +334,7 @@ def _sketch_reaction(sketch: Sketch, name: str, node: Node) -> None:
         return
     (force, moment), largest = sketch.step.reaction(name), sketch.largest_force
     point, arm = sketch.at(name), sketch.step.model.scales.length
-    moments = [largest * arm, norm(moment), *(float(np.abs(values).max()) for values in sketch.course.values)]
+    moments = [largest * arm, norm(moment), sketch.course.largest_moment]
     ink = Ink(f"reaction-{name}", REACTION, 1.1)
     rounding = 1e-11 * sketch.step.model.scales.force
     if norm(force) > max(tolerances.NEGLIGIBLE * max(largest, max(moments) / arm), rounding):

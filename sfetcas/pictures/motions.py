@@ -1,13 +1,15 @@
-"""Pictures of motions: positions at several times over each other, histories of a node, and energies.
+"""Pictures of motions: positions at several times over each other, histories of quantities, and energies.
 
-Positions are pale at first and bold at the end; thin lines are the ways of free ends.  Loads are not drawn, as they
-change in time.
+Positions are pale at first and bold at the end; thin lines are the ways of free ends.  All is drawn from the states at
+the time steps of the integrator (:meth:`~sfetcas.dynamics.motion.Trajectory.resampled`), however few answers were asked
+for.  Loads are not drawn, as they change in time.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,19 +17,21 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
+from ..description.answers import AnswerName
 from ..description.records import nearest
 from ..dynamics.motion import MotionState, Trajectory
 from ..errors import SceneError
 from ..mathematics.arrays import Array
-from .files import DPI, check_ending, save_figure
+from .curves import COMPONENTS, draw_panel, quantities_named, table_of, told
+from .files import check_ending, save_figure
 from .glyphs import sketch_supports
-from .sheet import DOTTED, Sheet, axes_on, drawn_text, plot_line, title_of
-from .sketch import REST, Ink, Sketch, course_of, prefix, view_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
+from .showing import Picture, new_figure
+from .sketch import REST, Ink, Sketch, course_of, prefix, unit_for, view_of
 
-__all__ = ["histories", "most_moving", "motion_picture", "save_histories", "save_motion"]
+__all__ = ["draw_strobes", "evenly", "histories", "most_moving", "motion_picture", "save_histories", "save_motion"]
 
 STROBES = 10
 """Positions drawn at most."""
@@ -35,80 +39,131 @@ MOST_WAYS = 4
 """Ways of nodes drawn at most."""
 WAY = "#CC5FA0"
 TIMES = LinearSegmentedColormap.from_list("times", ["#C6D8EA", "#5DA5D6", "#134B86", "#0B1F4B"])
-COMPONENTS = ("#0072B2", "#D55E00", "#009E73")
 ENERGIES = {"kinetic": "#D55E00", "elastic": "#009E73", "loads": "#0072B2", "total": "#222222"}
 BEGUN = 2e-3
 """Apart by this much of the size the undeformed scene is drawn beside the first position."""
 
 
-def save_motion(motion: Trajectory, file: str | os.PathLike[str]) -> None:
+def save_motion(motion: Trajectory, file: str | os.PathLike[str], *, quantities: Sequence[str] | None = None) -> None:
     """Write :func:`motion_picture` of a motion to a file, in the format of its ending.
 
     Raises
     ------
     SceneError
-        The ending is none of ``files.ENDINGS``.
+        As :func:`motion_picture`, or the ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
-    save_figure(motion_picture(motion), file)
+    save_figure(_motion_picture(motion, quantities, shown=False), file)
 
 
-def save_histories(motion: Trajectory, file: str | os.PathLike[str], nodes: Sequence[str] | None = None) -> None:
+def save_histories(
+    motion: Trajectory,
+    file: str | os.PathLike[str],
+    nodes: Sequence[str] | None = None,
+    *,
+    quantities: Sequence[str] | None = None,
+) -> None:
     """Write :func:`histories` of a motion to a file, in the format of its ending.
 
     Raises
     ------
     SceneError
-        The ending is none of ``files.ENDINGS``, or there is no such node.
+        As :func:`histories`, or the ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
-    save_figure(histories(motion, nodes), file)
+    save_figure(_histories(motion, nodes, quantities, shown=False), file)
 
 
-def motion_picture(motion: Trajectory) -> Figure:
-    """Positions over each other, the history of the node that moves most, and energies; a figure of 11 x 5.5 inch."""
-    figure = Figure(figsize=(11.0, 5.5), dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08, wspace=0.03))
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.2, 1.0])
-    paper, above = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
-    below = figure.add_subplot(grid[1, 1], sharex=above)
-    _draw_history(above, motion, most_moving(motion), "position")
-    _draw_energies(below, motion)
-    above.tick_params(labelbottom=False)
-    _say_times(below, motion)
+def motion_picture(motion: Trajectory, *, quantities: Sequence[str] | None = None) -> Figure:
+    """Positions over each other, beside curves over time; a figure of 11 inch.
+
+    Parameters
+    ----------
+    motion : Trajectory
+    quantities : sequence of str, optional
+        Names as ``nodes.tip.velocity`` or ``members.beam.moment.z at 0``, a panel for each.  Default: the position of
+        the node that moves most, and the energies.
+
+    Raises
+    ------
+    SceneError
+        There is no such quantity.
+    """
+    return _motion_picture(motion, quantities, shown=True)
+
+
+def _motion_picture(motion: Trajectory, quantities: Sequence[str] | None, *, shown: bool) -> Picture:
+    names = None if quantities is None else quantities_named(motion.scene, quantities)
+    rows = 2 if names is None else len(names)
+    fine = motion.resampled()
+    figure = new_figure(11.0, max(5.5, 0.9 + 1.9 * rows), shown=shown, wspace=0.03)
+    grid = figure.add_gridspec(rows, 2, width_ratios=[1.2, 1.0])
+    paper, first = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
+    panels = [first, *(figure.add_subplot(grid[i, 1], sharex=first) for i in range(1, rows))]
+    if names is None:
+        _draw_history(panels[0], fine, most_moving(fine), "position")
+        _draw_energies(panels[1], fine)
+    else:
+        _draw_quantities(panels, fine, names)
+    for panel in panels[:-1]:
+        panel.tick_params(labelbottom=False)
+    _say_times(panels[-1], fine)
     title = title_of(motion.scene.title)
     if title:
         figure.suptitle(title, fontsize=11, parse_math=False)
-    _draw_strobes(figure, paper, motion)
+    draw_strobes(figure, paper, motion, fine)
     return figure
 
 
-def histories(motion: Trajectory, nodes: Sequence[str] | None = None) -> Figure:
-    """Positions and velocities of nodes over time; a figure of 9 inch.
+def histories(
+    motion: Trajectory, nodes: Sequence[str] | None = None, *, quantities: Sequence[str] | None = None
+) -> Figure:
+    """Positions and velocities of nodes, or any quantities, over time; a figure of 9 or 7 inch.
 
     Parameters
     ----------
     motion : Trajectory
     nodes : sequence of str, optional
         Default: the one that moves most.
+    quantities : sequence of str, optional
+        Instead of nodes names as ``springs.knee.moment``, a panel for each.
 
     Raises
     ------
     SceneError
-        There is no such node.
+        There is no such node or quantity, or both are given.
     """
-    names = [most_moving(motion)] if nodes is None else list(nodes)
-    for name in names:
+    return _histories(motion, nodes, quantities, shown=True)
+
+
+def _histories(
+    motion: Trajectory, nodes: Sequence[str] | None, quantities: Sequence[str] | None, *, shown: bool
+) -> Picture:
+    if quantities is not None:
+        if nodes is not None:
+            raise SceneError("found nodes and quantities, accepted: one of them, as 'nodes.tip.position' is a quantity")
+        names = quantities_named(motion.scene, quantities)
+        figure = new_figure(7.0, 0.6 + 2.2 * len(names), shown=shown)
+        panels = list(np.atleast_1d(figure.subplots(len(names), 1, sharex=True)))
+        fine = motion.resampled()
+        _draw_quantities(panels, fine, names)
+        _say_times(panels[-1], fine)
+        return figure
+    chosen = None if nodes is None else list(nodes)
+    for name in chosen or ():
         if name not in motion.last.model.nodes:
             raise SceneError(f"found node {name!r}; {nearest(name, motion.last.model.nodes)}")
-    if not names:
+    if chosen == []:
         raise SceneError("found none, accepted: names of nodes", ("nodes",))
-    figure = Figure(figsize=(9.0, 0.6 + 2.4 * len(names)), dpi=DPI, layout="constrained")
-    table = figure.subplots(len(names), 2, sharex=True, squeeze=False)
-    for row, name in zip(table, names, strict=True):
+    fine = motion.resampled()
+    chosen = chosen or [most_moving(fine)]
+    figure = new_figure(9.0, 0.6 + 2.4 * len(chosen), shown=shown)
+    table = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
+    for row, name in zip(table, chosen, strict=True):
         for axes, quantity in zip(row, ("position", "velocity"), strict=True):
-            _draw_history(axes, motion, name, quantity)
+            _draw_history(axes, fine, name, quantity)
     for axes in table[-1]:
-        _say_times(axes, motion)
+        _say_times(axes, fine)
     return figure
 
 
@@ -119,40 +174,59 @@ def most_moving(motion: Trajectory) -> str:
     return nodes[int(np.argmax([np.linalg.norm(way - way[0], axis=1).max() for way in ways]))]
 
 
+def evenly(motion: Trajectory, count: int) -> list[MotionState]:
+    """So many states evenly over the time; where the steps are not known the nearest answers, each once."""
+    times = np.linspace(motion.times[0], motion.times[-1], count)
+    if motion.record is not None:
+        return list(motion.between(times if len(motion.steps) > 1 else times[:1]))
+    return [motion.steps[i] for i in np.unique(np.abs(motion.times - times[:, None]).argmin(axis=1))]
+
+
 # Over time
+
+
+def _draw_quantities(panels: Sequence[Axes], motion: Trajectory, names: Sequence[AnswerName]) -> None:
+    times, look = motion.times / _unit_of_time(motion)[0], _look_of_answers(motion)
+    tables = [table_of(name, motion.steps) for name in names]
+    for panel, name, table in zip(panels, names, tables, strict=True):
+        draw_panel(panel, name, [replace(curve, look=look) for curve in told(name, times, table)])
+
+
+def _look_of_answers(motion: Trajectory) -> dict[str, Any]:
+    """Dots on the answers where nothing is known between them: straight lines there are none of the motion."""
+    return {"marker": ".", "markersize": 4.0} if motion.record is None else {}
 
 
 def _draw_history(axes: Axes, motion: Trajectory, node: str, quantity: str) -> None:
     values = motion.positions(node) if quantity == "position" else motion.velocities(node)
-    factor, letter = prefix(float(np.abs(values).max()), 0.1)
-    for i, name in enumerate("xyz" if motion.last.model.space else "xy"):
+    letters = "xyz" if motion.last.model.space else "xy"
+    factor, unit = unit_for(values[:, : len(letters)], "m" if quantity == "position" else "m/s")
+    for i, name in enumerate(letters):
         _draw_values(axes, motion, values[:, i] / factor, name, COMPONENTS[i])
-    unit = "m" if quantity == "position" else "m/s"
-    _finish(axes, f"{quantity} of {node}, {letter}{unit}")
+    _finish(axes, f"{quantity} of {node}, {unit}")
 
 
 def _draw_energies(axes: Axes, motion: Trajectory) -> None:
     values = {kind: motion.energies(kind) for kind in ENERGIES}
-    factor, letter = prefix(max(float(np.abs(column).max()) for column in values.values()), 0.1)
+    factor, unit = unit_for(np.array(list(values.values())), "N m")
     for kind, colour in ENERGIES.items():
         # Where one energy is nearly all, it is seen below the dashes of the total.
         _draw_values(axes, motion, values[kind] / factor, kind, colour, "--" if kind == "total" else "-")
-    _finish(axes, f"energy, {letter}N m")
+    _finish(axes, f"energy, {unit}")
 
 
 def _draw_values(axes: Axes, motion: Trajectory, values: Array, name: str, colour: str, dashes: str = "-") -> None:
     # A single answer is no line.
-    style: dict[str, Any] = {"marker": "o", "markersize": 4} if len(values) == 1 else {}
+    style = {"marker": "o", "markersize": 4.0} if len(values) == 1 else _look_of_answers(motion)
     times = motion.times / _unit_of_time(motion)[0]
     axes.plot(times, values, color=colour, linewidth=1.5, linestyle=dashes, label=name, **style)
 
 
 def _finish(axes: Axes, name: str) -> None:
-    axes.set_ylabel(drawn_text(name), parse_math=False)
+    name_upright(axes, name)
     axes.grid(color="#EBEBEB", linewidth=0.6)
     axes.margins(x=0.01)
-    # Above the frame it hides nothing.
-    axes.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 0.98), fontsize=8, frameon=False, borderaxespad=0.2)
+    legend_above(axes)
 
 
 def _unit_of_time(motion: Trajectory) -> tuple[float, str]:
@@ -166,14 +240,15 @@ def _say_times(axes: Axes, motion: Trajectory) -> None:
 # Positions over each other
 
 
-def _draw_strobes(figure: Figure, paper: Axes, motion: Trajectory) -> None:
-    chosen = _chosen(motion)
+def draw_strobes(figure: Figure, paper: Axes, motion: Trajectory, fine: Trajectory) -> None:
+    """Positions of a motion over each other, with ways of nodes through all states of its ``fine`` one."""
+    chosen = evenly(motion, STROBES)
     scene = motion.last.model.scene
-    course = course_of(scene, chosen, "none")
+    course = course_of(scene, chosen)
     view = view_of(motion.last.model.space, [course.everything])
     sketch = Sketch(scene, chosen[-1], course, view)
     sketch_supports(sketch)
-    _sketch_ways(sketch, motion)
+    _sketch_ways(sketch, fine)
     axes = axes_on(figure, paper, sketch)
     unit, letter = _unit_of_time(motion)
     first, last = chosen[0].time / unit, chosen[-1].time / unit
@@ -191,10 +266,7 @@ def _draw_strobes(figure: Figure, paper: Axes, motion: Trajectory) -> None:
     if last > first:
         bar = figure.colorbar(ScalarMappable(shades, TIMES), ax=paper, shrink=0.85, aspect=32, pad=0.02)
         bar.set_label(f"time of the position, {letter}s")
-    handles = list(_legend(sketch, undeformed=undeformed))
-    if handles:
-        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.985), "borderaxespad": 0.2}
-        paper.legend(handles=handles, fontsize=8, ncols=3, frameon=False, **place)
+    legend_above(paper, list(_legend(sketch, undeformed=undeformed)))
     Sheet(figure, axes, paper, sketch).finish(gravity=1.0)
 
 
@@ -203,12 +275,6 @@ def _legend(sketch: Sketch, *, undeformed: bool) -> Iterator[Line2D]:
         yield Line2D([], [], color=REST, linewidth=1.2, linestyle=DOTTED, label="undeformed")
     if any(mark.name.startswith("way-") for mark in sketch.marks):
         yield Line2D([], [], color=WAY, linewidth=0.9, label="way of a node")
-
-
-def _chosen(motion: Trajectory) -> list[MotionState]:
-    """Answers evenly over the time."""
-    wanted = np.linspace(motion.times[0], motion.times[-1], STROBES)
-    return [motion.steps[i] for i in np.unique(np.abs(motion.times - wanted[:, None]).argmin(axis=1))]
 
 
 def _sketch_ways(sketch: Sketch, motion: Trajectory) -> None:

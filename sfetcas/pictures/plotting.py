@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,32 +18,38 @@ from matplotlib.figure import Figure
 from ..description.records import say
 from ..equilibria.solution import Solution
 from ..errors import SceneError
+from .colours import coloured
 from .files import check_ending, save_figure
 from .glyphs import sketch_all
 from .looks import looks_of_equilibria, looks_of_steps, number_of
-from .sheet import Colour, sheet_of
+from .sheet import sheet_of
 from .sketch import Sketch, course_of, view_of
 
 __all__ = ["picture", "save_picture"]
 
-COLOURS = ("moment", "magnitude", "none")
 MOST_STEPS = 40
 """Steps drawn at most."""
 
 
-def save_picture(solution: Solution, path: str | os.PathLike[str]) -> None:
+def save_picture(solution: Solution, path: str | os.PathLike[str], **how: Any) -> None:
     """Write :func:`picture` of an answer to a file, in the format of its ending.
+
+    Parameters
+    ----------
+    solution : Solution
+    path : path
+    how : as of :func:`picture`
 
     Raises
     ------
     SceneError
-        The ending is none of ``files.ENDINGS``.
+        As :func:`picture`, or the ending is none of ``files.ENDINGS``.
     """
     check_ending(path)
-    save_figure(picture(solution), path)
+    save_figure(_drawn(solution, shown=False, **how), path)
 
 
-def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: Colour = "moment") -> Figure:
+def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: str = "moment") -> Figure:
     """The deformed structure over the undeformed one, ready for a report.
 
     Parameters
@@ -53,29 +60,32 @@ def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: C
         its loads and reactions, the others thin.  Default: all; where all equilibria are asked for those of the last
         factor, the first of them bold.
     colour : str
-        ``moment``: bending moment, in the plane about z with its sign; ``magnitude``: its magnitude; ``none``.
+        The quantity that colours tell: one of :data:`~sfetcas.pictures.colours.QUANTITIES`, or ``none``.
 
     Returns
     -------
     Figure
-        matplotlib figure without pyplot, 7 x 5 inch.
+        matplotlib figure, 7 x 5 inch; it shows itself in notebooks and by ``pyplot.show()``.
 
     Raises
     ------
     SceneError
         There is no such step or colour.
     """
-    if colour not in COLOURS:
-        raise SceneError(f"found {say(colour)}, accepted: {', '.join(COLOURS)}", ("colour",))
+    return _drawn(solution, shown=True, steps=steps, colour=colour)
+
+
+def _drawn(solution: Solution, *, shown: bool, steps: Sequence[int] | None = None, colour: str = "moment") -> Figure:
+    quantity = coloured(solution.scene, colour)
     numbers = _chosen(solution, steps)
     chosen = [solution.steps[number] for number in numbers]
-    course = course_of(solution.scene, chosen, colour)
+    course = course_of(solution.scene, chosen, None if quantity is None else quantity.of)
     view = view_of(chosen[-1].model.space, [*course.rest, *course.last])
     sketch = Sketch(solution.scene, chosen[-1], course, view)
     sketch_all(sketch)
     several = solution.scene.analysis.equilibria == "all"
     looks = looks_of_equilibria(sketch, solution, numbers) if several else looks_of_steps(chosen)
-    sheet = sheet_of(sketch, looks, colour)
+    sheet = sheet_of(sketch, looks, quantity, shown=shown)
     sheet.finish(gravity=sketch.step.factor)
     return sheet.figure
 

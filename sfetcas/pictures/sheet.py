@@ -7,7 +7,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -17,7 +17,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path as Outline
@@ -29,7 +28,8 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # typ
 
 from ..description.structure import unit
 from ..mathematics.arrays import TINY, Array
-from .files import DPI
+from .colours import ColourQuantity
+from .showing import new_figure
 from .sketch import (
     BEHIND,
     LOAD,
@@ -44,14 +44,25 @@ from .sketch import (
     dense,
     flat_unit,
     norm,
-    prefix,
     rounded,
     thinned,
+    with_prefix,
 )
 
-__all__ = ["DOTTED", "Colour", "Sheet", "axes_on", "drawn_text", "plot_line", "sheet_of", "title_of"]
+__all__ = [
+    "DOTTED",
+    "Sheet",
+    "add_bar",
+    "axes_on",
+    "drawn_text",
+    "legend_above",
+    "name_upright",
+    "pieces_of",
+    "plot_line",
+    "sheet_of",
+    "title_of",
+]
 
-Colour = Literal["moment", "magnitude", "none"]
 DOTTED = (0, (1, 2))
 """Of the undeformed structure; dashes are for what is unstable."""
 WIDTH, HEIGHT = 7.0, 5.0
@@ -61,22 +72,32 @@ MOST_HIDDEN = 25.0
 """What a label may hide where there are too many: about half its width of a line in colour."""
 FONT = 9.0
 """Height of labels, points."""
+PLAIN = "#7F8FA6"
+"""Of members without a value."""
 
-SIGNED = LinearSegmentedColormap.from_list("signed", ["#5E1A70", "#9970AB", "#D8D8D8", "#5AAE61", "#126B33"])
-SIZES = LinearSegmentedColormap.from_list("sizes", ["#D8D8D8", "#7FBF9B", "#2A788E", "#404688", "#4B0C5C"])
+SIGNED = LinearSegmentedColormap.from_list(
+    "signed", ["#5E1A70", "#9970AB", "#D8D8D8", "#5AAE61", "#126B33"]
+).with_extremes(bad=PLAIN)
+SIZES = LinearSegmentedColormap.from_list(
+    "sizes", ["#D8D8D8", "#7FBF9B", "#2A788E", "#404688", "#4B0C5C"]
+).with_extremes(bad=PLAIN)
 
 
-def sheet_of(sketch: Sketch, looks: Sequence[Look], colour: Colour) -> Sheet:
+def sheet_of(sketch: Sketch, looks: Sequence[Look], quantity: ColourQuantity | None, *, shown: bool) -> Sheet:
     """A figure with axes, centre lines, colour bar, title and legend; :meth:`Sheet.finish` draws the sketch on it.
 
-    ``looks`` are those of the earlier lines and of the last.
+    Parameters
+    ----------
+    looks : those of the earlier lines and of the last
+    quantity : what the values of the sketch are
+    shown : whether the figure is registered with pyplot
     """
-    figure = Figure(figsize=(WIDTH, HEIGHT), dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
+    figure = new_figure(WIDTH, HEIGHT, shown=shown)
     paper = figure.add_subplot()
     axes = axes_on(figure, paper, sketch)
     lines, values = _add_lines(axes, sketch, looks)
-    if values is not None:
-        _add_bar(figure, paper, lines, values, sketch, colour)
+    if values is not None and quantity is not None:
+        add_bar(figure, paper, [(lines, values)], quantity, space=sketch.step.model.space)
     title = title_of(sketch.scene.title)
     if title:
         figure.suptitle(title, fontsize=11, parse_math=False)
@@ -116,6 +137,27 @@ def title_of(text: str) -> str:
     even = (textwrap.wrap(known, width) for width in range(max(20, len(known) // max(1, lines)), 69))
     fitting = (wrapped for wrapped in even if len(wrapped) <= min(3, lines))
     return "\n".join(next(fitting, textwrap.wrap(known, 68, max_lines=3, placeholder=" ...")))
+
+
+def legend_above(axes: Axes, handles: Sequence[Any] | None = None, columns: int = 4) -> None:
+    """The legend above the frame, where it hides nothing; at its left axes tell numbers to be added."""
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+    given = axes.get_legend_handles_labels()[0] if handles is None else handles
+    if given:
+        axes.legend(handles=given, ncols=columns, fontsize=8, frameon=False, **place)
+
+
+def name_upright(axes: Axes, text: str) -> None:
+    """Write what an upright axis tells, in as many lines as its height asks for, three at most."""
+    part = axes.get_subplotspec()
+    rows = 1 if part is None else part.get_gridspec().nrows
+    letters = max(12, int(72.0 * (axes.figure.bbox.height / axes.figure.dpi / rows - NO_FRAME) / (0.6 * FONT)))
+    lines = textwrap.wrap(drawn_text(text), letters, max_lines=3, placeholder=" ...")
+    axes.set_ylabel("\n".join(lines), parse_math=False, fontsize=FONT)
+
+
+NO_FRAME = 0.6
+"""Inch of the height of a panel that its frame does not have."""
 
 
 def _fill_plane(axes: Axes, sketch: Sketch) -> None:
@@ -176,25 +218,37 @@ def _add_lines(axes: Any, sketch: Sketch, looks: Sequence[Look]) -> tuple[Any, A
     add(course.last, "outline", colors="#222222", linewidths=3.8, capstyle="round", zorder=3)
     style: dict[str, Any] = {"linewidths": 2.4, "capstyle": "round", "zorder": 3.5}
     if not course.values:
-        return add(course.last, "deformed", colors="#7F8FA6", **style), None
-    pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in course.last])
-    values = np.concatenate([0.5 * (value[:-1] + value[1:]) for value in course.values])
+        return add(course.last, "deformed", colors=PLAIN, **style), None
+    pieces, values = pieces_of(course.last, course.values)
     return add(list(pieces), "deformed", **style), values
 
 
-def _add_bar(figure: Figure, paper: Axes, lines: Any, values: Array, sketch: Sketch, colour: Colour) -> None:
-    """Colour the pieces by the values (n,) in N m, and say so in a colour bar from zero to the extremes."""
-    plane = sketch.view.angles is None
-    signed = plane and colour == "moment"
-    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+def pieces_of(lines: Sequence[Array], values: Sequence[Array]) -> tuple[Array, Array]:
+    """Pieces (n, 2, 3) of lines, and the mean values (n,) on them."""
+    pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
+    return pieces, np.concatenate([0.5 * (value[:-1] + value[1:]) for value in values])
+
+
+def add_bar(
+    figure: Figure, paper: Axes, coloured: Sequence[tuple[Any, Array]], quantity: ColourQuantity, *, space: bool
+) -> float:
+    """Colour pieces by their values (n,) in SI units, with a colour bar from zero to the extremes; its unit.
+
+    ``coloured`` are collections of lines with their values, all on one scale.
+    """
+    every = np.concatenate([values for _, values in coloured])
+    known, signed = every[np.isfinite(every)], quantity.diverging(space)
+    low, high = min(0.0, float(known.min())), max(0.0, float(known.max()))
     largest = max(high, -low)
-    factor, letter = prefix(largest, 0.2)
-    lines.set(cmap=SIGNED if signed else SIZES, norm=Normalize(-largest / factor if signed else 0.0, largest / factor))
-    lines.set_array(values / factor)
-    bar = figure.colorbar(lines, ax=paper, shrink=0.85, aspect=32, pad=0.02)
+    factor, unit = with_prefix(largest, quantity.unit, 0.2)
+    norm = Normalize(-largest / factor if signed else 0.0, largest / factor)
+    for lines, values in coloured:
+        lines.set(cmap=SIGNED if signed else SIZES, norm=norm)
+        lines.set_array(np.ma.masked_invalid(values / factor))
+    bar = figure.colorbar(coloured[-1][0], ax=paper, shrink=0.85, aspect=32, pad=0.02)
     bar.ax.set_ylim(low / factor, high / factor)
-    name = "bending moment about z" if signed else "bending moment" if colour == "moment" else "size of bending moment"
-    bar.set_label(f"{name}, {letter}N m")
+    bar.set_label(f"{quantity.label(space)}, {unit}")
+    return factor
 
 
 def _legend(sketch: Sketch, looks: Sequence[Look]) -> list[Any]:
@@ -320,7 +374,7 @@ class Sheet:
 
     def _projected(self, points: Array) -> Array:
         if self.axes is self.paper:
-            return points[:, :2]
+            return self.sketch.view.flat(points)
         x, y, _ = proj3d.proj_transform(*points.T, self.axes.get_proj())
         return np.stack([np.asarray(x), np.asarray(y)], axis=1)
 
@@ -365,7 +419,7 @@ class Sheet:
         self.axes.apply_aspect()
 
     def _fit_space(self, content: Array) -> None:
-        cell, renderer = self.paper.get_window_extent(), FigureCanvasAgg(self.figure).get_renderer()  # type: ignore[no-untyped-call]
+        cell, renderer = self.paper.get_window_extent(), self._renderer()
         limits = np.array([self.axes.get_xlim(), self.axes.get_ylim(), self.axes.get_zlim()])
         ticks = [axis.get_tightbbox(renderer) for axis in self._axes_in_space()]
         corners = self.pixels(np.array(list(itertools.product(*limits))))
@@ -379,6 +433,13 @@ class Sheet:
             self._space_out(axis)
         # Last: up to the next drawing a new position is that of axes as wide as the figure.
         self.axes.set_position((left + shift[0], bottom + shift[1], width, height))
+
+    def _renderer(self) -> Any:
+        """What measures texts, on the canvas that the figure has or on one for a moment."""
+        canvas = self.figure.canvas
+        renderer = FigureCanvasAgg(self.figure).get_renderer()  # type: ignore[no-untyped-call]
+        self.figure.set_canvas(canvas)
+        return renderer
 
     def _axes_in_space(self) -> tuple[Any, Any, Any]:
         return self.axes.xaxis, self.axes.yaxis, self.axes.zaxis

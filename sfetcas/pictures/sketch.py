@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -44,7 +44,9 @@ __all__ = [
     "rounded",
     "tangents_of",
     "thinned",
+    "unit_for",
     "view_of",
+    "with_prefix",
 ]
 
 LOAD, REACTION, MOTION = "#D55E00", "#0072B2", "#8F3B76"
@@ -67,10 +69,36 @@ def in_short(factor: float) -> str:
 def prefix(value: float, least: float = 0.1) -> tuple[float, str]:
     """Factor and letter of the SI prefix for a value: none from ``least`` to 9999, a power of ten beyond all."""
     value = abs(value)
-    if value == 0.0 or least <= value < 1e4:
+    if value == 0.0 or least <= value < 1e4 or not math.isfinite(value):
         return 1.0, ""
     power = 3 * math.floor(math.log10(value / (least if value < least else 1.0)) / 3.0)
-    return 10.0**power, PREFIXES.get(power, f"$10^{{{power}}}$ ")
+    return 10.0**power, PREFIXES.get(power, f"{_ten_to(power)} ")
+
+
+def with_prefix(value: float, unit: str, least: float = 0.1) -> tuple[float, str]:
+    """Factor and unit for a value: the unit with its SI prefix, or behind a power of ten where it takes none."""
+    factor, letter = prefix(value, least)
+    if (unit[:1].isalpha() and not unit.startswith("kg")) or not letter:
+        return factor, f"{letter}{unit}"
+    power = _ten_to(round(math.log10(factor)))
+    return factor, f"{power}{unit[1:]}" if unit.startswith("1/") else f"{power} {unit}".rstrip()
+
+
+def unit_for(values: Array, unit: str) -> tuple[float, str]:
+    """Factor and unit for an axis on which values are drawn; of values far from zero that of differences."""
+    known = values[np.isfinite(values)]
+    size = float(np.abs(known).max(initial=0.0))
+    spread = float(np.ptp(known)) if len(known) else 0.0
+    return with_prefix(spread if ROUNDING * size < spread < OFFSET * size else size, unit)
+
+
+ROUNDING, OFFSET = 1e-12, 1e-3
+"""Values that differ by less than the first share of their size are the same; by less than the second, axes tell a
+number to be added."""
+
+
+def _ten_to(power: int) -> str:
+    return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def amount(value: float, name: str) -> str:
@@ -93,7 +121,9 @@ class Course:
     members : names, in the order of the lists
     rest, last : undeformed, and of the last step
     earlier : the same of the earlier steps, step by step
-    values : (n,) N m along the lines of ``last``; empty where nothing is to be coloured
+    values : (n,) in SI units along the lines of ``last``; empty where nothing is to be coloured
+    earlier_values : the same of the earlier steps, where they are asked for
+    largest_moment : of the sections of ``last``, N m
     """
 
     unit: float
@@ -103,6 +133,8 @@ class Course:
     last: list[Array]
     earlier: list[list[Array]]
     values: list[Array]
+    earlier_values: list[list[Array]] = field(default_factory=list)
+    largest_moment: float = 0.0
 
     @functools.cached_property
     def everything(self) -> Array:
@@ -110,20 +142,26 @@ class Course:
         return np.vstack([*self.rest, *self.last, *(line for lines in self.earlier for line in lines)])
 
 
-def course_of(scene: Scene, steps: Sequence[Configuration], colour: str) -> Course:
-    """Sampled centre lines of the undeformed scene and of equilibria, the last with values to colour by."""
+Values = Callable[[Configuration, Mapping[str, Mapping[str, Array]], Mapping[str, Array]], list[Array]]
+"""(state, fields of each member, fractions of its length) -> values (n,) along each, or nothing."""
+
+
+def course_of(
+    scene: Scene, steps: Sequence[Configuration], values: Values | None = None, *, every: bool = False
+) -> Course:
+    """Sampled centre lines of the undeformed scene and of states, with values of the last one (or ``every``)."""
     names = tuple(scene.members)
-    last = {name: steps[-1].along(name, _samples(steps[-1], name)) for name in names}
-    deformed = [last[name]["position"] for name in names]
-    rest = [scene.center_lines[name].positions(_samples(steps[-1], name)) for name in names]
-    earlier = [[step.along(name, _samples(step, name))["position"] for name in names] for step in steps[:-1]]
-    extent = max(float(np.ptp(np.vstack(lines), axis=0).max()) for lines in (rest, deformed, *earlier))
+    places = [{name: _samples(step, name) for name in names} for step in steps]
+    fields = [{name: step.along(name, x[name]) for name in names} for step, x in zip(steps, places, strict=True)]
+    rest = [scene.center_lines[name].positions(places[-1][name]) for name in names]
+    deformed = [[entry["position"] for entry in entries.values()] for entries in fields]
+    extent = max(float(np.ptp(np.vstack(lines), axis=0).max()) for lines in (rest, *deformed))
     unit, letter = prefix(extent, 0.2)
-    values = [_bending(steps[-1], name, last[name], colour) for name in names] if colour != "none" else []
-    if values and max(float(np.abs(value).max()) for value in values) <= _noise(steps[-1], last.values()):
-        values = []
-    scaled = [[line / unit for line in lines] for lines in (rest, deformed, *earlier)]
-    return Course(unit, letter, names, scaled[0], scaled[1], scaled[2:], values)
+    (first, last, *earlier) = [[line / unit for line in lines] for lines in (rest, deformed[-1], *deformed[:-1])]
+    given = list(zip(steps, fields, places, strict=True))
+    told = [] if values is None else [values(*one) for one in given[0 if every else -1 :]]
+    largest = max(float(np.linalg.norm(entry["moment"], axis=1).max()) for entry in fields[-1].values())
+    return Course(unit, letter, names, first, last, earlier, told[-1] if told else [], told[:-1], largest)
 
 
 def _samples(step: Configuration, member: str) -> Array:
@@ -139,23 +177,6 @@ def tangents_of(step: Configuration, member: str, x: Array) -> Array:
     """Unit tangents (n, 3) at fractions (n,) of the length of a deformed member, fixed axes."""
     rest = step.model.scene.center_lines[member].tangents(x)
     return quaternion.rotate(step.along(member, x)["quaternion"], rest)
-
-
-def _bending(step: Configuration, member: str, fields: dict[str, Array], colour: str) -> Array:
-    """Bending moment (n,) in N m: about z with its sign, or the magnitude of what is across the tangent."""
-    moment = fields["moment"]
-    if not step.model.space:
-        return moment[:, 2] if colour == "moment" else np.abs(moment[:, 2])
-    tangents = tangents_of(step, member, np.linspace(0.0, 1.0, len(moment)))
-    twist = np.einsum("ni,ni->n", moment, tangents)
-    return np.asarray(np.linalg.norm(moment - twist[:, None] * tangents, axis=1))
-
-
-def _noise(step: Configuration, fields: Iterable[dict[str, Array]]) -> float:
-    """Moments up to this many N m are rounding."""
-    scales = step.model.scales
-    largest = max(float(np.linalg.norm(field["force"], axis=1).max()) for field in fields)
-    return max(1e-9 * largest * scales.length, 1e-12 * scales.moment)
 
 
 # The point of view

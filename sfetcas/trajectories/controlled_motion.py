@@ -17,11 +17,14 @@ from ..description.showing import error_in_words, notes_in_words, ranges_in_word
 from ..dynamics.motion import Trajectory
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.arrays import Array
+from ..mathematics.interpolation import evaluation
 from ..parametric.arguments import with_values
 from .replay import HALVINGS, Response, respond
 from .transcription import GridMotion, Transcription
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..description.scene import Scene
 
 __all__ = ["Check", "ControlledMotion"]
@@ -245,19 +248,56 @@ class ControlledMotion:
             raise SceneError("found no replay, accepted: an answer of solve(replay=True)")
         return self.check.response.trajectory
 
+    def plot(self, **how: Any) -> Figure:
+        """Controls with bounds beside positions, see :func:`~sfetcas.pictures.controls.control_picture`."""
+        from ..pictures.controls import control_picture
+
+        return control_picture(self, **how)
+
     def _node_positions(self) -> dict[str, Array]:
         """Positions of all nodes at the begin and the ends of the intervals, (intervals + 1, 3) m."""
-        system, stages = self.transcription.system, self.transcription.stages
-        axes = system.system.axes
-        x = np.vstack([system.begin.x, self.course.x[stages - 1 :: stages]])
-        found = {}
-        for name in system.model.nodes:
-            place = system.model.segments.place(name)
-            rest = np.asarray(self.scene.nodes[name].position, dtype=float)
-            moved = np.zeros((len(x), 3))
-            moved[:, :axes] = x[:, axes * place : axes * (place + 1)] * system.model.scales.length
-            found[name] = rest + moved
+        stages = self.transcription.stages
+        x = np.vstack([self.transcription.system.begin.x, self.course.x[stages - 1 :: stages]])
+        return {name: self._places(name, x) for name in self.transcription.system.model.nodes}
+
+    def _places(self, node: str, x: Array) -> Array:
+        """Positions (n, 3) m of a node of quantities (n, quantities)."""
+        system = self.transcription.system
+        axes, place = system.system.axes, system.model.segments.place(node)
+        found = np.tile(np.asarray(self.scene.nodes[node].position, dtype=float), (len(x), 1))
+        found[:, :axes] += x[:, axes * place : axes * (place + 1)] * system.model.scales.length
         return found
+
+    def interpolated(self, node: str, parts: int = 8) -> tuple[Array, Array]:
+        """Positions of a node within the intervals, by the polynomials of the collocation.
+
+        Parameters
+        ----------
+        node : str
+        parts : int
+            Number of equal parts of each interval.
+
+        Returns
+        -------
+        times : ndarray (n,)
+            s
+        positions : ndarray (n, 3)
+            m
+
+        Raises
+        ------
+        SceneError
+            There is no such node.
+        """
+        if node not in self.transcription.system.model.nodes:
+            raise SceneError(f"node: {unknown(node, list(self.transcription.system.model.nodes), 'nodes')}")
+        inside, stages = np.arange(1, parts + 1) / parts, self.transcription.stages
+        rows = evaluation(np.append(0.0, self.transcription.places), inside)
+        x = np.vstack([self.transcription.system.begin.x, self.course.x])
+        pieces = [rows @ x[first : first + stages + 1] for first in range(0, len(x) - 1, stages)]
+        ends = self.ends
+        times = [begin + inside * (end - begin) for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+        return np.concatenate([ends[:1], *times]), self._places(node, np.vstack([x[:1], *pieces]))
 
     def positions(self, node: str) -> Array:
         """Positions of a node at :attr:`ends`, (intervals + 1, 3) m; SceneError if there is no such node."""

@@ -19,6 +19,7 @@ from ..description.records import counted, plain, unknown
 from ..description.scene import Scene, check_scene
 from ..description.showing import error_in_words, shown
 from ..dynamics.motion import MotionState, Trajectory
+from ..dynamics.sampling import StepRecord
 from ..dynamics.simulation import Simulation
 from ..equilibria.settings import Settings
 from ..errors import SceneError, SolveError, Status
@@ -55,6 +56,8 @@ class Response:
         Estimated error of the positions by the time steps, over the size of the scene.
     count : int
         Number of steps of the last run.
+    record : StepRecord or None
+        The time steps of that run.
     """
 
     times: Array
@@ -63,6 +66,7 @@ class Response:
     end: float
     error_estimate: float
     count: int
+    record: StepRecord | None = field(repr=False, default=None)
 
     def __repr__(self) -> str:
         span = f"{counted(len(self.times), 'answer')} from {self.times[0]:g} to {self.times[-1]:g} s"
@@ -97,6 +101,7 @@ class Response:
             error_estimate=self.error_estimate,
             error_of="",
             violation={},
+            record=self.record,
         )
 
     @property
@@ -243,7 +248,7 @@ def respond(
             off = _apart(against, {n: best[n][: len(one)] for n, one in against.items()}) / scene.size
         if error <= max(accuracy, 0.1 * off):
             break
-    return Response(replays.times, best, tuple(run.instants), end, error, run.count)
+    return Response(replays.times, best, tuple(run.instants), end, error, run.count, run.record)
 
 
 @dataclass
