@@ -325,12 +325,8 @@ class Ways:
         self, pilot: Prepared, begin: float, end: float, state: State, allowed: Allowed | None = None
     ) -> EquilibriumResult | None:
         """Follow from one factor to another, stopping where a history has a knot: no step jumps over one."""
-        knots = {
-            t
-            for history in self.scene.histories.values()
-            for t in history.knots
-            if min(begin, end) < t < max(begin, end)
-        }
+        low, high = min(begin, end), max(begin, end)
+        knots = {t for history in self.scene.histories.values() for t in history.knots if low < t < high}
         stops = [begin, *sorted(knots, reverse=end < begin), end]
         found: EquilibriumResult | None = None
         for a, b in zip(stops, stops[1:], strict=False):
