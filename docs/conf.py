@@ -1,10 +1,14 @@
 """How the documentation is built: ``python -m sphinx -W -b html docs build/docs``, without network."""
 
+import os
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "extensions")]
+
+# Pictures need no window, also those of processes that draw the gallery.
+os.environ["MPLBACKEND"] = "Agg"
 
 import sfetcas  # noqa: E402
 

@@ -20,12 +20,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 from sfetcas import Scene, load, solve
 from sfetcas.checks import check
 from sfetcas.description.records import say
-from sfetcas.outputs import _plot
 from sfetcas.reports import report
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,6 +33,7 @@ PROBLEMS = ROOT / "problems"
 GALLERY = ROOT / "docs" / "gallery"
 PICTURES = GALLERY / "pictures"
 KEPT = GALLERY / "kept"
+DPI = 110
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,7 @@ def entry_of(file: Path) -> Entry:
         It cannot be solved.
     """
     PICTURES.mkdir(parents=True, exist_ok=True)
-    with mpl.rc_context({"figure.dpi": 100, "savefig.dpi": 100}):
-        return _of_program(file) if file.suffix == ".py" else _of_scene(file)
+    return _of_program(file) if file.suffix == ".py" else _of_scene(file)
 
 
 def _of_scene(file: Path) -> Entry:
@@ -101,13 +101,17 @@ def _of_scene(file: Path) -> Entry:
         )
         for entry in check(scene, answer)
     ]
-    drawing = PICTURES / f"{file.stem}.png"
-    _plot(drawing, scene)(answer, drawing)
+    _save(answer.plot(), file)
     title = scene.title or file.stem
     command = f"sfetcas run problems/{file.name} --plot {file.stem}.png"
     return Entry(
         file.stem, title, _group(scene), scene.source, "", command, said.getvalue(), comparisons, seconds, picture=True
     )
+
+
+def _save(figure: Figure, file: Path) -> None:
+    figure.savefig(PICTURES / f"{file.stem}.png", dpi=DPI)
+    plt.close(figure)
 
 
 def _choice(expect: Any) -> Iterator[str]:
@@ -146,7 +150,7 @@ def _of_program(file: Path) -> Entry:
     ]
     drawn = hasattr(module, "picture")
     if drawn:
-        module.picture().savefig(PICTURES / f"{file.stem}.png")
+        _save(module.picture(), file)
     title, _, text = (module.__doc__ or file.stem).partition("\n")
     command = f"python problems/{file.name}"
     return Entry(
