@@ -34,7 +34,7 @@ def hung(contact, dimension="plane"):
 
 def sketched(solution):
     """What a picture of the last step shows, before it is drawn."""
-    course = course_of(solution.scene, solution.steps, "none")
+    course = course_of(solution.scene, solution.steps)
     sketch = Sketch(solution.scene, solution.last, course, view_of(solution.last.model.space, course.last))
     sketch_all(sketch)
     return sketch

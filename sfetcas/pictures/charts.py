@@ -256,7 +256,7 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity, shapes: Sequence[_
     # More numbers like -0.0075 would run into each other.
     axes.locator_params(axis="x", nbins=6)
     if limits is not None:
-        leave(axes, ends, limits, unit, letters)
+        leave(axes, ends, limits, unit, quantity.unit)
 
 
 def _draw_branch(axes: Axes, branch: Branch, values: Array, colour: str, *, upright: bool) -> None:

@@ -25,7 +25,7 @@ from ..mathematics.arrays import Array
 from .files import check_ending, save_figure
 from .sheet import legend_above, name_upright, title_of
 from .showing import Picture, new_figure
-from .sketch import unit_for
+from .sketch import rounded, unit_for, with_prefix
 
 __all__ = [
     "COMPONENTS",
@@ -207,7 +207,7 @@ def draw_panel(panel: Axes, name: AnswerName, found: Sequence[Curve]) -> None:
     panel.grid(color="#EBEBEB", linewidth=0.6)
     panel.margins(x=0.01)
     if limits is not None:
-        leave(panel, found, limits, factor, unit)
+        leave(panel, found, limits, factor, name.kind.unit)
     if any(curve.name for curve in found):
         legend_above(panel)
 
@@ -252,5 +252,8 @@ def leave(panel: Axes, found: Sequence[Curve], limits: tuple[float, float], fact
                 style: dict[str, Any] = {"linestyle": "", "clip_on": False, "markersize": 5, "gid": "leaves"}
                 panel.plot(curve.at[places], np.full(len(places), edge / factor), marker, color=curve.colour, **style)
                 extremes.append(float(curve.values[beyond][np.argmax(np.abs(curve.values[beyond]))]))
-    text = " and ".join(f"{value / factor:.2g}" for value in sorted({min(extremes), max(extremes)}))
-    panel.set_title(f"leaves the axes: up to {text} {unit}".rstrip(), fontsize=8, loc="left", parse_math=False)
+    shown, si = with_prefix(max(map(abs, extremes)), unit)
+    text = " and ".join(f"{rounded(value / shown):g}" for value in sorted({min(extremes), max(extremes)}))
+    style = {"fontsize": 7.5, "ha": "center", "va": "top", "parse_math": False, "gid": "leaving", "zorder": 5.0}
+    style["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
+    panel.text(0.5, 0.97, f"leaves the axes: up to {text} {si}".rstrip(), transform=panel.transAxes, **style)

@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from ..tradeoff.trading import Row, Trade, again, whole
-from .files import DPI, check_ending, save_figure
+from .files import check_ending, save_figure
 from .looks import PALETTE
 from .sheet import drawn_text, title_of
+from .showing import new_figure
 
 __all__ = ["front_picture", "save_front"]
 
@@ -31,15 +32,19 @@ def save_front(trade: Trade, file: str | os.PathLike[str]) -> None:
         The ending is none of ``files.ENDINGS``.
     """
     check_ending(file)
-    save_figure(front_picture(trade), file)
+    save_figure(_drawn(trade, shown=False), file)
 
 
 def front_picture(trade: Trade) -> Figure:
     """Errors over seconds of whole runs and, where there are such, of repeated solves alone; 11 or 7 x 5.5 inch."""
+    return _drawn(trade, shown=True)
+
+
+def _drawn(trade: Trade, *, shown: bool) -> Figure:
     costs: list[tuple[str, Callable[[Row], float]]] = [("a whole run", whole)]
     if any(np.isfinite(row.again) for row in trade.rows):
         costs.append(("a repeated solve alone", again))
-    figure = Figure(figsize=(7.0 if len(costs) == 1 else 11.0, 5.5), dpi=DPI, layout="constrained")
+    figure = new_figure(7.0 if len(costs) == 1 else 11.0, 5.5, shown=shown)
     papers = np.atleast_1d(figure.subplots(1, len(costs), sharey=True))
     for paper, (label, cost) in zip(papers, costs, strict=True):
         _draw(paper, trade, cost)
