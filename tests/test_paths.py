@@ -845,3 +845,43 @@ def test_a_stretch_that_ends_at_an_event_keeps_it():
     found = _with_crossed_folds(Traced(points, [last], "range"), 0)
     assert found.points == points
     assert found.events == [last]
+
+
+def pressed_arch(side):
+    """A hinged arch pressed at its crown, a little to one side."""
+    half = 0.6
+    foot, rise = np.sin(half), 1.0 - np.cos(half)
+    arc = {"type": "arc", "angle": -half}
+    return Scene.from_dict(
+        {
+            "sections": {"strip": {"EI3": 1.0}},
+            "nodes": {
+                "left": {"position": [-foot, 0], "support": "hinge"},
+                "crown": {"position": [0, rise]},
+                "right": {"position": [foot, 0], "support": "hinge"},
+            },
+            "members": {
+                "first": {"nodes": ["left", "crown"], "section": "strip", "shape": arc},
+                "second": {"nodes": ["crown", "right"], "section": "strip", "shape": arc},
+            },
+            "loads": {"press": {"type": "force", "node": "crown", "value": [side, -1]}},
+            "analysis": {"type": "path", "range": [-30, 30], "accuracy": 1e-6},
+        }
+    )
+
+
+def test_path_that_comes_near_to_another_one_turns_away_from_it():
+    """Pressed a little aside, an arch has a limit point where the even one has a bifurcation.
+
+    It is lower by a share of the two thirds power of the imperfection (Koiter), the same one for all.
+    """
+    even, sides = solve(pressed_arch(0.0)), np.array([1e-3, 1e-4, 1e-5, 1e-6])
+    (bifurcation,) = (entry.factor for entry in even.bifurcations if entry.factor > 0.0)
+    paths = [solve(pressed_arch(side)) for side in sides]
+    assert not any(path.bifurcations for path in paths)
+    # Up to the crest, down the bent branch, and up again where it comes to the even path from the other side.
+    assert all(path.limit_points[0].factor > 0.0 > path.limit_points[1].factor for path in paths)
+    assert all(path.points[-1].stable for path in paths)
+    lowered = np.array([bifurcation - path.limit_points[0].factor for path in paths]) / sides ** (2.0 / 3.0)
+    # The next term is of the order of the third root of the imperfection, a tenth for the largest.
+    np.testing.assert_allclose(lowered, lowered.mean(), rtol=0.1)

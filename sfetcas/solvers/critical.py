@@ -50,6 +50,15 @@ LARGEST_PRIMAL_FACTOR = 1e6
 TRUSTED = 0.02
 """Largest correction of an interpolated point, rad; with a larger one the point is searched along the arc instead."""
 
+TORN = 1e-3
+"""Farther from the points beside it a bifurcation point is not on their curve, rad; rounding moves it by 1e-5."""
+
+ALONG = 0.8
+"""Cosine of the angle by which a curve turns at most beside a bifurcation point, as from one point to the next.
+
+A curve that only comes near to another one folds away from it: the cosine falls to 0.1; at bifurcations it is 0.99.
+"""
+
 AROUND_LIMIT = 1e-3
 """Share of the arc on both sides of a limit point in which bifurcations are not searched."""
 
@@ -73,8 +82,11 @@ class Event:
     multiplicity: int = 1
 
 
-def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
-    """Limit and bifurcation points between two neighbouring points of the curve, in the order of the arc length."""
+def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event] | None:
+    """Limit and bifurcation points between two neighbouring points of the curve, in the order of the arc length.
+
+    None where the points belong to different curves: an eigenvalue changes its sign, but vanishes nowhere between.
+    """
     if a.tangent.factor * b.tangent.factor >= 0.0:
         return _bifurcations(curve, a, b)
     limit = _limit(curve, a, b)
@@ -85,14 +97,15 @@ def events_between(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     at, arc, place = curve.between(a, b), b.arc - a.arc, limit.arc - a.arc
     left = at(place - min(AROUND_LIMIT * arc, 0.5 * place)) or a
     right = at(place + min(AROUND_LIMIT * arc, 0.5 * (arc - place))) or b
-    return [*_bifurcations(curve, a, left), Event("limit", limit), *_bifurcations(curve, right, b)]
+    before, after = _bifurcations(curve, a, left), _bifurcations(curve, right, b)
+    return None if before is None or after is None else [*before, Event("limit", limit), *after]
 
 
 def _limit(curve: Curve, a: Standing, b: Standing) -> Standing | None:
     return sought(curve, a, b, lambda standing: standing.tangent.factor)
 
 
-def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
+def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event] | None:
     before, after = a.inertia.negative, b.inertia.negative
     found: list[Event] = []
     for rank in range(min(before, after), max(before, after)):
@@ -106,7 +119,12 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
         standing = sought(curve, a, b, value, BLUR)
         if standing is None:
             continue
+        if abs(value(standing)) > BLURRED * BLUR:
+            # Somewhere between there are no points, or the eigenvalue leaps over zero.
+            return None
         standing = _settled(curve, a, b, standing)
+        if standing is None:
+            return None
         twin = next((e for e in found if abs(e.standing.arc - standing.arc) <= ONE_EVENT * (b.arc - a.arc)), None)
         if twin is not None:
             found[found.index(twin)] = Event("bifurcation", twin.standing, twin.multiplicity + 1)
@@ -117,23 +135,30 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event]:
     return sorted(met, key=lambda event: event.standing.arc)
 
 
-def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing:
+def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing | None:
     """A bifurcation point without the rounding errors along its critical mode, where the matrix is singular.
 
     State and tangent are interpolated from a point on either side, where the matrix is regular; Newton's method then
-    removes the error of the interpolation without changing the value along the mode.
+    removes the error of the interpolation without changing the value along the mode.  None where the curve does not
+    lead from one side to the other, as where it only comes near to another one.
     """
     at, place = curve.between(a, b), found.arc - a.arc
     reach = min(ASIDE * (b.arc - a.arc), 0.5 * place, 0.5 * (b.arc - found.arc))
-    left, right = at(place - reach), at(place + reach)
-    if left is None or right is None or reach == 0.0:
+    if reach == 0.0:
         return replace(found, tangent=_mean(curve, a, b))
+    left, right = at(place - reach), at(place + reach)
+    if left is None or right is None:
+        return None
+    aside = max(curve.prepared.distance(side.state, found.state) for side in (left, right))
+    turned = min(curve.inner(side.tangent, a.tangent) for side in (left, right))
+    if turned < ALONG or aside > TORN + 3.0 * curve.prepared.distance(left.state, right.state):
+        return None
     tangent = _mean(curve, left, right)
     # Positions between the two points are measured along the tangent of a, as in the search for the point.
     left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
     state, factor = curve.predicted(left, reach, curve.bend(left, right))
     settled = curve.corrected(state, factor, a.tangent, found.arc, primal_factor=LARGEST_PRIMAL_FACTOR)
-    close = settled is not None and curve.prepared.distance(settled.state, found.state) < 1e-3
+    close = settled is not None and curve.prepared.distance(settled.state, found.state) < TORN
     return replace(settled if settled is not None and close else found, tangent=tangent)
 
 

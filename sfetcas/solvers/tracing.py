@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -234,12 +235,15 @@ class _Piece:
         if self.message:
             self.end = "bent"
             return there, 0.0
-        start = self.points[0]
+        start, last = self.points[0], self.points[-1]
         closed = not left and len(self.points) >= LOOP and _closes(curve, start, now, there)
-        for end in _to_start(curve, start, now, there) if closed else [there]:
-            last = self.points[-1]
+        ends = _to_start(curve, start, now, there) if closed else [there]
+        between = [events_between(curve, *pair) for pair in pairwise([last, *ends])]
+        if None in between and length >= FINE:
+            return None, 0.5 * length
+        for end, events in zip(ends, between, strict=True):
             # A point that is met by chance may be the limit point itself.
-            met = [event for event in events_between(curve, last, end) if event.standing is not last]
+            met = [event for event in events or [] if event.standing is not self.points[-1]]
             self.events += met
             self.points += [event.standing for event in met if event.standing is not end] + [end]
         self.end = "range" if left else "closed" if closed else ""
