@@ -249,6 +249,8 @@ ORDER = [
     "__init__",
     "__main__",
     "benchmarks",
+    "benchmarks.saving",
+    "benchmarks.timing",
     "benchmarks.scenes",
     "benchmarks.random_scenes",
     "benchmarks.random_checks",
