@@ -1,7 +1,7 @@
 """Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
-Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import
-and extremes; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.  Four
+Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import,
+extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.  Four
 others, ``random``, ``jitter``, ``contact`` and ``ways``, stand alone, take options (``--help``) and half an hour each.
 
 Not a test: times are medians on the machine at hand, printed as tables.
@@ -17,6 +17,7 @@ from sfetcas.errors import SceneError, SolveError
 
 from .accuracy import knob
 from .code import code
+from .compared import compared
 from .contact_run import contact
 from .derivatives import derivatives
 from .extremes import extremes
@@ -41,7 +42,7 @@ def main(words: list[str]) -> None:
     known: dict[str, Benchmark] = {"order": order, "loads": loads, "size": size}
     known |= {"repeated": repeated, "derivatives": derivatives, "net": net, "path": path, "motion": motion}
     known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many}
-    known |= {"import": importing, "extremes": extremes}
+    known |= {"import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
     alone |= {"contact": contact, "ways": ways}
     if words[:1] and words[0] in alone:

@@ -33,7 +33,7 @@ from sfetcas.mechanics.model import assemble
 
 from .saving import head, row
 
-__all__ = ["METHODS", "PROBLEMS", "TOLERANCES", "motion", "pendulum", "run", "step_cost"]
+__all__ = ["PROBLEMS", "TOLERANCES", "motion", "pendulum", "run", "step_cost"]
 
 
 def pendulum() -> Scene:

@@ -271,6 +271,12 @@ ORDER = [
     "benchmarks.ways",
     "benchmarks.importing",
     "benchmarks.speed",
+    "benchmarks.shooting",
+    "benchmarks.compared_problems",
+    "benchmarks.compared_sfetcas",
+    "benchmarks.compared_exudyn",
+    "benchmarks.compared_opensees",
+    "benchmarks.compared",
     "benchmarks.__main__",
 ]
 """A module imports only from names to its left."""

@@ -1,12 +1,19 @@
-"""What benchmarks save."""
+"""What benchmarks save, and the comparison with other programs: the search, the exact solutions, the tables."""
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
 from benchmarks import __main__ as program
-from benchmarks import saving
+from benchmarks import compared, compared_problems, saving
+from benchmarks.compared_problems import MOTION, STATICS, Candidate
+from benchmarks.extremes import elastica_tip
+from benchmarks.shooting import exact_tip
+from sfetcas.equilibria.statics import solve
+
+README = Path(__file__).parent.parent / "README.md"
 
 SAVED = sorted(saving.RESULTS.glob("*.md"))
 
@@ -57,3 +64,108 @@ def test_saved_tables_are_markdown(path):
         assert lines
         assert {line.count("|") for line in (head, bar, *lines)} == {head.count("|")}
     assert f"python -m benchmarks {path.stem}" in text
+
+
+# -- exact solutions ------------------------------------------------------------------------------
+
+
+def test_shooting_gives_the_elastica():
+    found = STATICS["S1"].exact()
+    # Integration to 1e-13, elliptic integrals to rounding.
+    assert found == pytest.approx(elastica_tip(10.0), abs=1e-11)
+
+
+def test_shooting_gives_the_bend_in_space():
+    problem = STATICS["S2b"]
+    answer = solve(problem.scene, accuracy=1e-10).last
+    assert problem.error(answer.position("tip"), problem.exact()) < 1e-10
+
+
+def test_shooting_stretches_and_shears():
+    """A small force along the beam stretches it by F/EA, one across it shears it by F/GA besides bending it."""
+    scene = STATICS["S1"].scene
+    for force, change in (([1e-3, 0.0], [1e-3 / 50.0, 0.0, 0.0]), ([0.0, 1e-3], [0.0, 1e-3 / 20.0, 0.0])):
+        loads = {"tip": scene.loads["tip"].replace(value=force)}
+        rigid, soft = (exact_tip(scene.replace(loads=loads), *given) for given in ((), (50.0, 20.0)))
+        # Linear but for squares of the force.
+        assert soft - rigid == pytest.approx(change, abs=1e-6)
+
+
+def test_half_of_the_beam_on_hinge_and_slider_is_a_cantilever():
+    problem = STATICS["S4"]
+    answer = solve(problem.scene, accuracy=1e-10).last
+    assert problem.error(answer.position("middle"), problem.exact()) < 1e-10
+
+
+# -- the search -----------------------------------------------------------------------------------
+
+
+def test_the_fastest_that_reaches_an_error_is_found(monkeypatch):
+    monkeypatch.setattr(compared_problems, "times", lambda run, runs, longest: ([run()], None))
+    problem = STATICS["S1"]
+    candidates = [
+        Candidate("coarse", 1e-2, 1e-6, lambda: 1e-6),
+        Candidate("fair", 1e-4, 2e-3, lambda: 3e-3),
+        # Timed again it turns out to be the faster one.
+        Candidate("fine", 1e-6, 3e-3, lambda: 2e-3),
+    ]
+    rows = compared_problems.fastest(problem, "a program", "cold", candidates)
+    assert [(row.target, row.setting, row.seconds) for row in rows] == [(1e-3, "fine", 2e-3), (1e-5, "fine", 2e-3)]
+
+
+# -- the tables -----------------------------------------------------------------------------------
+
+
+def result(rows, versions=("exudyn", "openseespy")):
+    keys = ("problem", "program", "kind", "target", "seconds")
+    given = [{**dict(zip(keys, row)), "error": 1e-9, "median": 1.0, "setting": "a mesh"} for row in rows]
+    problems = {problem.name: problem.title for problem in (*STATICS.values(), MOTION)}
+    return {"versions": dict.fromkeys(versions, "1"), "problems": problems, "rows": given, "left_out": ["None."]}
+
+
+def test_small_table_shows_the_best_of_the_others_and_what_is_not_reached():
+    rows = [
+        ("S1", "sfetcas", "whole run", 1e-3, 0.0312),
+        ("S1", "sfetcas", "cold", 1e-3, 0.00174),
+        ("S1", "sfetcas", "warm", 1e-3, 0.000514),
+        ("S1", "sfetcas", "C, cold", 1e-3, 0.0000031),
+        ("S1", "exudyn", "cold", 1e-3, 0.00024),
+        ("S1", "exudyn", "warm", 1e-3, 0.00001),
+        ("S1", "openseespy", "cold", 1e-3, 0.00014),
+        ("S1", "openseespy", "warm", 1e-3, 0.0001),
+    ]
+    table = compared.small_table(result(rows)).splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    assert len(cells) == 2 + len(compared.SHOWN)
+    assert cells[2][1:] == ["1e-03", "31", "1.7 / 0.51", "0.0031", "0.14 / 0.10 (openseespy)"]
+    assert cells[3][1:] == ["1e-07", "-", "-", "-", "not reached"]
+
+
+def test_large_table_has_a_table_for_each_problem_and_what_was_left_out():
+    rows = [
+        ("S1", "exudyn", "cold", 1e-5, 0.001),
+        ("S1", "exudyn", "cold", 1e-3, 0.001),
+        ("S1", "sfetcas", "cold", 1e-3, 0.002),
+    ]
+    text = compared.large_table(result(rows))
+    lines = [[cell.strip() for cell in line.split("|")] for line in text.splitlines() if line.startswith("| 1e")]
+    assert [line[1:3] for line in lines] == [["1e-03", "sfetcas"], ["1e-03", "exudyn"], ["1e-05", "exudyn"]]
+    # Seconds of the row, in ms.
+    assert lines[0][5] == "2.0"
+    assert text.count("## ") == 5
+    assert text.endswith("None.")
+
+
+def test_a_program_that_is_not_installed_is_left_out(monkeypatch, capsys):
+    monkeypatch.setattr(compared.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(compared, "_measured", lambda program, problem: ([], "" if problem == "S1" else "too slow"))
+    found = compared.compared()
+    assert "exudyn is not installed: its rows are left out." in found["left_out"]
+    assert "sfetcas has no rows of D1: too slow." in capsys.readouterr().out
+
+
+def test_readme_has_the_table_of_the_saved_results():
+    text, file = README.read_text(encoding="utf-8"), saving.RESULTS / "compared.json"
+    if "<!-- compared -->" not in text:
+        pytest.skip("the README does not show the comparison")
+    assert f"<!-- compared -->\n{compared.small_table(json.loads(file.read_text()))}\n" in text
