@@ -22,7 +22,7 @@ from .saving import head, row
 from .scenes import arch, bend, cantilever, large, lee_frame, on_slider, rolled
 from .timing import median
 
-__all__ = ["loads", "net", "order", "path", "repeated", "size"]
+__all__ = ["TIP", "loads", "net", "order", "path", "repeated", "size"]
 
 TIP = np.array([0.445004402246249, 0.810609024880296])
 """Tip of the cantilever under F L^2/EI = 10, elliptic integrals."""

@@ -4,13 +4,16 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks import __main__ as program
-from benchmarks import compared, compared_problems, saving
+from benchmarks import compared, compared_exudyn, compared_opensees, compared_problems, compared_sfetcas, saving
+from benchmarks.code import has_compiler
 from benchmarks.compared_problems import MOTION, STATICS, Candidate
 from benchmarks.extremes import elastica_tip
 from benchmarks.shooting import exact_tip
+from benchmarks.speed import TIP
 from sfetcas.equilibria.statics import solve
 
 README = Path(__file__).parent.parent / "README.md"
@@ -111,6 +114,63 @@ def test_the_fastest_that_reaches_an_error_is_found(monkeypatch):
     ]
     rows = compared_problems.fastest(problem, "a program", "cold", candidates)
     assert [(row.target, row.setting, row.seconds) for row in rows] == [(1e-3, "fine", 2e-3), (1e-5, "fine", 2e-3)]
+
+
+# -- the programs ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Everything is timed once."""
+    times = compared_problems.times
+    for module in (compared_problems, compared_sfetcas):
+        monkeypatch.setattr(module, "times", lambda call, runs, longest=1.0: times(call, 1))
+
+
+def test_own_rows_are_of_all_kinds_and_reach_the_wanted_errors(monkeypatch, short):
+    monkeypatch.setattr(compared_sfetcas, "MESHES", {"SFET5": (2,)})
+    monkeypatch.setattr(compared_sfetcas, "has_compiler", lambda: False)
+    rows = compared_sfetcas.rows("S1")
+    # Two elements reach 1e-5; whole runs choose finer ones.
+    wanted = {("whole run", 1e-3), ("whole run", 1e-5), ("whole run", 1e-7)}
+    wanted |= {(kind, target) for kind in ("cold", "warm") for target in (1e-3, 1e-5)}
+    assert {(row.kind, row.target) for row in rows} == wanted
+    assert all(0.0 < row.error <= row.target for row in rows)
+    assert {row.setting for row in rows if row.kind == "warm"} == {"2 SFET5, interpreted"}
+
+
+@pytest.mark.skipif(not has_compiler(), reason="no C compiler")
+def test_own_exported_rows_reach_the_wanted_errors(monkeypatch, short):
+    problem, exact = STATICS["S1"], np.append(TIP, 0.0)
+    meshes = [compared_sfetcas._Mesh(problem, "SFET3", 2, exact), compared_sfetcas._Mesh(problem, "SFET5", 1, exact)]
+    for mesh in meshes:
+        # As a search would have found: the first is too coarse.
+        mesh.error = {"SFET3": 1.0, "SFET5": 5e-4}[mesh.element]
+    rows = compared_sfetcas._exported(problem, meshes, exact)
+    assert [(row.kind, row.target, row.setting) for row in rows] == [
+        (kind, 1e-3, "1 SFET5") for kind in ("C, cold", "C, warm")
+    ]
+    assert 1e-4 < rows[0].error < 1e-3
+
+
+def test_exudyn_solves_the_same_problem(monkeypatch, short):
+    pytest.importorskip("exudyn")
+    monkeypatch.setattr(compared_exudyn, "PLANE", {"ge2d3": (4,)})
+    monkeypatch.setattr(compared_exudyn, "LOAD_STEPS", {"plane": (2,)})
+    rows = compared_exudyn.rows("S1")
+    assert [(row.kind, row.target) for row in rows] == [("cold", 1e-3), ("warm", 1e-3)]
+
+
+def test_opensees_solves_the_same_problem(monkeypatch, short):
+    pytest.importorskip("openseespy")
+    try:
+        compared_opensees._opensees()
+    except RuntimeError as error:
+        pytest.skip(str(error))
+    monkeypatch.setattr(compared_opensees, "COUNTS", {"space": (8,)})
+    monkeypatch.setattr(compared_opensees, "LOAD_STEPS", {"space": (2,)})
+    rows = compared_opensees.rows("S2b")
+    assert [(row.kind, row.target) for row in rows] == [("cold", 1e-3), ("warm", 1e-3)]
 
 
 # -- the tables -----------------------------------------------------------------------------------
