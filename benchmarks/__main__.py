@@ -1,8 +1,8 @@
-"""Accuracy and speed measured: ``python -m benchmarks [NAME ...]``, from a clone of the repository.
+"""Accuracy and speed measured: ``python -m benchmarks [NAME ...] [--save]``, from a clone of the repository.
 
-Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import
-and extremes; left out, all are run.  Four others, ``random``, ``jitter``, ``contact`` and ``ways``, stand alone, take
-options (``--help``) and half an hour each.
+Names are order, loads, size, repeated, derivatives, net, path, motion, steps, code, accuracy, pieces, sweep, import,
+extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.  Four
+others, ``random``, ``jitter``, ``contact`` and ``ways``, stand alone, take options (``--help``) and half an hour each.
 
 Not a test: times are medians on the machine at hand, printed as tables.
 """
@@ -10,12 +10,14 @@ Not a test: times are medians on the machine at hand, printed as tables.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from sfetcas.errors import SceneError, SolveError
 
 from .accuracy import knob
 from .code import code
+from .compared import compared
 from .contact_run import contact
 from .derivatives import derivatives
 from .extremes import extremes
@@ -25,30 +27,44 @@ from .many import many
 from .motion import motion, step_cost
 from .pieces import pieces
 from .random_run import random_scenes
+from .saving import saved
 from .speed import loads, net, order, path, repeated, size
 from .ways import ways
 
 __all__ = ["main"]
 
+Benchmark = Callable[[], Mapping[str, Any] | None]
+"""Prints tables, and may return what is to be saved as data."""
 
-def main(names: list[str]) -> None:
-    """Run the benchmarks of these names, all by default."""
-    known = {"order": order, "loads": loads, "size": size, "repeated": repeated, "derivatives": derivatives}
-    known |= {"net": net, "path": path, "motion": motion, "steps": step_cost, "code": code}
-    known |= {"accuracy": knob, "pieces": pieces, "sweep": many, "import": importing, "extremes": extremes}
+
+def main(words: list[str]) -> None:
+    """Run the benchmarks of these names, all by default; with ``--save`` among the words save their results."""
+    known: dict[str, Benchmark] = {"order": order, "loads": loads, "size": size}
+    known |= {"repeated": repeated, "derivatives": derivatives, "net": net, "path": path, "motion": motion}
+    known |= {"steps": step_cost, "code": code, "accuracy": knob, "pieces": pieces, "sweep": many}
+    known |= {"import": importing, "extremes": extremes, "compared": compared}
     alone: dict[str, Callable[[list[str]], None]] = {"random": random_scenes, "jitter": jitter}
     alone |= {"contact": contact, "ways": ways}
-    if names[:1] and names[0] in alone:
-        alone[names[0]](names[1:])
+    if words[:1] and words[0] in alone:
+        alone[words[0]](words[1:])
         return
+    names = [word for word in words if word != "--save"]
     for name in names or list(known):
         if name not in known:
             raise SystemExit(f"found benchmark {name!r}, accepted: {', '.join([*known, *alone])}")
         try:
-            known[name]()
+            _run(name, known[name], save="--save" in words)
         except (SceneError, SolveError) as error:
             print(f"{name}: {error}")
         print()
+
+
+def _run(name: str, benchmark: Benchmark, *, save: bool) -> None:
+    if not save:
+        benchmark()
+        return
+    for file in saved(name, benchmark):
+        print(f"saved {file}")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,8 @@ from sfetcas.tradeoff.measuring import Measurement, measure
 from sfetcas.tradeoff.tables import markdown_table
 from sfetcas.tradeoff.variants import Variant, families
 
+from .saving import head, row
+
 __all__ = ["knob", "static_problems"]
 
 ASKED = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
@@ -98,7 +100,8 @@ def _error(run: Measurement, reference: Measurement) -> float:
 
 
 def _against_the_best(scenes: dict[str, Scene], references: dict[str, Measurement]) -> None:
-    print(f"\naccuracy = {COMPARED:g} against the best mesh of equal elements: milliseconds, ratio, that mesh\n")
+    print(f"\nA whole run with accuracy = {COMPARED:g} against the best mesh of equal elements; milliseconds\n")
+    head("problem", "whole run", "best mesh", "ratio", "that mesh")
     ratios = {}
     for name, scene in scenes.items():
         asked = measure(scene, Variant(accuracy=COMPARED), RUNS, LONGEST)
@@ -117,11 +120,10 @@ def _against_the_best(scenes: dict[str, Scene], references: dict[str, Measuremen
                     best = run if best is None or run.seconds < best.seconds else best
                     break
         if best is None:
-            print(f"{name:>60} {1e3 * asked.seconds:9.1f} ms; no mesh of equal elements is as near")
+            row(name, f"{1e3 * asked.seconds:.1f}", "-", "-", "none is as near")
             continue
         ratios[name] = asked.seconds / best.seconds
-        times = f"{1e3 * asked.seconds:9.1f} {1e3 * best.seconds:9.1f} ms {ratios[name]:6.2f}"
-        print(f"{name:>60} {times}  {best.variant.name}")
+        row(name, f"{1e3 * asked.seconds:.1f}", f"{1e3 * best.seconds:.1f}", f"{ratios[name]:.2f}", best.variant.name)
     known = np.array(list(ratios.values()))
     if len(known):
         within = int((known <= 3.0).sum())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +15,8 @@ from sfetcas.equilibria.statics import solve
 from sfetcas.mathematics.arrays import Array
 from sfetcas.parametric.solving import ParametricAnswer, parametric
 from sfetcas.tradeoff.tables import markdown_table
+
+from .timing import median
 
 __all__ = ["derivatives"]
 
@@ -130,15 +130,6 @@ CASES: dict[str, Callable[[], tuple[Scene, list[str]]]] = {
 }
 
 
-def _median(run: Callable[[], object]) -> float:
-    seconds = []
-    for _ in range(RUNS):
-        begin = time.perf_counter()
-        run()
-        seconds.append(time.perf_counter() - begin)
-    return 1e3 * statistics.median(seconds)
-
-
 def _flat(answer: ParametricAnswer) -> Array:
     return np.concatenate([np.ravel(answer[one.name]) for one in answer.of.answers])
 
@@ -175,15 +166,14 @@ def _measured(scene: Scene, names: list[str]) -> tuple[str, ...]:
     near = equilibrium.by_parameter(1.01 * numbers)
     implicit, slopes = equilibrium.implicit, equilibrium.implicit.slopes(numbers, state)
     weights = np.eye(1, len(slopes.answers)).ravel()
-    # Functions are made at the first call.
-    implicit.second(numbers, state, slopes, weights)
-    times = (
-        _median(lambda: solve(scene)),
-        _median(equilibrium.solve),
-        _median(lambda: equilibrium.solve(near, answer)),
-        _median(lambda: implicit.slopes(numbers, state)),
-        _median(lambda: implicit.second(numbers, state, slopes, weights)),
+    timed: tuple[Callable[[], object], ...] = (
+        lambda: solve(scene),
+        equilibrium.solve,
+        lambda: equilibrium.solve(near, answer),
+        lambda: implicit.slopes(numbers, state),
+        lambda: implicit.second(numbers, state, slopes, weights),
     )
+    times = [1e3 * median(call, RUNS)[0] for call in timed]
     first, second = _apart(answer)
     sizes = (implicit.total, len(numbers), len(slopes.answers))
     return (

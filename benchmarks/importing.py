@@ -9,6 +9,8 @@ import sys
 import tempfile
 import time
 
+from .saving import head, row
+
 __all__ = ["importing"]
 
 RUNS = 15
@@ -30,6 +32,7 @@ COMMANDS = {
 def importing() -> None:
     """Medians over fresh processes, and as multiples of what CasADi itself needs."""
     print(f"Imports and a first answer ({FILE}), medians of {RUNS} processes; multiples of import casadi\n")
+    head("command", "s", "multiple")
     with tempfile.TemporaryDirectory() as folder:
         # As installed: with the bytecode of all kept, which some environments forbid.
         kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
@@ -37,7 +40,7 @@ def importing() -> None:
     # The first one made the bytecode.
     medians = {name: statistics.median(times[name] for times in rounds[1:]) for name in COMMANDS}
     for name, median in medians.items():
-        print(f"{name:>28} {median:8.3f} s {median / medians['import casadi']:6.1f}")
+        row(f"`{name}`", f"{median:.3f}", f"{median / medians['import casadi']:.1f}")
 
 
 def _round(environment: dict[str, str]) -> dict[str, float]:

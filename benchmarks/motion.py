@@ -31,7 +31,9 @@ from sfetcas.mechanics.masses import masses_of
 from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import assemble
 
-__all__ = ["motion", "step_cost"]
+from .saving import head, row
+
+__all__ = ["PROBLEMS", "TOLERANCES", "motion", "pendulum", "run", "step_cost"]
 
 
 def pendulum() -> Scene:
@@ -114,7 +116,7 @@ def _memory(system: StageEquations, method: Method) -> Memory:
     return Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.unwrapped)
 
 
-def _run(scene: Scene, name: str, mesh: tuple[str, int], tolerance: float) -> tuple[Array, float, float, int]:
+def run(scene: Scene, name: str, mesh: tuple[str, int], tolerance: float) -> tuple[Array, float, float, int]:
     """Displacements of the tip at a hundred times, seconds to build and to solve, steps."""
     begin = time.perf_counter()
     system = _system(scene, *mesh)
@@ -145,26 +147,32 @@ def _run(scene: Scene, name: str, mesh: tuple[str, int], tolerance: float) -> tu
 
 def motion() -> None:
     """Errors against seconds of the problems of the module's docstring."""
-    print("Motion: problem, element, elements, integrator, tolerance: error, seconds to build and to solve, steps\n")
+    print("Error of motions against far finer runs, over the length; elements of each member; seconds\n")
+    head("problem", "elements", "integrator", "tolerance", "error", "build", "integrate", "steps")
+    reached = {}
     for name, (make, length, meshes, (element, elements, tolerance)) in PROBLEMS.items():
-        exact = _run(make(), "radau-3", (element, elements), tolerance)[0]
+        exact = run(make(), "radau-3", (element, elements), tolerance)[0]
         best = dict.fromkeys(TARGETS, np.inf)
         for mesh in meshes:
             for method, tolerances in TOLERANCES.items():
                 for each in tolerances:
-                    tips, build, solve, steps = _run(make(), method, mesh, each)
+                    tips, build, solve, steps = run(make(), method, mesh, each)
                     error = float(np.abs(tips - exact).max()) / length
                     for target in TARGETS:
                         best[target] = min(best[target], solve if error <= target else np.inf)
-                    where = f"{name:>12} {mesh[0]} {mesh[1]:2d} {method:>17} {each:.0e}"
-                    print(f"{where}   {error:.1e} {build:6.2f} {solve:7.3f} s {steps:6d}")
-        reached = ", ".join(f"{target:.0e} {seconds:.3f} s" for target, seconds in best.items() if np.isfinite(seconds))
-        print(f"{name:>12} least seconds to an error of: {reached}\n")
+                    which = (name, f"{mesh[1]} {mesh[0]}", method, f"{each:.0e}")
+                    row(*which, f"{error:.1e}", f"{build:.2f}", f"{solve:.3f}", steps)
+        reached[name] = best
+    print("\nLeast seconds of the integration to an error of\n")
+    head("problem", *(f"{target:.0e}" for target in TARGETS))
+    for name, best in reached.items():
+        row(name, *(f"{seconds:.3f}" if np.isfinite(seconds) else "-" for seconds in best.values()))
 
 
 def step_cost() -> None:
     """Milliseconds of a step of a spatial cantilever and of the elbow, and of many elements in the plane."""
-    print("Steps: scene, elements, unknowns, kernels: seconds to build, milliseconds a step, iterations\n")
+    print("One step of a motion; medians\n")
+    head("scene", "elements", "unknowns", "integrator", "kernels", "build, s", "ms a step", "iterations")
     cantilever = elbow().replace(
         nodes={"root": Node(position=[0, 0], support="clamped"), "tip": Node(position=[10, 0])},
         members={"beam": Member(nodes=["root", "tip"], section="strip")},
@@ -189,5 +197,5 @@ def step_cost() -> None:
             taken = stepper.step(memory, h)
             spent.append(time.perf_counter() - start)
             memory, count = taken.after, count + taken.iterations
-        figures = f"{built:6.2f} s {1e3 * statistics.median(spent):8.3f} ms {count / len(spent):.1f}"
-        print(f"{name:>12} {element} {elements:5d} {system.total:6d} {method:>17} {kernels:>11} {figures}")
+        which = (name, f"{elements} {element}", system.total, method, kernels)
+        row(*which, f"{built:.2f}", f"{1e3 * statistics.median(spent):.3f}", f"{count / len(spent):.1f}")

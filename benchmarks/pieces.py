@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -23,6 +21,8 @@ from sfetcas.mechanics.mesh import uniform_mesh
 from sfetcas.mechanics.model import Model, assemble
 from sfetcas.solvers.prepared import Prepared
 from sfetcas.tradeoff.tables import markdown_table
+
+from .timing import median
 
 __all__ = ["pieces"]
 
@@ -67,22 +67,13 @@ def _modelled(scene: Scene, assembly: str = "auto", places: bool = False) -> Cal
     return lambda: assemble(scene, mesh, assembly=assembly)
 
 
-def _median(run: Callable[[], object]) -> float:
-    seconds = []
-    for _ in range(RUNS):
-        begin = time.perf_counter()
-        run()
-        seconds.append(time.perf_counter() - begin)
-    return statistics.median(seconds)
-
-
 def _static(make: Callable[[], Model]) -> tuple[str, ...]:
     """Unknowns, milliseconds of the model, of a solve from the start guess and of one from a near answer."""
-    built = _median(lambda: Prepared(make()).equations)
+    built = median(lambda: Prepared(make()).equations, RUNS)[0]
     prepared = Prepared(make())
     near = solve_model(prepared, 0.97)
-    cold = _median(lambda: solve_model(prepared))
-    warm = _median(lambda: solve_model(prepared, start=near))
+    cold = median(lambda: solve_model(prepared), RUNS)[0]
+    warm = median(lambda: solve_model(prepared, start=near), RUNS)[0]
     return str(prepared.model.unknowns), *(f"{1e3 * seconds:.2f}" for seconds in (built, cold, warm))
 
 
@@ -97,7 +88,8 @@ def _moving(inertia: tuple[float, float, float] | None, dimension: str) -> tuple
     x, _ = system.rates(state, system.factors(0.0), np.zeros(system.equations.unknowns))
     memory = Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.unwrapped)
     stepper.step(memory, 0.01)
-    return str(system.total), "", "", f"{1e3 * _median(lambda: stepper.step(memory, 0.01)):.2f}"
+    seconds, _ = median(lambda: stepper.step(memory, 0.01), RUNS)
+    return str(system.total), "", "", f"{1e3 * seconds:.2f}"
 
 
 def pieces() -> None:

@@ -258,6 +258,8 @@ ORDER = [
     "__init__",
     "__main__",
     "benchmarks",
+    "benchmarks.saving",
+    "benchmarks.timing",
     "benchmarks.scenes",
     "benchmarks.random_scenes",
     "benchmarks.random_checks",
@@ -278,6 +280,12 @@ ORDER = [
     "benchmarks.ways",
     "benchmarks.importing",
     "benchmarks.speed",
+    "benchmarks.shooting",
+    "benchmarks.compared_problems",
+    "benchmarks.compared_sfetcas",
+    "benchmarks.compared_exudyn",
+    "benchmarks.compared_opensees",
+    "benchmarks.compared",
     "benchmarks.__main__",
 ]
 """A module imports only from names to its left."""

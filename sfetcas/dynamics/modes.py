@@ -96,7 +96,7 @@ class Mode:
     members : mapping
         For each member fractions of its length ``s`` (n,) and the displacement ``position`` (n, 3) m there.
     change : ndarray (unknowns,)
-        The eigenvector, normalised in the same way, from which :meth:`Modes.along` takes the shape anywhere.
+        The eigenvector, normalised in the same way, from which :meth:`.Modes.along` takes the shape anywhere.
     """
 
     omega: float
@@ -219,7 +219,7 @@ class Modes:
         -------
         dict of ndarray
             The displacement ``position`` (n, 3) m and the ``rotation`` (n, 3) rad of the sections, fixed axes, for the
-            shape as it is normalised in :class:`Mode`; complex with damping.
+            shape as it is normalised in :class:`.Mode`; complex with damping.
 
         Raises
         ------
@@ -236,7 +236,7 @@ class Modes:
         return {key: _joined([table[key] for table in tables]) for key in tables[0]}
 
     def plot(self, **how: Any) -> Figure:
-        """The lowest mode shapes over the equilibrium, see :func:`~sfetcas.pictures.modeshapes.mode_picture`."""
+        """The lowest mode shapes over the equilibrium, see ``modeshapes.mode_picture``."""
         from ..pictures.modeshapes import mode_picture
 
         return mode_picture(self, **how)

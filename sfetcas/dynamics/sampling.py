@@ -102,7 +102,7 @@ class Sampler:
 class StepRecord:
     """The time steps of a motion, from which its state at any time is interpolated when it is asked for.
 
-    It keeps at most :data:`ROOM` bytes: of a motion with more steps it keeps every second one, every fourth, and so on.
+    It keeps at most ``ROOM`` bytes: of a motion with more steps it keeps every second one, every fourth, and so on.
 
     Parameters
     ----------

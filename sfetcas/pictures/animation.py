@@ -112,7 +112,7 @@ def animation(answer: Solution | Path | Trajectory | Modes, *, colour: str = NON
     answer : Solution, Path, Trajectory or Modes
     colour : str
         The quantity that colours tell, with one scale for all frames: one of
-        :data:`~sfetcas.pictures.colours.QUANTITIES`, or ``none``.  Modes have none.
+        ``colours.QUANTITIES``, or ``none``.  Modes have none.
 
     Raises
     ------

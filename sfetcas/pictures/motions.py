@@ -1,7 +1,7 @@
 """Pictures of motions: positions at several times over each other, histories of quantities, and energies.
 
 Positions are pale at first and bold at the end; thin lines are the ways of free ends.  All is drawn from the states at
-the time steps of the integrator (:meth:`~sfetcas.dynamics.motion.Trajectory.resampled`), however few answers were asked
+the time steps of the integrator (:meth:`.Trajectory.resampled`), however few answers were asked
 for.  Loads are not drawn, as they change in time.
 """
 

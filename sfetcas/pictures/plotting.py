@@ -60,7 +60,7 @@ def picture(solution: Solution, *, steps: Sequence[int] | None = None, colour: s
         its loads and reactions, the others thin.  Default: all; where all equilibria are asked for those of the last
         factor, the first of them bold.
     colour : str
-        The quantity that colours tell: one of :data:`~sfetcas.pictures.colours.QUANTITIES`, or ``none``.
+        The quantity that colours tell: one of ``colours.QUANTITIES``, or ``none``.
 
     Returns
     -------

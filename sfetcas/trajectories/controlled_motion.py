@@ -249,7 +249,7 @@ class ControlledMotion:
         return self.check.response.trajectory
 
     def plot(self, **how: Any) -> Figure:
-        """Controls with bounds beside positions, see :func:`~sfetcas.pictures.controls.control_picture`."""
+        """Controls with bounds beside positions, see ``controls.control_picture``."""
         from ..pictures.controls import control_picture
 
         return control_picture(self, **how)
