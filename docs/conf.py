@@ -29,6 +29,8 @@ extensions = [
 ]
 exclude_patterns = ["extensions", "**/generated"]
 nitpicky = True
+# Names keep the quotes that they have.
+smartquotes = False
 # Names of other libraries have no page here, and what validates keys is part of their types.
 nitpick_ignore_regex = [
     ("py:.*", r"(casadi|collections|concurrent|multiprocessing|numpy|pydantic)\b.*"),
