@@ -173,7 +173,8 @@ def _rst(directive: str, options: str) -> str:
 
 def _module(name: str) -> str:
     # These have their place among the public names, wherever they are known, too.
-    public = [public for public in sfetcas.__all__ if hasattr(importlib.import_module(name), public)]
+    module = importlib.import_module(name)
+    public = [public for public in sfetcas.__all__ if getattr(module, public, None) is getattr(sfetcas, public)]
     options = ":members:\n" + (f":exclude-members: {', '.join(public)}\n" if public else "")
     return f"## {name.removeprefix('sfetcas.')}\n\n" + _rst(f".. automodule:: {name}", options)
 
