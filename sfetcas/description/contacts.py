@@ -61,7 +61,7 @@ class Contact(Record):
         Instead of ``member``: several names, or ``"all"``.
     side : (3,), or text
         Where members are allowed: a direction that points there; of what is round ``"inside"`` or
-        ``"outside"``.
+        ``"outside"``.  Default: of what is round the outside.
     """
 
     type: Literal["point", "line", "plane", "circle", "cylinder", "sphere"]

@@ -9,7 +9,7 @@ two.  A complex pair whose real part changes its sign leaves the tangent regular
 At a zero another equilibrium is adjacent (static divergence); nothing else follows for stability: flutter does not
 show in these numbers.
 
-Source: Bolotin 1963, Nonconservative problems of the theory of elastic stability; Leipholz 1987.
+Source: Bolotin 1963, Nonconservative problems of the theory of elastic stability.
 """
 
 from __future__ import annotations
