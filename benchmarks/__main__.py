@@ -4,7 +4,7 @@ Names are order, loads, size, repeated, derivatives, net, path, motion, steps, c
 extremes and compared; left out, all are run.  ``--save`` writes what each prints into ``benchmarks/results`` too.  Four
 others, ``random``, ``jitter``, ``contact`` and ``ways``, stand alone, take options (``--help``) and half an hour each.
 
-Not a test: times are medians on the machine at hand, printed as tables.
+Not a test: times are those of the machine at hand, the least of several or medians as the tables say.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from sfetcas.mathematics.arrays import Array
 from sfetcas.parametric.solving import ParametricAnswer, parametric
 from sfetcas.tradeoff.tables import markdown_table
 
-from .timing import median
+from .timing import least
 
 __all__ = ["derivatives"]
 
@@ -173,7 +173,7 @@ def _measured(scene: Scene, names: list[str]) -> tuple[str, ...]:
         lambda: implicit.slopes(numbers, state),
         lambda: implicit.second(numbers, state, slopes, weights),
     )
-    times = [1e3 * median(call, RUNS)[0] for call in timed]
+    times = [1e3 * least(call, RUNS)[0] for call in timed]
     first, second = _apart(answer)
     sizes = (implicit.total, len(numbers), len(slopes.answers))
     return (
@@ -187,7 +187,7 @@ def _measured(scene: Scene, names: list[str]) -> tuple[str, ...]:
 
 def derivatives() -> None:
     """Milliseconds of solves and of derivatives, and how far these are from differences."""
-    print(f"Derivatives of all answers by ten numbers; milliseconds, medians of {RUNS}; accuracy 1e-6\n")
+    print(f"Derivatives of all answers by ten numbers; milliseconds, least of {RUNS}; accuracy 1e-6\n")
     heads = (
         *("scene", "unknowns", "numbers", "answers", "`solve(scene)`", "cold", "warm"),
         *("first", "second, of one", "first / warm", "first off", "second off"),

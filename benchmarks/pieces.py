@@ -22,7 +22,7 @@ from sfetcas.mechanics.model import Model, assemble
 from sfetcas.solvers.prepared import Prepared
 from sfetcas.tradeoff.tables import markdown_table
 
-from .timing import median
+from .timing import least
 
 __all__ = ["pieces"]
 
@@ -69,11 +69,11 @@ def _modelled(scene: Scene, assembly: str = "auto", places: bool = False) -> Cal
 
 def _static(make: Callable[[], Model]) -> tuple[str, ...]:
     """Unknowns, milliseconds of the model, of a solve from the start guess and of one from a near answer."""
-    built = median(lambda: Prepared(make()).equations, RUNS)[0]
+    built = least(lambda: Prepared(make()).equations, RUNS)[0]
     prepared = Prepared(make())
     near = solve_model(prepared, 0.97)
-    cold = median(lambda: solve_model(prepared), RUNS)[0]
-    warm = median(lambda: solve_model(prepared, start=near), RUNS)[0]
+    cold = least(lambda: solve_model(prepared), RUNS)[0]
+    warm = least(lambda: solve_model(prepared, start=near), RUNS)[0]
     return str(prepared.model.unknowns), *(f"{1e3 * seconds:.2f}" for seconds in (built, cold, warm))
 
 
@@ -88,13 +88,13 @@ def _moving(inertia: tuple[float, float, float] | None, dimension: str) -> tuple
     x, _ = system.rates(state, system.factors(0.0), np.zeros(system.equations.unknowns))
     memory = Memory(0.0, state.q, state.y, state.lam, x, np.zeros((method.kept, len(x))), state.unwrapped)
     stepper.step(memory, 0.01)
-    seconds, _ = median(lambda: stepper.step(memory, 0.01), RUNS)
+    seconds, _ = least(lambda: stepper.step(memory, 0.01), RUNS)
     return str(system.total), "", "", f"{1e3 * seconds:.2f}"
 
 
 def pieces() -> None:
     """Unknowns and milliseconds with each piece and without."""
-    print(f"What each piece costs, SFET5, {ELEMENTS} elements a member; milliseconds, medians of {RUNS}\n")
+    print(f"What each piece costs, SFET5, {ELEMENTS} elements a member; milliseconds, least of {RUNS}\n")
     weight = Load(type="distributed", member="beam", value=[0, -1])
     follower = Load(type="force", node="tip", value=[1, 0], frame="follower")
     spring = {"spring": Spring(node="B", between=["left", "top"], stiffness=1.0)}

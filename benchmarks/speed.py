@@ -20,7 +20,7 @@ from sfetcas.solvers.prepared import Prepared
 
 from .saving import head, row
 from .scenes import arch, bend, cantilever, large, lee_frame, on_slider, rolled
-from .timing import median
+from .timing import least
 
 __all__ = ["TIP", "loads", "net", "order", "path", "repeated", "size"]
 
@@ -70,12 +70,12 @@ def loads() -> None:
     for dimension in ("plane", "space"):
         for exponent in range(-6, 9, 2):
             scene = cantilever([0.0, 10.0**exponent], dimension)
-            seconds, step = median(lambda scene=scene: solve(scene, accuracy=1e-6).last, 1)  # type: ignore[misc]
+            seconds, step = least(lambda scene=scene: solve(scene, accuracy=1e-6).last, 1)  # type: ignore[misc]
             turned = step.along("beam", [1.0])["quaternion"][0]
             angle = 2.0 * np.arctan2(turned[3], turned[0])
             _line(f"force of 1e{exponent} EI/L², {dimension}", angle, step, seconds)
     for turns in (1, 5, 50):
-        seconds, step = median(lambda turns=turns: solve(rolled(turns), accuracy=1e-6).last, 1)  # type: ignore[misc]
+        seconds, step = least(lambda turns=turns: solve(rolled(turns), accuracy=1e-6).last, 1)  # type: ignore[misc]
         _line(f"roll-up of {turns} turns, plane", step.angle("tip"), step, seconds)
 
 
@@ -99,7 +99,7 @@ def size() -> None:
             begin = time.perf_counter()
             solve_model(prepared)
             first = time.perf_counter() - begin
-            seconds, _ = median(lambda prepared=prepared: solve_model(prepared), 3)  # type: ignore[misc]
+            seconds, _ = least(lambda prepared=prepared: solve_model(prepared), 3)  # type: ignore[misc]
             times = (f"{built:.3f}", f"{first:.3f}", f"{seconds:.3f}", f"{1e6 * seconds / n:.1f}")
             row(kernels, n, *times, _peak())
 
@@ -109,7 +109,7 @@ def repeated() -> None:
     print(
         "One prepared model solved again and again: cold from the start guess, warm from an answer at 0.97 of the load."
     )
-    print("Errors are over the size of the scene, times are medians in milliseconds.\n")
+    print("Errors are over the size of the scene, times are the least of several in milliseconds.\n")
     head("problem", "kernels", "error", "model and first solve", "cold", "warm")
     cases = {
         "S1": (cantilever([0.0, 10.0]), 4, 3),
@@ -127,8 +127,8 @@ def repeated() -> None:
             prepared = Prepared(assemble(scene, uniform_mesh(scene, p, n)), kernels=kernels)
             near = solve_model(prepared, 0.97)
             first = time.perf_counter() - begin
-            cold, step = median(lambda prepared=prepared: solve_model(prepared), 15)  # type: ignore[misc]
-            warm, _ = median(lambda prepared=prepared, near=near: solve_model(prepared, start=near), 15)  # type: ignore[misc]
+            cold, step = least(lambda prepared=prepared: solve_model(prepared), 15)  # type: ignore[misc]
+            warm, _ = least(lambda prepared=prepared, near=near: solve_model(prepared, start=near), 15)  # type: ignore[misc]
             exact = solve(scene, accuracy=1e-10).last
             error = max(float(np.abs(step.position(k) - exact.position(k)).max()) for k in scene.nodes) / scene.size
             row(name, kernels, f"{error:.1e}", f"{1e3 * first:.1f}", f"{1e3 * cold:.2f}", f"{1e3 * warm:.2f}")
@@ -169,7 +169,7 @@ def _peak() -> str:
 
 def path() -> None:
     """Equilibria along a path against single solves from the undeformed state, both at the same accuracy."""
-    print("Equilibria along a path, and single solves of the same scene to the same accuracy; medians\n")
+    print("Equilibria along a path, and single solves of the same scene to the same accuracy; least times\n")
     counted = ("points", "limit points", "path, s")
     head("path", "accuracy", *counted, "ms a point", "ms a solve", "100 points, in solves")
     strip = CrossSection(EI2=14400.0, EI3=1440.0, GJ=3000.0)
@@ -181,9 +181,9 @@ def path() -> None:
     for name, (scene, factors, factor) in courses.items():
         for accuracy in PATH_ACCURACIES:
             along = scene.replace(analysis=Analysis(type="path", range=tuple(factors), accuracy=accuracy))
-            seconds, found = median(lambda along=along: follow_path(along, Settings()), 3)  # type: ignore[misc]
+            seconds, found = least(lambda along=along: follow_path(along, Settings()), 3)  # type: ignore[misc]
             single = scene.replace(analysis=Analysis(steps=(factor,), accuracy=accuracy))
-            cold, _ = median(lambda single=single: solve(single), 5)  # type: ignore[misc]
+            cold, _ = least(lambda single=single: solve(single), 5)  # type: ignore[misc]
             count, each = len(found.points), seconds / len(found.points)
             counts = (count, len(found.limit_points), f"{seconds:.3f}")
             row(
