@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import io
 import json
 import os
@@ -150,7 +151,10 @@ def _of_program(file: Path) -> Entry:
     ]
     drawn = hasattr(module, "picture")
     if drawn:
-        _save(module.picture(), file)
+        # Of what was checked, where the size of it is a choice: it is at hand.
+        sizes = {name: entry.default for name, entry in inspect.signature(module.check).parameters.items()}
+        taken = inspect.signature(module.picture).parameters
+        _save(module.picture(**{name: size for name, size in sizes.items() if name in taken}), file)
     title, _, text = (module.__doc__ or file.stem).partition("\n")
     command = f"python problems/{file.name}"
     return Entry(
