@@ -2,12 +2,13 @@
 
 import re
 import typing
+from pathlib import Path
 
 import pytest
 
 import sfetcas
 from sfetcas import Scene, solve
-from sfetcas.description.answers import ANSWERS
+from sfetcas.description.answers import ANSWERS, answers_table
 from sfetcas.description.records import plain
 from sfetcas.equilibria.quantities import value_of
 
@@ -59,6 +60,15 @@ def test_headings_of_shapes_are_those_of_the_types():
     headings = {heading.removeprefix("Shapes: ") for heading, _ in reference.TABLES.values() if "Shapes" in heading}
     assert headings == known - {"straight"}
     assert known <= set(re.findall(r"``(\w+)``", KEYS["Member", "shape"].meaning))
+
+
+@pytest.mark.parametrize("name", ["scene", "answers"])
+def test_pages_in_the_repository_are_those_of_the_program(name):
+    """A build of the documentation writes them anew."""
+    made = {"scene": reference.scene_tables, "answers": answers_table}[name]()
+    text = (Path(reference.__file__).parents[1] / "reference" / f"{name}.md").read_text(encoding="utf-8")
+    assert reference.filled(text, made) == text
+    assert reference.filled(text, made + "more") != text
 
 
 def test_each_public_name_is_on_a_page():

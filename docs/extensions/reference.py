@@ -120,6 +120,16 @@ def scene_tables() -> str:
     return "\n".join(lines)
 
 
+BEGIN, END = "<!-- made from the program -->", "<!-- until here -->"
+"""Marks around what a page takes from the program: such pages are read in the repository, too."""
+
+
+def filled(text: str, made: str) -> str:
+    """A page with what is made from the program between its marks."""
+    before, _, rest = text.partition(BEGIN)
+    return f"{before}{BEGIN}\n\n{made.strip()}\n\n{END}{rest.partition(END)[2]}"
+
+
 def command_help() -> str:
     """What each command says of itself."""
     environ["COLUMNS"] = "100"
@@ -222,8 +232,11 @@ def _write(folder: Path, pages: dict[str, str]) -> None:
 
 def _generate(app: Sphinx) -> None:
     reference = Path(app.srcdir) / "reference"
-    tables = {"scene": scene_tables(), "answers": answers_table(), "commands": command_help()}
-    _write(reference / "generated", tables)
+    made = {"scene": scene_tables(), "answers": answers_table()}
+    _write(
+        reference, {name: filled((reference / f"{name}.md").read_text("utf-8"), text) for name, text in made.items()}
+    )
+    _write(reference / "generated", {"commands": command_help()})
     _write(reference / "api", api_pages())
     _write(reference / "modules", module_pages())
 
