@@ -93,7 +93,7 @@ def _of_scene(file: Path) -> Entry:
         Comparison(
             # What chooses an answer stands behind the name, as in the file's own words.
             quantity=" ".join([entry.expect.quantity, *_choice(entry.expect)]),
-            expected=say(entry.expect.value),
+            expected=_rounded(entry.expect.value),
             found=_rounded(entry.value),
             difference=entry.error,
             tolerance="exactly" if entry.expect.tolerance is None else f"{entry.expect.tolerance:.1e}",

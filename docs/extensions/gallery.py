@@ -57,27 +57,36 @@ def _page(entry: Entry, file: Path) -> str:
         parts.append(f"![{plain_text(entry.title)}](pictures/{file.stem}.png)\n")
     if entry.source:
         parts.append(f"Source: {plain_text(entry.source)}\n")
-    parts += ["## Run it\n", _fenced(entry.command, "console")]
-    parts += ["## Found beside expected\n", _comparisons(entry)]
+    took = f"It took {entry.seconds:.2g} s when this page was made.\n"
     language = "python" if file.suffix == ".py" else "toml"
-    parts += ["## The file\n", f"```{{literalinclude}} ../../problems/{file.name}\n:language: {language}\n```\n"]
+    parts += [
+        "## Run it\n",
+        _fenced(entry.command, "console"),
+        took,
+        "## Found beside expected\n",
+        _comparisons(entry),
+        "## The file\n",
+        f"```{{literalinclude}} ../../problems/{file.name}\n:language: {language}\n```\n",
+    ]
     if entry.found:
         parts += ["## The report\n", _fenced(entry.found)]
     return "\n".join(parts)
 
 
 def _comparisons(entry: Entry) -> str:
-    if file_is_program := entry.group == "Programs":
+    """A table of what was compared, with the reasons of the tolerances as notes below it."""
+    notes = list(dict.fromkeys(c.reason for c in entry.comparisons if c.reason))
+    if entry.group == "Programs":
         rows = ["| difference of | found | accepted |", "|---|---|---|"]
+        cells = [[c.quantity, f"{c.difference:.1e}", c.tolerance] for c in entry.comparisons]
     else:
-        rows = ["| quantity | expected | found | difference | accepted | reason, source |", "|---|---|---|---|---|---|"]
-    for c in entry.comparisons:
-        cells = [plain_text(c.quantity)]
-        cells += [] if file_is_program else [plain_text(c.expected), plain_text(c.found)]
-        cells += [f"{c.difference:.1e}", plain_text(c.tolerance)]
-        cells += [] if file_is_program else [plain_text(c.reason)]
-        rows.append(f"| {' | '.join(cells)} |")
-    return "\n".join(rows) + f"\n\nThis took {entry.seconds:.2f} s when the page was made.\n"
+        rows = ["| quantity | expected | found | difference | accepted | note |", "|---|---|---|---|---|---|"]
+        cells = [
+            [c.quantity, c.expected, c.found, f"{c.difference:.1e}", c.tolerance, str(notes.index(c.reason) + 1)]
+            for c in entry.comparisons
+        ]
+    rows += [f"| {' | '.join(map(plain_text, row))} |" for row in cells]
+    return "\n".join([*rows, "", *(f"{i}. {plain_text(note)}" for i, note in enumerate(notes, start=1)), ""])
 
 
 def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
@@ -92,25 +101,24 @@ def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
             table.append(f"| {' | '.join(cells + [''] * (WIDE - len(cells)))} |")
         names = "\n".join(entry.name for entry in chosen)
         pages[page] = "\n".join(table) + f"\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
-        shown = " ".join(
-            _picture(entry) for entry in [entry for entry in chosen if entry.picture][:: len(chosen) // 3][:3]
-        )
-        rows.append(f"| [{group}]({page}.md): {len(chosen)} | {shown} |")
+        drawn = [entry for entry in chosen if entry.picture]
+        shown = " | ".join(_picture(entry, 200) for entry in drawn[:: len(drawn) // WIDE][:WIDE])
+        rows.append(f"| [{group}]({page}.md), {len(chosen)} | {shown} |")
     text = (
         "# Gallery\n\nEach file of `problems/` has a page: its picture, the file, what is expected and from where, and "
-        "what is found. They are made with the documentation, which cannot be built where a value is missed.\n"
+        "what is found. The pages are made with the documentation; the build fails if a value is missed.\n"
     )
     listed = "\n".join(pages)
-    table = "\n".join(["| | |", "|---|---|", *rows])
+    table = "\n".join(["|" + " |" * (1 + WIDE), "|" + "---|" * (1 + WIDE), *rows])
     return {**pages, "index": f"{text}\n{table}\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"}
 
 
 def _cell(entry: Entry) -> str:
-    return f"{_picture(entry)} [{plain_text(entry.title)}]({entry.name}.md)"
+    return f"{_picture(entry, 220)} [{plain_text(entry.title)}]({entry.name}.md)"
 
 
-def _picture(entry: Entry) -> str:
-    drawn = f'![{plain_text(entry.title)}](pictures/{entry.name}.png){{width="220px"}}'
+def _picture(entry: Entry, width: int) -> str:
+    drawn = f'![{plain_text(entry.title)}](pictures/{entry.name}.png){{width="{width}px"}}'
     return f"[{drawn}]({entry.name}.md)" if entry.picture else ""
 
 
