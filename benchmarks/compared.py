@@ -55,7 +55,14 @@ SHOWN = (
 )
 """Problems and wanted errors of the small table."""
 
-HEADS = ("problem", "error", "whole run", "solved again: cold / warm", "exported C: cold / warm", "others: cold / warm")
+HEADS = (
+    "problem",
+    "error",
+    "whole run, ms",
+    "solved again: cold / warm, ms",
+    "exported C: cold / warm, ms",
+    "others: cold / warm, ms",
+)
 
 INTRODUCTION = f"""\
 Milliseconds of wall time on one thread, the least of several runs. Of many elements, meshes and settings of each

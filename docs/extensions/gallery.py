@@ -82,7 +82,10 @@ def _comparisons(entry: Entry) -> str:
     else:
         rows = ["| quantity | expected | found | difference | accepted | note |", "|---|---|---|---|---|---|"]
         cells = [
-            [c.quantity, c.expected, c.found, f"{c.difference:.1e}", c.tolerance, str(notes.index(c.reason) + 1)]
+            [
+                *(c.quantity, c.expected, c.found, f"{c.difference:.1e}", c.tolerance),
+                str(notes.index(c.reason) + 1) if c.reason else "",
+            ]
             for c in entry.comparisons
         ]
     rows += [f"| {' | '.join(map(plain_text, row))} |" for row in cells]
