@@ -1,7 +1,8 @@
 """Charts of paths: the factor against what moves most, or quantities over it, and deformed shapes along the way.
 
 Stable stretches are drawn solid, unstable ones dashed; limit points are circles, bifurcations squares, and dots in
-the colours of the shapes say where these are.  Where only motions are prescribed, the largest reaction at a moved
+the colours of the shapes say where these are.  A bifurcation whose branches are not followed has its buckling mode,
+drawn so large that it is well seen.  Where only motions are prescribed, the largest reaction at a moved
 node stands over the factor instead.  Supports, joints, springs and obstacles are drawn with the shape at the end of
 the path, as in pictures of answers; loads are not, as they grow along the way.
 """
@@ -21,11 +22,14 @@ from matplotlib.lines import Line2D
 from ..description.answers import AnswerName
 from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
+from ..mechanics.displacements import Displacements
 from ..paths.path import Branch, Path
+from ..paths.paths import buckling_mode
 from .curves import FREQUENCIES, Curve, clipped, leave, quantities_named, said, shown_components, table_of
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
+from .modeshapes import REACH, TWISTING
 from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
 from .showing import Picture, new_figure
 from .sketch import REST, Course, Sketch, course_of, unit_for, view_of
@@ -46,6 +50,8 @@ NARROW = 0.01
 SHAPES, OVER_EACH_OTHER = 6, 2e-3
 """Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
 SAMPLES = np.linspace(0.0, 1.0, 61)
+BUCKLING_MODES = 3
+"""Bifurcations at most whose shapes are drawn, the first ones."""
 SHADES = ("#0B1F4B", "#134B86", "#2A7AB8", "#5DA5D6", "#9CC7E8")
 """Of the shapes along the path, in this order."""
 
@@ -97,7 +103,7 @@ def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Pict
     grid = figure.add_gridspec(len(found), 2)
     panels = [figure.add_subplot(grid[i, 0]) for i in range(len(found))]
     right = figure.add_subplot(grid[:, 1])
-    shapes = _shapes(path)
+    shapes = [*_shapes(path), *_buckling_modes(path)]
     for panel, quantity in zip(panels, found, strict=True):
         _draw_course(panel, path, quantity, shapes)
     if all(quantity.upright for quantity in found):
@@ -304,13 +310,14 @@ def _legend(path: Path, *, frequencies: bool) -> Iterator[Line2D]:
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """A deformed shape: of which branch and point, and how it looks."""
+    """A deformed shape: of which branch and point, and how it looks; ``buckling``: drawn from there on, in any size."""
 
     branch: int
     index: int
     colour: str
     label: str
     dashes: Any
+    buckling: Displacements | None = None
 
 
 def _shapes(path: Path) -> list[_Shape]:
@@ -334,6 +341,39 @@ def _shapes(path: Path) -> list[_Shape]:
     return found
 
 
+def _buckling_modes(path: Path) -> Iterator[_Shape]:
+    """Shapes of the first bifurcations from which no branch was followed."""
+    followed = {branch.bifurcation for branch in path.branches[1:]}
+    indices = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"]
+    alone = [number for number in range(1, len(indices) + 1) if number not in followed]
+    for place, number in enumerate(alone[:BUCKLING_MODES]):
+        index, colour = indices[number - 1], _colour(len(path.branches) + place)
+        label = f"buckling mode, factor {path.points[index].factor:.4g}"
+        yield _Shape(0, index, colour, label, "-", buckling_mode(path, number))
+
+
+def _buckled(course: Course, shapes: Sequence[_Shape]) -> Course:
+    """The course with the lines of the buckling modes so far from their equilibria that they are well seen."""
+    extent = float(np.ptp(course.everything, axis=0).max())
+    earlier = list(course.earlier)
+    for number, shape in enumerate(shapes):
+        if shape.buckling is not None:
+            lines = earlier[number]
+            moved = [
+                shape.buckling.along(name, np.linspace(0.0, 1.0, len(line)))
+                for name, line in zip(course.members, lines, strict=True)
+            ]
+            largest, turned = (
+                max(float(np.linalg.norm(found[key], axis=1).max()) for found in moved)
+                for key in ("position", "rotation")
+            )
+            # What only twists moves no line.
+            if largest > TWISTING * turned * extent * course.unit:
+                scale = REACH * extent / largest
+                earlier[number] = [line + scale * found["position"] for line, found in zip(lines, moved, strict=True)]
+    return replace(course, earlier=earlier)
+
+
 def _colour(branch: int) -> str:
     return COLOURS[branch % len(COLOURS)]
 
@@ -341,7 +381,7 @@ def _colour(branch: int) -> str:
 def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     """The shapes over the undeformed one, with what holds them as at the end of the path."""
     points = [*(path.branches[shape.branch].points[shape.index] for shape in shapes), path.points[-1]]
-    course = course_of(path.scene, [path.configuration(point) for point in points])
+    course = _buckled(course_of(path.scene, [path.configuration(point) for point in points]), shapes)
     view = view_of(path.model.space, [course.everything])
     sketch = Sketch(path.scene, path.configuration(path.points[-1]), course, view)
     sketch_supports(sketch)
@@ -352,13 +392,17 @@ def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     below = -0.13 if axes is paper else 0.0
     handles, _ = axes.get_legend_handles_labels()
     place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, below)}
+    if any(shape.buckling is not None for shape in shapes):
+        place |= {"title": "buckling modes are drawn in an arbitrary size", "title_fontsize": 8}
     paper.legend(handles=handles, fontsize=8, ncols=columns, frameon=False, **place)
     Sheet(paper.figure, axes, paper, sketch).finish()
 
 
 def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
     """Undeformed and deformed lines, with entries for the legend."""
-    text = "undeformed" if shapes else "undeformed; all shapes look like it"
+    text = (
+        "undeformed" if any(shape.buckling is None for shape in shapes) else "undeformed; all equilibria look like it"
+    )
     looks: list[tuple[list[Array], str, dict[str, Any]]] = [
         (course.rest, text, {"color": REST, "linewidth": 1.2, "linestyle": DOTTED, "gid": "undeformed"})
     ]
