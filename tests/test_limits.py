@@ -11,6 +11,7 @@ from matplotlib.patches import Polygon
 from matplotlib.text import Text
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy.special import ellipk
 
 from sfetcas import Scene, load, solve
 from sfetcas.description.contacts import Contact
@@ -374,6 +375,32 @@ def test_branches_to_both_sides_are_seen_apart():
     assert course.get_xlabel() == "displacement of tip in y, m"
     said = [text.get_text() for text in shapes.get_legend().get_texts()]
     assert said == ["undeformed", "factor 23, branch 1", "factor 23, branch 2", "buckling mode, factor 22.21"]
+    # Three shapes along each branch, the last one bold in colour and in the legend.
+    lines = [line for line in shapes.get_lines() if line.get_gid() == "shape"]
+    dots = [line for line in course.get_lines() if line.get_gid() == "shape"]
+    assert len(lines) == len(dots) == 2 * 3 + 1
+    assert [line.get_label().startswith("_") for line in lines] == [True, True, False] * 2 + [False]
+    assert [line.get_color() for line in lines] == [dot.get_color() for dot in dots]
+
+
+def test_paths_are_smooth_between_their_points():
+    """Euler's elastica: its tip is farthest aside between two points of the path."""
+    path = solve(load("problems/cantilever_post_buckling.toml"))
+    course, _ = chart(path).axes
+    aside = np.abs(path.positions("tip", 1)[:, 1]).max()
+    drawn = [line for line in course.get_lines() if line.get_gid() == "stable"]
+    farthest = max(float(np.abs(line.get_xdata()).max()) for line in drawn)
+    closed = elastica_farthest_aside()
+    # The largest point of the path is this much below; the curve misses it by less than a thousandth.
+    assert aside < closed - 5e-3
+    assert farthest == pytest.approx(closed, abs=1e-3)
+
+
+def elastica_farthest_aside() -> float:
+    """Largest deflection of the tip of a compressed cantilever of unit length: 2 k / K(k), k the sine of half the angle
+    of the tip."""
+    moduli = np.linspace(0.01, 0.999, 100_000)
+    return float((2.0 * moduli / ellipk(moduli**2)).max())
 
 
 def test_charts_draw_what_holds_the_structure():

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -47,8 +48,10 @@ LOADED = 5.0
 
 NARROW = 0.01
 """Half the width of the axis where nothing moves, over the size of the scene."""
-SHAPES, OVER_EACH_OTHER = 6, 2e-3
-"""Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
+SHAPES, OF_BRANCHES, OVER_EACH_OTHER = 5, 3, 2e-3
+"""Deformed shapes of the path and of a branch at most, and how much they differ at least, over their size."""
+BETWEEN = 8
+"""Pieces of the curve between two points of a path."""
 SAMPLES = np.linspace(0.0, 1.0, 61)
 BUCKLING_MODES = 3
 """Bifurcations at most whose shapes are drawn, the first ones."""
@@ -176,23 +179,26 @@ def _frequencies(path: Path) -> _Quantity:
 def _telling(path: Path) -> _Quantity:
     """The component that changes most: of a reaction where only motions are prescribed, else of a displacement.
 
-    A loaded node comes before others that do not move by far more, and there the direction of the load.  What
-    tells the ends of branches apart comes before what does not, as mirrored branches lie on each other there.
+    A loaded node comes before others that do not move by far more, and there, of a path without branches, the
+    direction of the load.  What tells the ends of branches apart comes before what does not, as mirrored branches
+    lie on each other there.
     """
     scene = path.scene
     driven = not scene.loads and scene.gravity is None
     found = list(_reactions(path) if driven else _displacements(path))
     loaded = {load.node: np.abs(load.vector) for load in scene.loads.values() if load.type == "force"}
 
-    def change(quantity: _Quantity) -> float:
-        change = float(np.ptp(quantity.every))
+    def change(quantity: _Quantity) -> tuple[float, float]:
+        change = 0.0 if _still(path, quantity) else float(np.ptp(quantity.every))
         ends = np.sort([float(values[-1, 0]) for values in quantity.values])
-        if len(ends) > 1 and np.diff(ends).min() < 1e-3 * change:
-            change *= 0.01
+        if len(ends) > 1:
+            # Each pair of ends that coincide counts.
+            change *= 0.01 ** float((np.diff(ends) < 1e-3 * change).mean())
         if quantity.node is None or quantity.node not in loaded:
-            return change
+            return change, 0.0
         along = loaded[quantity.node]
-        return LOADED * change * (0.2 + 0.8 * float(along[quantity.axis] / max(along.max(), TINY)))
+        share = float(along[quantity.axis] / max(along.max(), TINY))
+        return LOADED * change * (0.2 + 0.8 * share if len(ends) == 1 else 1.0), share
 
     return max(found, key=change)
 
@@ -269,12 +275,33 @@ def _draw_branch(axes: Axes, branch: Branch, values: Array, colour: str, *, upri
     """Draw values (points,) of a branch, stretch by stretch, with its critical points."""
     across, up = (branch.factors, values) if upright else (values, branch.factors)
     for stable, first, last in branch.stretches():
-        part = slice(first, last + 1)
         label = dict(KINDS)[stable]
-        axes.plot(across[part], up[part], linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
+        line = _smooth(branch, first, last, np.column_stack([across, up]))
+        axes.plot(*line.T, linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
     for kind, mark in MARKS.items():
         here = [i for i, point in enumerate(branch.points) if point.kind == kind]
         axes.plot(across[here], up[here], mark, color=colour, fillstyle="none", markersize=7, gid=kind)
+
+
+def _smooth(branch: Branch, first: int, last: int, places: Array) -> Array:
+    """Places (n, 2) of the points from the ``first`` to the ``last``, with others on cubics over the arc between them.
+
+    In contact, whose points have meshes of their own, a path may have corners: lines are straight.
+    """
+    part = slice(first, last + 1)
+    arcs = np.array([point.arc for point in branch.points])
+    steps = np.diff(arcs)
+    own = any(point.prepared is not None for point in branch.points)
+    if own or len(arcs) < 3 or not (steps > 0.0).all() or not np.isfinite(places).all():
+        return places[part]
+    # SciPy's splines would take longer to import than the picture to draw.
+    slopes = np.gradient(places, arcs, axis=0)[part]
+    ends, step = places[part], steps[first:last, None, None]
+    t = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)[:, None]
+    rise = 3.0 * t**2 - 2.0 * t**3
+    between = ends[:-1, None] + rise * np.diff(ends, axis=0)[:, None]
+    between += step * (t * (1.0 - t) ** 2 * slopes[:-1, None] - t**2 * (1.0 - t) * slopes[1:, None])
+    return np.vstack([between.reshape(-1, 2), ends[-1:]])
 
 
 def _calm(axes: Axes, path: Path, quantity: _Quantity, unit: float) -> None:
@@ -321,10 +348,12 @@ class _Shape:
 
 
 def _shapes(path: Path) -> list[_Shape]:
-    """Shapes at the end and evenly along the path, and at the end of each branch; none that looks like another."""
+    """Shapes at the end and evenly along the path and its branches; none that looks like another."""
     count = len(path.points)
-    chosen = [(0, int(i)) for i in np.unique(np.linspace(0, count - 1, SHAPES).round().astype(int))[1:]]
-    chosen += [(number, len(branch.points) - 1) for number, branch in enumerate(path.branches)][1:]
+    chosen = list[tuple[int, int]]()
+    for number, one in enumerate(path.branches):
+        evenly = np.linspace(0, len(one.points) - 1, 1 + (OF_BRANCHES if number else SHAPES)).round().astype(int)
+        chosen += [(number, int(i)) for i in np.unique(evenly)[1:]]
     rest = np.vstack([line.positions(SAMPLES) for line in path.scene.center_lines.values()])
     seen, found = [rest], list[_Shape]()
     for branch, index in chosen:
@@ -337,6 +366,9 @@ def _shapes(path: Path) -> list[_Shape]:
             state = "" if point.stable is True else f", {dict(KINDS)[point.stable]}"
             where = f", branch {branch}" if branch else ""
             label = f"factor {point.factor:.4g}{where}{state}"
+            if branch and index < len(path.branches[branch].points) - 1:
+                # One entry of the legend for each branch.
+                label, colour = "", _paler(colour)
             found.append(_Shape(branch, index, colour, label, dashes_of(point.stable)))
     return found
 
@@ -378,6 +410,11 @@ def _colour(branch: int) -> str:
     return COLOURS[branch % len(COLOURS)]
 
 
+def _paler(colour: str) -> str:
+    red, green, blue = (0.5 + 0.5 * share for share in to_rgb(colour))
+    return to_hex((red, green, blue))
+
+
 def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     """The shapes over the undeformed one, with what holds them as at the end of the path."""
     points = [*(path.branches[shape.branch].points[shape.index] for shape in shapes), path.points[-1]]
@@ -388,7 +425,7 @@ def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     assert isinstance(paper.figure, Figure)
     axes = axes_on(paper.figure, paper, sketch)
     _draw_lines(axes, course, shapes)
-    columns = min(3, 1 + len(shapes) // 5)
+    columns = min(3, 1 + sum(bool(shape.label) for shape in shapes) // 5)
     below = -0.13 if axes is paper else 0.0
     handles, _ = axes.get_legend_handles_labels()
     place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, below)}
@@ -411,4 +448,4 @@ def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
         looks.append((lines, shape.label, style))
     for lines, label, style in looks:
         for i, line in enumerate(lines):
-            plot_line(axes, line, label=label if i == 0 else None, **style)
+            plot_line(axes, line, label=label if label and i == 0 else None, **style)
