@@ -11,6 +11,7 @@ from matplotlib.patches import Polygon
 from matplotlib.text import Text
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy.special import ellipk
 
 from sfetcas import Scene, load, solve
 from sfetcas.description.contacts import Contact
@@ -18,6 +19,7 @@ from sfetcas.description.obstacles import obstacle
 from sfetcas.mathematics import quaternion
 from sfetcas.pictures.charts import chart
 from sfetcas.pictures.glyphs import sketch_all
+from sfetcas.pictures.modeshapes import REACH
 from sfetcas.pictures.plotting import picture
 from sfetcas.pictures.sketch import Sketch, course_of, view_of
 
@@ -372,7 +374,33 @@ def test_branches_to_both_sides_are_seen_apart():
     course, shapes = chart(solve(load("problems/cantilever_post_buckling.toml"))).axes
     assert course.get_xlabel() == "displacement of tip in y, m"
     said = [text.get_text() for text in shapes.get_legend().get_texts()]
-    assert said == ["undeformed", "factor 23, branch 1", "factor 23, branch 2"]
+    assert said == ["undeformed", "factor 23, branch 1", "factor 23, branch 2", "buckling mode, factor 22.21"]
+    # Three shapes along each branch, the last one bold in colour and in the legend.
+    lines = [line for line in shapes.get_lines() if line.get_gid() == "shape"]
+    dots = [line for line in course.get_lines() if line.get_gid() == "shape"]
+    assert len(lines) == len(dots) == 2 * 3 + 1
+    assert [line.get_label().startswith("_") for line in lines] == [True, True, False] * 2 + [False]
+    assert [line.get_color() for line in lines] == [dot.get_color() for dot in dots]
+
+
+def test_paths_are_smooth_between_their_points():
+    """Euler's elastica: its tip is farthest aside between two points of the path."""
+    path = solve(load("problems/cantilever_post_buckling.toml"))
+    course, _ = chart(path).axes
+    aside = np.abs(path.positions("tip", 1)[:, 1]).max()
+    drawn = [line for line in course.get_lines() if line.get_gid() == "stable"]
+    farthest = max(float(np.abs(line.get_xdata()).max()) for line in drawn)
+    closed = elastica_farthest_aside()
+    # The largest point of the path is this much below; the curve misses it by less than a thousandth.
+    assert aside < closed - 5e-3
+    assert farthest == pytest.approx(closed, abs=1e-3)
+
+
+def elastica_farthest_aside() -> float:
+    """Largest deflection of the tip of a compressed cantilever of unit length: 2 k / K(k), k the sine of half the angle
+    of the tip."""
+    moduli = np.linspace(0.01, 0.999, 100_000)
+    return float((2.0 * moduli / ellipk(moduli**2)).max())
 
 
 def test_charts_draw_what_holds_the_structure():
@@ -411,4 +439,26 @@ def test_rounding_does_not_fill_a_chart():
     course, shapes = chart(solve(load("problems/toggle_inextensible.toml"))).axes
     low, high = course.get_xlim()
     assert high - low > 0.01
-    assert [text.get_text() for text in shapes.get_legend().get_texts()] == ["undeformed; all shapes look like it"]
+    assert [text.get_text() for text in shapes.get_legend().get_texts()] == [
+        "undeformed; all equilibria look like it",
+        "buckling mode, factor 6.035",
+    ]
+
+
+def test_charts_draw_the_buckling_modes_of_a_column():
+    course, shapes = chart(solve(load("problems/euler_column_clamped_free.toml"))).axes
+    lines = [line for line in shapes.get_lines() if line.get_gid() == "shape"]
+    dots = [line for line in course.get_lines() if line.get_gid() == "shape"]
+    assert len(lines) == len(dots) == 3
+    for number, (line, dot) in enumerate(zip(lines, dots, strict=True)):
+        wave = (number + 0.5) * np.pi
+        assert line.get_label() == f"buckling mode, factor {wave**2:.4g}"
+        # The unit of the drawing is the metre here.
+        x, y = line.get_data()
+        closed = 1.0 - np.cos(wave * x)
+        # The mesh of the path has factors to 1e-8, shapes to its root.
+        np.testing.assert_allclose(y / y[-1], closed / closed[-1], atol=1e-4)
+        assert np.abs(y).max() == pytest.approx(REACH, rel=1e-12)
+        assert dot.get_ydata()[0] == pytest.approx(wave**2, rel=1e-7)
+        assert dot.get_color() == line.get_color()
+    assert "arbitrary size" in shapes.get_legend().get_title().get_text()

@@ -29,12 +29,12 @@ from ..equilibria.settings import Settings
 from ..equilibria.single import finished
 from ..equilibria.solution import Equilibrium, heading, heading_in_words
 from ..errors import SceneError, SolveError, Status
-from ..mathematics import quaternion
 from ..mathematics.arrays import TINY, Array, first_of_largest
 from ..mathematics.linear import SparseSolver, smallest
 from ..mathematics.threads import single_threaded
+from ..mechanics.displacements import STEP, Displacements
 from ..mechanics.equations import Equations, State
-from ..mechanics.fields import Fields, transferred
+from ..mechanics.fields import transferred
 from ..mechanics.loading import Loading
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import assemble
@@ -70,9 +70,6 @@ HALVINGS = 7
 
 MOST_ELEMENTS = 4000
 """A mesh that is halved does not grow beyond this."""
-
-STEP = 1e-5
-"""Step of the central difference that turns eigenvectors into displacements; its relative error is the step squared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +229,7 @@ class Modes:
             raise SceneError(f"found member {member!r}; {nearest(member, self.scene.members)}")
         shape, places = self.modes[number].change, np.atleast_1d(np.asarray(at, dtype=float))
         parts = [shape.real] + ([shape.imag] if np.iscomplexobj(shape) else [])
-        tables = [_along(self.motion, part, member, places) for part in parts]
+        tables = [_displacements(self.motion, part).along(member, places) for part in parts]
         return {key: _joined([table[key] for table in tables]) for key in tables[0]}
 
     def plot(self, **how: Any) -> Figure:
@@ -501,48 +498,18 @@ def _joined(parts: list[Array]) -> Array:
     return parts[0] if len(parts) == 1 else parts[0] + 1j * parts[1]
 
 
-def _sides(motion: SmallMotion, shape: Array) -> tuple[Fields, Fields, float]:
-    """The state moved a little ahead and back along a change of the unknowns, and one over the step between."""
-    equations = motion.equations
-    size = float(np.abs(shape).max(initial=0.0)) or 1.0
-    step = np.zeros(equations.total)
-    step[: motion.unknowns] = STEP / size * shape
-    ahead, behind = (
-        Fields(equations, equations.moved(motion.state, sign * step), motion.loading) for sign in (1.0, -1.0)
-    )
-    return ahead, behind, size / (2.0 * STEP)
+def _displacements(motion: SmallMotion, shape: Array) -> Displacements:
+    return Displacements(motion.equations, motion.state, motion.loading, shape)
 
 
 def _displaced(motion: SmallMotion, shape: Array) -> tuple[dict[str, dict[str, Array]], dict[str, dict[str, Array]]]:
     """Displacements (m) and rotations of nodes, and displacements along members, of a change of the unknowns."""
-    equations, model = motion.equations, motion.model
-    ahead, behind, scale = _sides(motion, shape)
+    model, moved = motion.model, _displacements(motion, shape)
     nodes: dict[str, dict[str, Array]] = {}
     for name in model.nodes:
-        nodes[name] = {"position": scale * (ahead.position(name) - behind.position(name))}
-        turn = model.rotations.node_turn[name]
-        if turn is not None:
-            nodes[name]["rotation"] = _rotation(equations, turn, shape)
-    members = {}
-    for name in model.scene.members:
-        places = model.along(name)
-        moved = ahead.along(name, places)["position"] - behind.along(name, places)["position"]
-        members[name] = {"position": scale * moved}
+        nodes[name] = {"position": moved.position(name)}
+        turned = moved.rotation(name)
+        if turned is not None:
+            nodes[name]["rotation"] = turned
+    members = {name: {"position": moved.along(name, model.along(name))["position"]} for name in model.scene.members}
     return nodes, members
-
-
-def _along(motion: SmallMotion, shape: Array, member: str, places: Array) -> dict[str, Array]:
-    """Displacements (n, 3) m and rotations (n, 3) rad along a member, of a change of the unknowns."""
-    ahead, behind, scale = _sides(motion, shape)
-    one, other = ahead.along(member, places), behind.along(member, places)
-    if motion.model.space:
-        turn = quaternion.rotation_vector(quaternion.multiply(one["rotation"], quaternion.conjugate(other["rotation"])))
-    else:
-        turn = np.pad(one["rotation"] - other["rotation"], ((0, 0), (2, 0)))
-    return {"position": scale * (one["position"] - other["position"]), "rotation": scale * turn}
-
-
-def _rotation(equations: Equations, turn: int, shape: Array) -> Array:
-    """Rotation vector (3,) of a rotation in a change of the unknowns."""
-    vector = equations.spins(shape)[turn]
-    return np.concatenate([np.zeros(3 - len(vector)), vector])

@@ -22,6 +22,7 @@ from ..equilibria.statics import pilot_of
 from ..errors import SceneError, SolveError, Status
 from ..mathematics.threads import single_threaded
 from ..mechanics.accuracy import largest_difference
+from ..mechanics.displacements import Displacements
 from ..mechanics.fields import transferred
 from ..mechanics.mesh import Mesh
 from ..mechanics.model import Model, assemble
@@ -31,12 +32,12 @@ from ..solvers.critical import Event, at_factors, shapes_at
 from ..solvers.prepared import Prepared
 from ..solvers.redundancy import with_sharing
 from ..solvers.residuals import relative_residual
-from ..solvers.tracing import Traced, passes, switched, trace, without
+from ..solvers.tracing import Traced, full_shape, passes, switched, trace, without
 from .contact_path import MARGIN, STEADY, follow_in_contact
 from .path import NO_POTENTIAL, Branch, Path, PathPoint, ending
 from .vibrations import shaken, with_modes
 
-__all__ = ["follow_path", "switch"]
+__all__ = ["buckling_mode", "follow_path", "switch"]
 
 LEVELS = 10
 """Most halvings of the first mesh."""
@@ -115,6 +116,43 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
     SolveError
         No branch was found there.
     """
+    if side not in (1, -1):
+        raise SceneError(f"side: found {side}, accepted: 1 or -1")
+    curve, event = _bifurcation_of(path, bifurcation, shape)
+    run = PathTracing(path.scene, Settings())
+    traced = run.branch(curve, event, side, shape, points or path.scene.analysis.points)
+    if traced is None:
+        raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
+    stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
+    branch = run.answered(curve, stretch, {})
+    return branch if path.massive is None else shaken(path, branch)
+
+
+@single_threaded
+def buckling_mode(path: Path, bifurcation: int = 1, *, shape: int = 1) -> Displacements:
+    """The mode in which the structure buckles at a bifurcation of a path; its size is arbitrary.
+
+    Parameters
+    ----------
+    path : Path
+    bifurcation : int
+        Number of the bifurcation on the path itself, 1 is the first.
+    shape : int
+        Number of the eigenvector, from 1, where several eigenvalues vanish at once.
+
+    Raises
+    ------
+    SceneError
+        There is no such bifurcation or shape.
+    """
+    curve, event = _bifurcation_of(path, bifurcation, shape)
+    here = event.standing
+    change = full_shape(curve, here, shapes_at(curve, event)[:, shape - 1]).z[: curve.equations.unknowns]
+    return Displacements(curve.equations, here.state, here.loading, change)
+
+
+def _bifurcation_of(path: Path, bifurcation: int, shape: int) -> tuple[Curve, Event]:
+    """A bifurcation of a path by its number, from 1, which has a shape of this number."""
     if not isinstance(path, Path):
         accepted = "the answer of a scene whose analysis is a path, whole and not a branch of it"
         raise SceneError(f"path: found a {type(path).__name__}, accepted: {accepted}")
@@ -123,20 +161,12 @@ def switch(path: Path, bifurcation: int = 1, side: int = 1, *, shape: int = 1, p
         raise SceneError("bifurcation: the path has none, accepted: a path with bifurcations")
     if not 1 <= bifurcation <= count:
         raise SceneError(f"bifurcation: found {bifurcation}, accepted: 1 to {count}, those of the path")
-    if side not in (1, -1):
-        raise SceneError(f"side: found {side}, accepted: 1 or -1")
-    run = PathTracing(path.scene, Settings())
     curve = Curve(path.prepared, path.unit)
     number = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"][bifurcation - 1]
     event = _event_at(curve, path, number)
     if not 1 <= shape <= event.multiplicity:
         raise SceneError(f"shape: found {shape}, accepted: 1 to {event.multiplicity}, those that vanish there")
-    traced = run.branch(curve, event, side, shape, points or path.scene.analysis.points)
-    if traced is None:
-        raise SolveError(Status.FAILED, f"no branch found at bifurcation {bifurcation}")
-    stretch = run.stretch(_Stretch(traced, bifurcation, side), curve)
-    branch = run.answered(curve, stretch, {})
-    return branch if path.massive is None else shaken(path, branch)
+    return curve, event
 
 
 def _event_at(curve: Curve, path: Path, number: int) -> Event:

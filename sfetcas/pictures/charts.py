@@ -1,7 +1,8 @@
 """Charts of paths: the factor against what moves most, or quantities over it, and deformed shapes along the way.
 
 Stable stretches are drawn solid, unstable ones dashed; limit points are circles, bifurcations squares, and dots in
-the colours of the shapes say where these are.  Where only motions are prescribed, the largest reaction at a moved
+the colours of the shapes say where these are.  A bifurcation whose branches are not followed has its buckling mode,
+drawn so large that it is well seen.  Where only motions are prescribed, the largest reaction at a moved
 node stands over the factor instead.  Supports, joints, springs and obstacles are drawn with the shape at the end of
 the path, as in pictures of answers; loads are not, as they grow along the way.
 """
@@ -15,17 +16,21 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..description.answers import AnswerName
 from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
+from ..mechanics.displacements import Displacements
 from ..paths.path import Branch, Path
+from ..paths.paths import buckling_mode
 from .curves import FREQUENCIES, Curve, clipped, leave, quantities_named, said, shown_components, table_of
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
+from .modeshapes import REACH, TWISTING
 from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
 from .showing import Picture, new_figure
 from .sketch import REST, Course, Sketch, course_of, unit_for, view_of
@@ -43,9 +48,13 @@ LOADED = 5.0
 
 NARROW = 0.01
 """Half the width of the axis where nothing moves, over the size of the scene."""
-SHAPES, OVER_EACH_OTHER = 6, 2e-3
-"""Deformed shapes of a branch at most, and how much they differ from others at least, over their size."""
+SHAPES, OF_BRANCHES, OVER_EACH_OTHER = 5, 3, 2e-3
+"""Deformed shapes of the path and of a branch at most, and how much they differ at least, over their size."""
+BETWEEN = 8
+"""Pieces of the curve between two points of a path."""
 SAMPLES = np.linspace(0.0, 1.0, 61)
+BUCKLING_MODES = 3
+"""Bifurcations at most whose shapes are drawn, the first ones."""
 SHADES = ("#0B1F4B", "#134B86", "#2A7AB8", "#5DA5D6", "#9CC7E8")
 """Of the shapes along the path, in this order."""
 
@@ -97,7 +106,7 @@ def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Pict
     grid = figure.add_gridspec(len(found), 2)
     panels = [figure.add_subplot(grid[i, 0]) for i in range(len(found))]
     right = figure.add_subplot(grid[:, 1])
-    shapes = _shapes(path)
+    shapes = [*_shapes(path), *_buckling_modes(path)]
     for panel, quantity in zip(panels, found, strict=True):
         _draw_course(panel, path, quantity, shapes)
     if all(quantity.upright for quantity in found):
@@ -170,23 +179,26 @@ def _frequencies(path: Path) -> _Quantity:
 def _telling(path: Path) -> _Quantity:
     """The component that changes most: of a reaction where only motions are prescribed, else of a displacement.
 
-    A loaded node comes before others that do not move by far more, and there the direction of the load.  What
-    tells the ends of branches apart comes before what does not, as mirrored branches lie on each other there.
+    A loaded node comes before others that do not move by far more, and there, of a path without branches, the
+    direction of the load.  What tells the ends of branches apart comes before what does not, as mirrored branches
+    lie on each other there.
     """
     scene = path.scene
     driven = not scene.loads and scene.gravity is None
     found = list(_reactions(path) if driven else _displacements(path))
     loaded = {load.node: np.abs(load.vector) for load in scene.loads.values() if load.type == "force"}
 
-    def change(quantity: _Quantity) -> float:
-        change = float(np.ptp(quantity.every))
+    def change(quantity: _Quantity) -> tuple[float, float]:
+        change = 0.0 if _still(path, quantity) else float(np.ptp(quantity.every))
         ends = np.sort([float(values[-1, 0]) for values in quantity.values])
-        if len(ends) > 1 and np.diff(ends).min() < 1e-3 * change:
-            change *= 0.01
+        if len(ends) > 1:
+            # Each pair of ends that coincide counts.
+            change *= 0.01 ** float((np.diff(ends) < 1e-3 * change).mean())
         if quantity.node is None or quantity.node not in loaded:
-            return change
+            return change, 0.0
         along = loaded[quantity.node]
-        return LOADED * change * (0.2 + 0.8 * float(along[quantity.axis] / max(along.max(), TINY)))
+        share = float(along[quantity.axis] / max(along.max(), TINY))
+        return LOADED * change * (0.2 + 0.8 * share if len(ends) == 1 else 1.0), share
 
     return max(found, key=change)
 
@@ -263,12 +275,33 @@ def _draw_branch(axes: Axes, branch: Branch, values: Array, colour: str, *, upri
     """Draw values (points,) of a branch, stretch by stretch, with its critical points."""
     across, up = (branch.factors, values) if upright else (values, branch.factors)
     for stable, first, last in branch.stretches():
-        part = slice(first, last + 1)
         label = dict(KINDS)[stable]
-        axes.plot(across[part], up[part], linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
+        line = _smooth(branch, first, last, np.column_stack([across, up]))
+        axes.plot(*line.T, linestyle=STYLES[str(stable)], color=colour, linewidth=1.4, gid=label)
     for kind, mark in MARKS.items():
         here = [i for i, point in enumerate(branch.points) if point.kind == kind]
         axes.plot(across[here], up[here], mark, color=colour, fillstyle="none", markersize=7, gid=kind)
+
+
+def _smooth(branch: Branch, first: int, last: int, places: Array) -> Array:
+    """Places (n, 2) of the points from the ``first`` to the ``last``, with others on cubics over the arc between them.
+
+    In contact, whose points have meshes of their own, a path may have corners: lines are straight.
+    """
+    part = slice(first, last + 1)
+    arcs = np.array([point.arc for point in branch.points])
+    steps = np.diff(arcs)
+    own = any(point.prepared is not None for point in branch.points)
+    if own or len(arcs) < 3 or not (steps > 0.0).all() or not np.isfinite(places).all():
+        return places[part]
+    # SciPy's splines would take longer to import than the picture to draw.
+    slopes = np.gradient(places, arcs, axis=0)[part]
+    ends, step = places[part], steps[first:last, None, None]
+    t = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)[:, None]
+    rise = 3.0 * t**2 - 2.0 * t**3
+    between = ends[:-1, None] + rise * np.diff(ends, axis=0)[:, None]
+    between += step * (t * (1.0 - t) ** 2 * slopes[:-1, None] - t**2 * (1.0 - t) * slopes[1:, None])
+    return np.vstack([between.reshape(-1, 2), ends[-1:]])
 
 
 def _calm(axes: Axes, path: Path, quantity: _Quantity, unit: float) -> None:
@@ -304,20 +337,23 @@ def _legend(path: Path, *, frequencies: bool) -> Iterator[Line2D]:
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """A deformed shape: of which branch and point, and how it looks."""
+    """A deformed shape: of which branch and point, and how it looks; ``buckling``: drawn from there on, in any size."""
 
     branch: int
     index: int
     colour: str
     label: str
     dashes: Any
+    buckling: Displacements | None = None
 
 
 def _shapes(path: Path) -> list[_Shape]:
-    """Shapes at the end and evenly along the path, and at the end of each branch; none that looks like another."""
+    """Shapes at the end and evenly along the path and its branches; none that looks like another."""
     count = len(path.points)
-    chosen = [(0, int(i)) for i in np.unique(np.linspace(0, count - 1, SHAPES).round().astype(int))[1:]]
-    chosen += [(number, len(branch.points) - 1) for number, branch in enumerate(path.branches)][1:]
+    chosen = list[tuple[int, int]]()
+    for number, one in enumerate(path.branches):
+        evenly = np.linspace(0, len(one.points) - 1, 1 + (OF_BRANCHES if number else SHAPES)).round().astype(int)
+        chosen += [(number, int(i)) for i in np.unique(evenly)[1:]]
     rest = np.vstack([line.positions(SAMPLES) for line in path.scene.center_lines.values()])
     seen, found = [rest], list[_Shape]()
     for branch, index in chosen:
@@ -330,35 +366,80 @@ def _shapes(path: Path) -> list[_Shape]:
             state = "" if point.stable is True else f", {dict(KINDS)[point.stable]}"
             where = f", branch {branch}" if branch else ""
             label = f"factor {point.factor:.4g}{where}{state}"
+            if branch and index < len(path.branches[branch].points) - 1:
+                # One entry of the legend for each branch.
+                label, colour = "", _paler(colour)
             found.append(_Shape(branch, index, colour, label, dashes_of(point.stable)))
     return found
+
+
+def _buckling_modes(path: Path) -> Iterator[_Shape]:
+    """Shapes of the first bifurcations from which no branch was followed."""
+    followed = {branch.bifurcation for branch in path.branches[1:]}
+    indices = [i for i, point in enumerate(path.points) if point.kind == "bifurcation"]
+    alone = [number for number in range(1, len(indices) + 1) if number not in followed]
+    for place, number in enumerate(alone[:BUCKLING_MODES]):
+        index, colour = indices[number - 1], _colour(len(path.branches) + place)
+        label = f"buckling mode, factor {path.points[index].factor:.4g}"
+        yield _Shape(0, index, colour, label, "-", buckling_mode(path, number))
+
+
+def _buckled(course: Course, shapes: Sequence[_Shape]) -> Course:
+    """The course with the lines of the buckling modes so far from their equilibria that they are well seen."""
+    extent = float(np.ptp(course.everything, axis=0).max())
+    earlier = list(course.earlier)
+    for number, shape in enumerate(shapes):
+        if shape.buckling is not None:
+            lines = earlier[number]
+            moved = [
+                shape.buckling.along(name, np.linspace(0.0, 1.0, len(line)))
+                for name, line in zip(course.members, lines, strict=True)
+            ]
+            largest, turned = (
+                max(float(np.linalg.norm(found[key], axis=1).max()) for found in moved)
+                for key in ("position", "rotation")
+            )
+            # What only twists moves no line.
+            if largest > TWISTING * turned * extent * course.unit:
+                scale = REACH * extent / largest
+                earlier[number] = [line + scale * found["position"] for line, found in zip(lines, moved, strict=True)]
+    return replace(course, earlier=earlier)
 
 
 def _colour(branch: int) -> str:
     return COLOURS[branch % len(COLOURS)]
 
 
+def _paler(colour: str) -> str:
+    red, green, blue = (0.5 + 0.5 * share for share in to_rgb(colour))
+    return to_hex((red, green, blue))
+
+
 def _draw_shapes(paper: Axes, path: Path, shapes: list[_Shape]) -> None:
     """The shapes over the undeformed one, with what holds them as at the end of the path."""
     points = [*(path.branches[shape.branch].points[shape.index] for shape in shapes), path.points[-1]]
-    course = course_of(path.scene, [path.configuration(point) for point in points])
+    course = _buckled(course_of(path.scene, [path.configuration(point) for point in points]), shapes)
     view = view_of(path.model.space, [course.everything])
     sketch = Sketch(path.scene, path.configuration(path.points[-1]), course, view)
     sketch_supports(sketch)
     assert isinstance(paper.figure, Figure)
     axes = axes_on(paper.figure, paper, sketch)
     _draw_lines(axes, course, shapes)
-    columns = min(3, 1 + len(shapes) // 5)
+    columns = min(3, 1 + sum(bool(shape.label) for shape in shapes) // 5)
     below = -0.13 if axes is paper else 0.0
     handles, _ = axes.get_legend_handles_labels()
     place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, below)}
+    if any(shape.buckling is not None for shape in shapes):
+        place |= {"title": "buckling modes are drawn in an arbitrary size", "title_fontsize": 8}
     paper.legend(handles=handles, fontsize=8, ncols=columns, frameon=False, **place)
     Sheet(paper.figure, axes, paper, sketch).finish()
 
 
 def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
     """Undeformed and deformed lines, with entries for the legend."""
-    text = "undeformed" if shapes else "undeformed; all shapes look like it"
+    text = (
+        "undeformed" if any(shape.buckling is None for shape in shapes) else "undeformed; all equilibria look like it"
+    )
     looks: list[tuple[list[Array], str, dict[str, Any]]] = [
         (course.rest, text, {"color": REST, "linewidth": 1.2, "linestyle": DOTTED, "gid": "undeformed"})
     ]
@@ -367,4 +448,4 @@ def _draw_lines(axes: Any, course: Course, shapes: list[_Shape]) -> None:
         looks.append((lines, shape.label, style))
     for lines, label, style in looks:
         for i, line in enumerate(lines):
-            plot_line(axes, line, label=label if i == 0 else None, **style)
+            plot_line(axes, line, label=label if label and i == 0 else None, **style)

@@ -28,7 +28,7 @@ from .sheet import Sheet, title_of
 from .showing import new_figure
 from .sketch import REST, SUPPORT, Sketch, View, course_of, in_short, norm, view_of
 
-__all__ = ["PHASES", "ModePanels", "mode_picture", "save_modes"]
+__all__ = ["PHASES", "REACH", "TWISTING", "ModePanels", "mode_picture", "save_modes"]
 
 MOST = 12
 """Modes drawn at most."""

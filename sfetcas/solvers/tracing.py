@@ -21,7 +21,7 @@ from .critical import LARGEST_PRIMAL_FACTOR, Event, events_between
 from .newton import largest_rotation
 from .residuals import relative_residual
 
-__all__ = ["FAR", "Traced", "passes", "switched", "trace", "without"]
+__all__ = ["FAR", "Traced", "full_shape", "passes", "switched", "trace", "without"]
 
 TURNING = 0.25
 """Angle between the tangents of neighbouring points, rad, that steps aim at."""
@@ -336,7 +336,7 @@ def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int =
         1 or -1: in which direction along the shape.
     """
     here = event.standing
-    across = _full_shape(curve, here, shapes[:, number - 1])
+    across = full_shape(curve, here, shapes[:, number - 1])
     across = replace(across, z=side * across.z, factor=side * across.factor)
     others = np.delete(shapes, number - 1, axis=1)
     alone = replace(across, neutral=curve.neutral(here.point, others, LARGEST_PRIMAL_FACTOR)) if others.size else across
@@ -351,8 +351,8 @@ def switched(curve: Curve, event: Event, shapes: Array, side: int, number: int =
     return None
 
 
-def _full_shape(curve: Curve, here: Standing, shape: Array) -> Tangent:
-    """A direction along the shape with the displacements and multipliers that belong to it, across the curve."""
+def full_shape(curve: Curve, here: Standing, shape: Array) -> Tangent:
+    """A direction across the curve: a shape (rotation unknowns,) with its displacements and multipliers."""
     along = curve.normed(Tangent(curve.neutral(here.point, shape[:, None], LARGEST_PRIMAL_FACTOR).motions[:, 0], 0.0))
     share = curve.inner(along, here.tangent)
     mixed = Tangent(along.z - share * here.tangent.z, along.factor - share * here.tangent.factor)

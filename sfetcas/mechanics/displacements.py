@@ -1,0 +1,61 @@
+"""Displacements and rotations that belong to a small change of the unknowns: mode shapes of motions and of buckling."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..mathematics import quaternion
+from ..mathematics.arrays import Array
+from .equations import Equations, State
+from .fields import Fields
+from .loading import Loading
+
+__all__ = ["STEP", "Displacements"]
+
+STEP = 1e-5
+"""Step of the central difference that turns changes into displacements; its relative error is the step squared."""
+
+
+class Displacements:
+    """What nodes and members do, to first order, where the unknowns of a state change.
+
+    Parameters
+    ----------
+    equations : Equations
+    state : State
+    loading : Loading
+    change : ndarray (unknowns,)
+        Change of the unknowns, dimensionless; rotations in rad.
+    """
+
+    def __init__(self, equations: Equations, state: State, loading: Loading, change: Array) -> None:
+        self._equations, self._change = equations, change
+        size = float(np.abs(change).max(initial=0.0)) or 1.0
+        step = np.zeros(equations.total)
+        step[: equations.unknowns] = STEP / size * change
+        self._ahead, self._behind = (
+            Fields(equations, equations.moved(state, sign * step), loading) for sign in (1.0, -1.0)
+        )
+        self._scale = size / (2.0 * STEP)
+
+    def position(self, node: str) -> Array:
+        """Displacement of a node, (3,) m."""
+        return np.asarray(self._scale * (self._ahead.position(node) - self._behind.position(node)))
+
+    def rotation(self, node: str) -> Array | None:
+        """Rotation vector of a node, (3,) rad; None for a node without a rotation of its own."""
+        turn = self._equations.model.rotations.node_turn[node]
+        if turn is None:
+            return None
+        vector = self._equations.spins(self._change)[turn]
+        return np.concatenate([np.zeros(3 - len(vector)), vector])
+
+    def along(self, member: str, at: Array) -> dict[str, Array]:
+        """Displacements ``position`` (n, 3) m and ``rotation`` (n, 3) rad at fractions (n,) of a member's length."""
+        one, other = self._ahead.along(member, at), self._behind.along(member, at)
+        if self._equations.model.space:
+            between = quaternion.multiply(one["rotation"], quaternion.conjugate(other["rotation"]))
+            turn = quaternion.rotation_vector(between)
+        else:
+            turn = np.pad(one["rotation"] - other["rotation"], ((0, 0), (2, 0)))
+        return {"position": self._scale * (one["position"] - other["position"]), "rotation": self._scale * turn}
