@@ -183,8 +183,12 @@ if not TYPE_CHECKING:
         return value
 
 
+_FOLDERS = {"pictures", "tradeoff"}
+"""Folders with functions for users, listed once they are imported."""
+
+
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*__all__, "__doc__", "__version__", *(_FOLDERS & globals().keys())})
 
 
 class _Package(ModuleType):

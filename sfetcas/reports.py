@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -13,7 +13,7 @@ from .description.records import counted
 from .description.showing import WAYS, error_in_words, stability_in_words
 from .dynamics.motion import MotionState, Trajectory
 from .equilibria.solution import Equilibrium
-from .mathematics.arrays import first_of_largest
+from .mathematics.arrays import Array, first_of_largest
 from .mechanics.model import Model
 from .paths.path import Branch, FlutterPoint
 from .paths.path import Path as Course
@@ -27,6 +27,9 @@ __all__ = ["print_checks", "report", "report_sweep"]
 
 MOST_NODES = 20
 """Nodes in the printed report at most."""
+
+ROUNDING = 1e-13
+"""Share of the largest number of its kind below which a printed number is rounding: it is printed as 0."""
 
 
 def report(solution: Answer, seconds: float) -> None:
@@ -90,16 +93,34 @@ def _report_motion(motion: Trajectory) -> None:
 
 def _report_instant(instant: MotionState) -> None:
     print(f"at {instant.time:.9g} s")
-    for name in instant.model.nodes[:MOST_NODES]:
-        position, velocity = _vector(instant.position(name)), _vector(instant.velocity(name))
-        print(f"  node {name}: position {position} m, velocity {velocity} m/s")
+    sizes, nodes = _sizes(instant), instant.model.nodes[:MOST_NODES]
+    velocities = {name: instant.velocity(name) for name in nodes}
+    fastest = max(float(np.abs(velocity).max()) for velocity in velocities.values())
+    for name, velocity in velocities.items():
+        position = _vector(instant.position(name), sizes["m"])
+        print(f"  node {name}: position {position} m, velocity {_vector(velocity, fastest)} m/s")
     _report_more_nodes(instant.model)
-    for name, node in instant.model.scene.nodes.items():
-        if node.support != "free":
-            force, moment = instant.reaction(name)
-            print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    _report_reactions(instant, sizes)
     energy = ", ".join(f"{kind} {value:.9g}" for kind, value in instant.energy.items())
     print(f"  energy: {energy} N m")
+
+
+def _report_reactions(state: Equilibrium | MotionState, sizes: Mapping[str, float]) -> None:
+    for name, (force, moment) in _reactions(state).items():
+        print(f"  reaction {name}: force {_vector(force, sizes['N'])} N, moment {_vector(moment, sizes['N m'])} N m")
+
+
+def _reactions(state: Equilibrium | MotionState) -> dict[str, tuple[Array, Array]]:
+    supported = [name for name, node in state.model.scene.nodes.items() if node.support != "free"]
+    return {name: state.reaction(name) for name in supported}
+
+
+def _sizes(state: Equilibrium | MotionState) -> dict[str, float]:
+    """By unit what a number of this unit is compared with: the size of the scene, one radian, the largest reactions."""
+    reactions = list(_reactions(state).values())
+    force, moment = (max((float(np.abs(one[i]).max()) for one in reactions), default=0.0) for i in (0, 1))
+    length = state.model.scales.length
+    return {"m": length, "rad": 1.0, "N": max(force, moment / length), "N m": max(moment, force * length)}
 
 
 def _report_course(motion: Trajectory) -> None:
@@ -204,29 +225,27 @@ def _places(solution: Answer) -> list[str]:
 def _report_step(step: Equilibrium, place: str, said: set[str]) -> None:
     """One answer; a note that was said of one before is not repeated."""
     print(f"factor {step.factor:g}{place}")
+    sizes = _sizes(step)
     for name in step.model.nodes[:MOST_NODES]:
         angle = step.angle(name)
-        turned = f"  angle {angle:.9g} rad" if angle is not None else ""
-        print(f"  node {name}: position {_vector(step.position(name))} m{turned}")
+        turned = f"  angle {_number(angle, sizes['rad'])} rad" if angle is not None else ""
+        print(f"  node {name}: position {_vector(step.position(name), sizes['m'])} m{turned}")
     _report_more_nodes(step.model)
-    for name, node in step.model.scene.nodes.items():
-        if node.support != "free":
-            force, moment = step.reaction(name)
-            print(f"  reaction {name}: force {_vector(force)} N, moment {_vector(moment)} N m")
+    _report_reactions(step, sizes)
     for name in step.model.scene.springs:
         found = step.spring(name).to_dict()
         units = {key: answer_name(f"springs.{name}.{key}").kind.unit for key in found}
         # What a stop adds is of the kind of the spring.
         units |= {"stop": units.get("moment", "N")}
-        print(f"  spring {name}: {', '.join(f'{key} {value:.9g} {units[key]}' for key, value in found.items())}")
+        texts = (f"{key} {_number(value, sizes[units[key]])} {units[key]}" for key, value in found.items())
+        print(f"  spring {name}: {', '.join(texts)}")
     for name in step.model.scene.motions:
-        drives = [
-            f"{key} {_effort(value)} {answer_name(f'motions.{name}.{key}').kind.unit}"
-            for key, value in step.motion(name).items()
-        ]
-        print(f"  motion {name}: {', '.join(drives)}")
+        efforts = step.motion(name)
+        units = {key: answer_name(f"motions.{name}.{key}").kind.unit for key in efforts}
+        texts = (f"{key} {_effort(value, sizes[units[key]])} {units[key]}" for key, value in efforts.items())
+        print(f"  motion {name}: {', '.join(texts)}")
     for name, entry in step.contacts.items():
-        _report_contact(name, entry)
+        _report_contact(name, entry, sizes["N"])
     proof = step.certificate
     print(f"  {_kind(step)}, residual {proof.residual:.1e}, {error_in_words(proof.error_estimate, proof.error_of)}")
     for note in dict.fromkeys(step.notes):
@@ -243,7 +262,7 @@ def _kind(step: Equilibrium) -> str:
     return f"{kind}, smallest eigenvalue {proof.smallest:.4g} N" if np.isfinite(proof.smallest) else kind
 
 
-def _report_contact(name: str, entry: dict[str, Any]) -> None:
+def _report_contact(name: str, entry: dict[str, Any], size: float) -> None:
     if entry["at"] is None:
         print(f"  contact {name}: nothing touches it" + ("" if entry["gap"] is None else f", gap {entry['gap']:.9g} m"))
         return
@@ -255,15 +274,21 @@ def _report_contact(name: str, entry: dict[str, Any]) -> None:
         where = (
             f"lies on it from {at[0]:.9g} to {at[1]:.9g}, force over this" if lies else f"touches it at {at:.9g}, force"
         )
-        print(f"  contact {name}: {member} {where} {_vector(force)} N")
+        print(f"  contact {name}: {member} {where} {_vector(force, size)} N")
 
 
-def _effort(value: Any) -> str:
-    return f"{value:.9g}" if isinstance(value, float) else _vector(value)
+def _effort(value: Any, size: float) -> str:
+    return _number(value, size) if isinstance(value, float) else _vector(value, size)
 
 
-def _vector(values: Any) -> str:
-    return "(" + ", ".join(f"{value + 0.0:.9g}" for value in values) + ")"
+def _vector(values: Any, size: float = 0.0) -> str:
+    """A vector; components that are rounding beside its largest, or beside a size in its unit, as 0."""
+    size = max(size, float(np.abs(values).max()))
+    return "(" + ", ".join(_number(value, size) for value in values) + ")"
+
+
+def _number(value: float, size: float) -> str:
+    return "0" if abs(value) < ROUNDING * size else f"{value + 0.0:.9g}"
 
 
 def print_checks(checks: Sequence[Check]) -> None:

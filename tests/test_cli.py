@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -90,6 +91,22 @@ def test_run_prints_a_report_and_writes_the_answer(scene, tmp_path, capsys):
     assert proof["negative"] == 0
     assert 0 <= proof["residual"] < 1e-12
     assert 0 < proof["error_estimate"] <= 1e-8
+
+
+def test_only_what_rounding_may_hide_is_printed_as_zero(scene, capsys):
+    """Beside a force of 1 N: 1e-14 N may be rounding, 1e-12 N is told."""
+    for small, printed in ((1e-14, 0.0), (1e-12, -1e-12)):
+        assert main(["run", str(scene(("value = [0, 1]", f"value = [{small}, 1]")))]) == 0
+        force = re.search(r"reaction A: force \((\S+), -1, 0\) N", capsys.readouterr().out)[1]
+        # Forces are rounded to 1e-16 of the largest.
+        assert float(force) == pytest.approx(printed, abs=1e-14 if printed else 0.0)
+
+
+def test_small_numbers_among_small_ones_are_printed(scene, capsys):
+    """A load of 1e-15 N has a reaction of 1e-15 N: there is nothing beside which it were rounding."""
+    assert main(["run", str(scene(("value = [0, 1]", "value = [0, 1e-15]")))]) == 0
+    force = re.search(r"reaction A: force \(\S+, (\S+), 0\) N", capsys.readouterr().out)[1]
+    assert float(force) == pytest.approx(-1e-15, rel=1e-3, abs=0.0)
 
 
 def test_json_scene_is_the_toml_scene(scene, tmp_path, capsys):

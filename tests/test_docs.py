@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from sfetcas import Scene
+from sfetcas import Scene, load
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -49,6 +49,12 @@ def blocks(page):
 
 def is_run(block):
     return block.language in ("python", "{plot}", "sh") or "caption" in block.options
+
+
+def is_scene(block):
+    """Whether it is a whole scene; other TOML is read, too."""
+    table = tomllib.loads(block.text) if block.language == "toml" else {}
+    return {"nodes", "members"} <= set(table) and any("position" in node for node in table["nodes"].values())
 
 
 RUN = [page for page in PAGES if any(map(is_run, blocks(page)))]
@@ -99,6 +105,9 @@ def test_page_runs_as_it_stands(page, monkeypatch, tmp_path):
     for block in blocks(page):
         if "caption" in block.options:
             (tmp_path / block.options["caption"]).write_text(block.text, encoding="utf-8")
+            if is_scene(block):
+                # Beside the files that blocks before it wrote.
+                load(tmp_path / block.options["caption"])
         elif block.language in ("python", "{plot}"):
             run_python(block, names, page)
         elif block.language == "sh" and page.name != "README.md":
@@ -110,10 +119,8 @@ def test_page_runs_as_it_stands(page, monkeypatch, tmp_path):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_scenes_of_a_page_are_scenes(page):
     for block in blocks(page):
-        if block.language == "toml":
-            table = tomllib.loads(block.text)
-            if {"nodes", "members"} <= set(table) and any("position" in node for node in table["nodes"].values()):
-                Scene.from_dict(table)
+        if is_scene(block) and "caption" not in block.options:
+            Scene.from_dict(tomllib.loads(block.text))
 
 
 def test_links_of_the_readme_lead_somewhere():

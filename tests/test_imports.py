@@ -32,6 +32,13 @@ def test_package_imports_only_what_hears_signals():
     assert not modules & {"numpy", "casadi", "pydantic", "scipy", "matplotlib", "asyncio", "multiprocessing"}
 
 
+def test_package_lists_public_names_only():
+    """Also after its modules were imported; the folder with functions for users once it is."""
+    code = "import sfetcas, sfetcas.mechanics; first = set(dir(sfetcas)); import sfetcas.pictures.plotting"
+    code += "; assert first == {*sfetcas.__all__, '__doc__', '__version__'}, first - {*sfetcas.__all__}"
+    loaded(code + "; assert {*dir(sfetcas)} - first == {'pictures'}")
+
+
 def test_scene_needs_no_solver():
     modules = loaded("from sfetcas import Node, Scene, load")
     packages = {name.split(".")[1] for name in own(modules)}

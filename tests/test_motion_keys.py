@@ -427,6 +427,11 @@ def test_motions_that_begin_and_end_at_rest():
         (
             {"t": [0, 5], "value": [0, 1]},
             "begins with a rate of 0.2 1/s, so that the motion 'crank' would start with a jump, accepted: a history "
+            "that begins at rest, as with interpolation = 'spline', or a scene that begins with velocities",
+        ),
+        (
+            {"t": [0, 5], "polynomial": [[0, 1]]},
+            "begins with a rate of 0.2 1/s, so that the motion 'crank' would start with a jump, accepted: a history "
             "that begins at rest, or a scene that begins with velocities",
         ),
         ({"t": [-1, 5], "polynomial": [[0, 0, 1, -1]]}, "begins with 0.0231481, so that the motion 'crank' would jump"),

@@ -431,6 +431,13 @@ def test_supports_of_one_rigid_body_share_its_moment(space):
     assert np.abs(found["reactions.B.moment"][2]) > 0.1
 
 
+def test_a_number_that_a_section_is_given_without():
+    table = cantilever()
+    table["sections"]["s"] = {"shape": "rectangle", "width": 0.1, "height": 0.01, "E": 1e9}
+    with pytest.raises(SceneError, match=r"sections\.s is given without EI3, accepted: E, width, height$"):
+        parametric(Scene.from_dict(table), {"sections.s.EI3": None}, ["nodes.B.position"])
+
+
 @pytest.mark.parametrize("member", ["r1", "r2"])
 @pytest.mark.parametrize("at", [0.0, 0.5, 1.0])
 def test_moments_anywhere_on_a_rigid_body_reach_its_supports(member, at):

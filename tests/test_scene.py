@@ -719,6 +719,13 @@ def test_a_moment_by_one_number_is_about_z():
     assert Load(type="force", node="B", value=[1, 2]).vector == (1.0, 2.0, 0.0)
 
 
+def test_keys_are_given_by_their_names():
+    with pytest.raises(SceneError, match=r"^Member: found a value without a name, .* as Member\(nodes=\.\.\.\)$"):
+        Member(["A", "B"], section="strip")
+    with pytest.raises(SceneError, match=r"^Node: found 2 values without a name"):
+        Node([0, 0], "clamped")
+
+
 def test_how_the_ground_lets_a_node_turn():
     slider = Node(position=[0, 0], support="slider", direction=[1, 0], rotation="ball")
     assert [

@@ -171,7 +171,8 @@ def _check_start(motion: str, history: History, analysis: Analysis, resting: boo
             f"begins with {factor:g}, so that the motion {motion!r} would jump at t = 0, accepted: {accepted}"
         )
     if abs(rate) > slowest and resting:
-        accepted = "a history that begins at rest, or a scene that begins with velocities"
+        how = ", as with interpolation = 'spline'," if history.value is not None else ","
+        accepted = f"a history that begins at rest{how} or a scene that begins with velocities"
         raise SceneError(
             f"begins with a rate of {rate:g} 1/s, so that the motion {motion!r} would start with a jump, "
             f"accepted: {accepted}"

@@ -8,7 +8,7 @@ import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
@@ -258,7 +258,11 @@ class Record(Described):
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, *unnamed: NoReturn, **values: Any) -> None:
+        if unnamed:
+            own, key = type(self).__name__, next(iter(type(self).model_fields))
+            found = "a value" if len(unnamed) == 1 else f"{len(unnamed)} values"
+            raise SceneError(f"{own}: found {found} without a name, accepted: keys by their names, as {own}({key}=...)")
         try:
             super().__init__(**values)
         except ValidationError as error:

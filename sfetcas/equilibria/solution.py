@@ -74,7 +74,9 @@ class Certificate:
     negative : int
         Number of negative eigenvalues of the second variation there: independent directions in which energy falls.
     smallest : float
-        Its smallest eigenvalue, N: second variation along a field of rotations over the integral of its square.
+        Its smallest eigenvalue, N: second variation along a field of rotations over the integral of its square. For a
+        straight clamped-free column it is the critical load less the load. It goes to zero where stability is lost;
+        it is no safety factor, so compare it with its value without load.
     error_estimate : float or None
         Estimated discretisation error of the positions, over the size of the scene.
     halved : float or None

@@ -294,6 +294,7 @@ APART = 1e-6
 def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
     """The number, or list of numbers, at a path of a scene."""
     here: Any = scene
+    record: Any = scene
     for i, key in enumerate(path):
         if isinstance(here, Mapping):
             known = list(here)
@@ -304,7 +305,14 @@ def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
         if key not in known:
             where = ".".join(path[:i]) or "the scene"
             raise SceneError(f"{name} of {where}: {unknown(key, known, 'such numbers')}", ("arguments",))
+        record = here
         here = here[key] if isinstance(here, Mapping) else here[int(key)] if key.isdigit() else getattr(here, key)
+    if here is None:
+        # As EI3 of a section that is given by a shape.
+        given = [key for key, value in record if key in record.model_fields_set and isinstance(value, (int, float))]
+        where = ".".join(path[:-1]) or "the scene"
+        message = f"{where} is given without {path[-1]}, accepted: {', '.join(given) or 'a number that it has'}"
+        raise SceneError(message, ("arguments",))
     here = plain(here)
     numbers = here if isinstance(here, list) else [here]
     if not numbers or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in numbers):
