@@ -256,3 +256,22 @@ def test_files(motions, tmp_path, save, ending):
         save(motions["plane"], tmp_path / "out.bmp")
     with pytest.raises(SceneError, match="found no ending"):
         save(motions["plane"], tmp_path / "out")
+
+
+def test_states_between_are_continuous_within_steps():
+    """Also where two interpolations are as good as each other and either is taken."""
+    scene = Scene.from_dict(
+        {
+            "sections": {"s": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
+            "loads": {"f": {"type": "force", "node": "B", "value": [0, 1]}},
+            "analysis": {"type": "dynamic", "end": 0.2, "output": 0.1, "step": 0.05},
+        }
+    )
+    times = np.linspace(0.0, 0.2, 801)
+    states = solve(scene).between(times)
+    places = np.array([state.position("B") for state in states])
+    fastest = max(np.linalg.norm(state.velocity("B")) for state in states)
+    # No further than the fastest velocity leads; a leap within a step was forty times that.
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 2.0 * fastest * times[1]

@@ -885,3 +885,17 @@ def test_path_that_comes_near_to_another_one_turns_away_from_it():
     lowered = np.array([bifurcation - path.limit_points[0].factor for path in paths]) / sides ** (2.0 / 3.0)
     # The next term is of the order of the third root of the imperfection, a tenth for the largest.
     np.testing.assert_allclose(lowered, lowered.mean(), rtol=0.1)
+
+
+def test_path_that_turns_beside_another_curve_says_so():
+    """The two halves of this ring have different meshes: to the equations it is not even."""
+    uneven = table("ring_normal_pressure", range=[0, 4], accuracy=1e-3)
+    uneven["members"]["upper"].update(element="SFET4", elements=8)
+    uneven["members"]["lower"].update(element="SFET4", elements=13)
+    path = solve(Scene.from_dict(uneven))
+    assert not path.bifurcations
+    (note,) = (note for note in path.notes if "comes close to another curve" in note)
+    assert "an uneven mesh is one" in note
+    even = solve(Scene.from_dict(table("ring_normal_pressure", range=[0, 4], accuracy=1e-3)))
+    assert even.bifurcations
+    assert not any("comes close to another curve" in note for note in even.notes)

@@ -105,7 +105,7 @@ def _pages_of_groups(entries: list[Entry]) -> dict[str, str]:
         names = "\n".join(entry.name for entry in chosen)
         pages[page] = "\n".join(table) + f"\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
         drawn = [entry for entry in chosen if entry.picture]
-        shown = " | ".join(_picture(entry, 200) for entry in drawn[:: len(drawn) // WIDE][:WIDE])
+        shown = " | ".join(_picture(entry, 200) for entry in drawn[:: max(1, len(drawn) // WIDE)][:WIDE])
         rows.append(f"| [{group}]({page}.md), {len(chosen)} | {shown} |")
     text = (
         "# Gallery\n\nEach file of `problems/` has a page: its picture, the file, what is expected and from where, and "

@@ -172,9 +172,9 @@ class Scene(Record):
         -------
         Scene
             A free node at the end of a member whose changed shape says where it ends (a curvature with a ``start``, a
-            helix, a spline) moves along.  Values in ``expect`` are known of this scene: they are kept where only texts,
-            the dimension or numerical settings change (``accuracy``, ``accuracy_of``, ``step``, ``integrator``,
-            ``element``, ``elements``), and dropped where the answer may change, unless ``expect`` is given.
+            helix, a spline) moves along.  Values in ``expect`` are known of this scene: they are kept where only texts
+            or numerical settings change (``accuracy``, ``accuracy_of``, ``step``, ``integrator``, ``element``,
+            ``elements``), and dropped where the answer may change, unless ``expect`` is given.
 
         Raises
         ------
@@ -305,7 +305,7 @@ def _answers_alike(scene: Scene, other: Scene) -> bool:
             one, two = ({name: bare(member, key) for name, member in table.items()} for table in (one, two))
         if one != two:
             return False
-    return True
+    return scene.resolved_dimension == other.resolved_dimension
 
 
 def _check_members(scene: Scene) -> None:

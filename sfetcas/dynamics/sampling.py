@@ -143,7 +143,7 @@ class StepRecord:
         """The state at a dimensionless time between the first and the last of :attr:`times`."""
         ends = [steps[-1].after.t for steps in self._pieces]
         piece = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-        return _within(self._pieces[piece], self._stages, t)
+        return _within(self._pieces[piece], self._stages, t, whole=True)
 
 
 ROOM = 2**25
@@ -163,15 +163,19 @@ def _bytes(taken: Taken) -> int:
     return sum(part.nbytes for part in (taken.turns, taken.shifts, taken.x, after.q, after.y, after.x, after.rates))
 
 
-def _within(steps: Sequence[Taken], stages: int, t: float) -> Sample:
-    """The sample at a time within smoothly connected steps."""
+def _within(steps: Sequence[Taken], stages: int, t: float, *, whole: bool = False) -> Sample:
+    """The sample at a time within smoothly connected steps.
+
+    Which polynomial is taken is decided at that time, or at the end of the step for the ``whole`` step: then samples are
+    continuous within it.
+    """
     ends = [taken.after.t for taken in steps]
     k = min(int(np.searchsorted(ends, t * (1.0 - 1e-14))), len(ends) - 1)
-    found = []
-    for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // stages), slice(0, None))):
-        if chosen.start == 0 or len(ends) >= NODES:
-            first = max(0, min(k - (around - 1) // 2, len(ends) - around))
-            found.append(_interpolated(steps[first : first + around], steps[k], t, chosen))
+    if whole and t != ends[k]:
+        here, judged = (_polynomials(steps, stages, ends, k, at) for at in (t, ends[k]))
+        found = [(sample, doubt) for (sample, _), (_, doubt) in zip(here, judged, strict=True)]
+    else:
+        found = _polynomials(steps, stages, ends, k, t)
     ends_only, doubt = found[0]
     sample = ends_only if len(found) == 1 or doubt <= DOUBTFUL * found[1][1] else found[1][0]
     if t != 0.0:
@@ -179,6 +183,18 @@ def _within(steps: Sequence[Taken], stages: int, t: float) -> Sample:
     # How it begins is known; from rest nothing turns.
     v = steps[0].begin.rates[0]
     return replace(sample, v=v, spin=sample.spin if v.any() else np.zeros_like(sample.spin))
+
+
+def _polynomials(
+    steps: Sequence[Taken], stages: int, ends: Sequence[float], k: int, t: float
+) -> list[tuple[Sample, float]]:
+    """The samples within a step by the ends of many steps, and by all stages of few, with their doubts."""
+    found = []
+    for around, chosen in ((NODES, slice(-1, None)), (-(-NODES // stages), slice(0, None))):
+        if chosen.start == 0 or len(ends) >= NODES:
+            first = max(0, min(k - (around - 1) // 2, len(ends) - around))
+            found.append(_interpolated(steps[first : first + around], steps[k], t, chosen))
+    return found
 
 
 def _interpolated(steps: Sequence[Taken], own: Taken, t: float, chosen: slice) -> tuple[Sample, float]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import tolerances
+from ..description.records import enumerated
 from ..description.scene import Scene
 from ..equilibria.settings import Settings, settings_with
 from ..equilibria.solution import Equilibrium, equilibrium
@@ -302,6 +303,7 @@ class PathTracing:
         for number, event in enumerate(bends[: self.analysis.branches], start=1):
             for side in (1, -1):
                 self._add_branch(level, event, number, side)
+        level.notes += _beside(main.traced.near)
         level.stretches = [self.stretch(part, curve) for part in level.stretches]
         return level
 
@@ -449,6 +451,17 @@ def _disagreement(coarse: _Level, fine: _Level) -> tuple[str, ...]:
         a, b = (len(part.crossings) for part in parts)
         found += [f"{a} and {b} crossings of the factors asked for{where}"] if a != b else []
     return (f"meshes of {sizes} elements do not agree: they have {', '.join(found)}",) if found else ()
+
+
+def _beside(near: tuple[float, ...]) -> tuple[str, ...]:
+    """A note on factors beyond which a path comes near to another curve."""
+    factors = list(dict.fromkeys(f"{factor:.2g}" for factor in near))
+    if not factors:
+        return ()
+    return (
+        f"beyond factor {enumerated(factors)} the path comes close to another curve and turns beside it, as that of a "
+        "structure with a small imperfection does beside a bifurcation; an uneven mesh is one, too",
+    )
 
 
 def _point(standing: Standing, event: Event | None, has_energy: bool) -> PathPoint:

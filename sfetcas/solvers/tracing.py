@@ -90,12 +90,15 @@ class Traced:
         elasticity).
     message : str
         Where it ends ``bent``: a sentence that names the member and its deformation.
+    near : tuple of float
+        Factors at which it comes so near to another curve that a step led there at first.
     """
 
     points: list[Standing]
     events: list[Event]
     end: str
     message: str = ""
+    near: tuple[float, ...] = ()
 
 
 def trace(
@@ -126,7 +129,8 @@ def trace(
         events = [event for event in part.events if span[0] <= event.standing.factor <= span[1]]
         outside = {id(event.standing) for event in part.events} - {id(event.standing) for event in events}
         points = [point for point in part.points[1:] if id(point) not in outside]
-        traced = Traced(traced.points + points, traced.events + events, part.end, part.message)
+        near = traced.near + part.near
+        traced = Traced(traced.points + points, traced.events + events, part.end, part.message, near)
     return _with_crossed_folds(traced, usual)
 
 
@@ -154,7 +158,7 @@ def _with_crossed_folds(traced: Traced, usual: int) -> Traced:
         firm = i
     points += traced.points[firm + 1 :]
     order = [events[id(point)] for point in points if id(point) in events]
-    return Traced(points, order, traced.end, traced.message)
+    return replace(traced, points=points, events=order)
 
 
 def without(traced: Traced, known: Sequence[Standing]) -> Traced:
@@ -211,11 +215,12 @@ class _Piece:
     before: Standing | None = None
     end: str = ""
     message: str = ""
+    near: list[float] = field(default_factory=list)
 
     def traced(self) -> Traced:
         """The stretch from its first point on."""
         _, arrived = advanced(self.points[0], FIRST, self.trial, lambda _: self.ended(), shortest=SHORTEST)
-        return Traced(self.points, self.events, self.end if arrived else "lost", self.message)
+        return Traced(self.points, self.events, self.end if arrived else "lost", self.message, tuple(self.near))
 
     def ended(self) -> bool:
         """Whether no further step is to be taken; ``end`` says why not."""
@@ -239,8 +244,12 @@ class _Piece:
         closed = not left and len(self.points) >= LOOP and _closes(curve, start, now, there)
         ends = _to_start(curve, start, now, there) if closed else [there]
         between = [events_between(curve, *pair) for pair in pairwise([last, *ends])]
-        if None in between and length >= FINE:
-            return None, 0.5 * length
+        if None in between:
+            if not self.near or abs(self.near[-1] - now.factor) > abs(there.factor - now.factor):
+                # Of shorter steps to the same place only the first is new.
+                self.near.append(now.factor)
+            if length >= FINE:
+                return None, 0.5 * length
         for end, events in zip(ends, between, strict=True):
             # A point that is met by chance may be the limit point itself.
             met = [event for event in events or [] if event.standing is not self.points[-1]]
