@@ -21,12 +21,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..description.answers import AnswerName
-from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.displacements import Displacements
 from ..paths.path import Branch, Path
 from ..paths.paths import buckling_mode
-from .curves import FREQUENCIES, Curve, clipped, leave, quantities_named, said, shown_components, table_of
+from .curves import (
+    FREQUENCIES,
+    Curve,
+    clipped,
+    leave,
+    one_or_several,
+    quantities_named,
+    said,
+    shown_components,
+    table_of,
+)
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
@@ -89,11 +98,7 @@ def chart(path: Path, quantity: str | None = None, *, quantities: Sequence[str] 
     SceneError
         There is no such quantity, or both are given.
     """
-    if quantity is not None:
-        if quantities is not None:
-            raise SceneError("found quantity and quantities, accepted: one of them")
-        quantities = [quantity]
-    return _chart(path, quantities, shown=True)
+    return _chart(path, one_or_several(quantity, quantities), shown=True)
 
 
 def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Picture:
