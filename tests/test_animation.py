@@ -18,7 +18,7 @@ from PIL import Image
 
 from sfetcas import Scene, SceneError, Settings, solve
 from sfetcas.cli import main
-from sfetcas.pictures.animation import _Film, _paced, save_animation
+from sfetcas.pictures.animation import _Film, _paced, animation, save_animation
 from sfetcas.pictures.files import ENDINGS as PICTURES
 from sfetcas.pictures.files import save_figure
 from sfetcas.pictures.paraview import save_vtk
@@ -27,6 +27,7 @@ ENDED = {**FALLING, "analysis": {**FALLING["analysis"], "output": 0.1}}
 """Four answers."""
 STEPS = scenes.cantilever(analysis={"steps": [0.5, 1.0, 2.0]})
 PATH = scenes.cantilever(analysis={"type": "path", "range": [0, 1.0], "points": 5})
+BRANCHED = {"type": "path", "range": [0, 4.0], "branches": 1, "accuracy": 1e-3}
 
 
 @pytest.fixture
@@ -158,6 +159,25 @@ def test_colours_move_with_one_scale(tmp_path):
         moments = step.along("m", np.linspace(0, 1, 1 + len(pieces.get_array())))["moment"][:, 2]
         np.testing.assert_allclose(pieces.get_array(), 0.5 * (moments[1:] + moments[:-1]), rtol=1e-6, atol=1e-9)
         assert pieces.norm.vmax == pytest.approx(steps[-1].along("m", [0.0])["moment"][0, 2], rel=0.02)
+
+
+def test_branches_move_after_their_path():
+    scene = Scene.from_dict(scenes.cantilever((-1.0, 0.0), analysis=BRANCHED))
+    path = solve(scene)
+    assert len(path.branches) == 3
+    film = animation(path)._film
+    assert film.count == sum(len(branch.points) for branch in path.branches)
+    count = len(path.points)
+    for number, text in (
+        (0, "factor"),
+        (count - 1, "factor"),
+        (count, "branch 1, factor"),
+        (film.count - 1, "branch 2"),
+    ):
+        film.show(number)
+        assert film.figure.axes[0].get_title(loc="left").startswith(text)
+    (line,) = [one for one in film.figure.findobj() if getattr(one, "get_gid", lambda: None)() == "deformed"]
+    assert line.get_xydata()[-1] == pytest.approx(path.positions("B", 2)[-1][:2], abs=1e-9)
 
 
 def test_an_animation_shows_itself_in_a_notebook_and_writes_a_file(tmp_path):

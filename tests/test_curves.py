@@ -151,6 +151,16 @@ def test_curves_go_through_the_steps(steps):
     np.testing.assert_allclose(line.get_ydata(), [step.reaction("A")[1][2] for step in steps.steps])
 
 
+def test_solutions_plot_their_quantities(steps):
+    assert upright(steps.plot("nodes.B.position.y")) == ["nodes.B.position.y, m"]
+    assert upright(steps.plot(quantities=["nodes.B.position.x", "factor"])) == ["nodes.B.position.x, m", "factor"]
+    with pytest.raises(SceneError, match="found quantity and quantities"):
+        steps.plot("factor", quantities=["factor"])
+    for how in ({"steps": [0]}, {"colour": "moment"}):
+        with pytest.raises(SceneError, match="found quantities with steps or colour"):
+            steps.plot("factor", **how)
+
+
 @pytest.fixture(scope="module")
 def path():
     table = scenes.cantilever((-1.0, 0.01), analysis={"type": "path", "range": [0, 5.0], "points": 60})

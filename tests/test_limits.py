@@ -439,6 +439,9 @@ def test_rounding_does_not_fill_a_chart():
     course, shapes = chart(solve(load("problems/toggle_inextensible.toml"))).axes
     low, high = course.get_xlim()
     assert high - low > 0.01
+    # One unit of length in both panels.
+    assert course.get_xlabel() == "displacement of apex in y, m"
+    assert shapes.get_ylabel() == "y, m"
     assert [text.get_text() for text in shapes.get_legend().get_texts()] == [
         "undeformed; all equilibria look like it",
         "buckling mode, factor 6.035",

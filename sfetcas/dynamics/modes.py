@@ -232,11 +232,11 @@ class Modes:
         tables = [_displacements(self.motion, part).along(member, places) for part in parts]
         return {key: _joined([table[key] for table in tables]) for key in tables[0]}
 
-    def plot(self, **how: Any) -> Figure:
+    def plot(self, *, count: int | None = None) -> Figure:
         """The lowest mode shapes over the equilibrium, see ``modeshapes.mode_picture``."""
         from ..pictures.modeshapes import mode_picture
 
-        return mode_picture(self, **how)
+        return mode_picture(self, count=count)
 
     def animate(self, file: str | os.PathLike[str] | None = None) -> Animation | File:
         """The mode shapes moving through one period, see :func:`~sfetcas.pictures.animation.animation`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -313,20 +313,20 @@ class Trajectory:
         """Energies over the times, (times,) N m; ``kind`` is kinetic, elastic, loads or total."""
         return np.array([step.energy[kind] for step in self.steps])
 
-    def plot(self, **how: Any) -> Figure:
+    def plot(self, *, quantities: Sequence[str] | None = None) -> Figure:
         """Positions over each other and curves over time, see :func:`~sfetcas.pictures.motions.motion_picture`."""
         from ..pictures.motions import motion_picture
 
-        return motion_picture(self, **how)
+        return motion_picture(self, quantities=quantities)
 
-    def animate(self, file: str | os.PathLike[str] | None = None, **how: Any) -> Animation | File:
+    def animate(self, file: str | os.PathLike[str] | None = None, *, colour: str = "none") -> Animation | File:
         """A moving picture, see :func:`~sfetcas.pictures.animation.animation`.
 
         The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
         """
         from ..pictures.animation import animated
 
-        return animated(self, file, **how)
+        return animated(self, file, colour=colour)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries; each quantity is a list over ``times``."""

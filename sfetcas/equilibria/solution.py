@@ -370,9 +370,9 @@ class Equilibrium(Configuration):
             return {**self.energy, "potential": self.energy["total"]}
         return super().table(kind, name)
 
-    def plot(self, **how: Any) -> Figure:
+    def plot(self, *, colour: str | None = None) -> Figure:
         """The deformed structure over the undeformed one, see :func:`~sfetcas.pictures.plotting.picture`."""
-        return Solution(self.model.scene, Status.SOLVED, (self,), {}).plot(**how)
+        return Solution(self.model.scene, Status.SOLVED, (self,), {}).plot(colour=colour)
 
     def to_dict(self) -> dict[str, Any]:
         """The equilibrium as an entry of ``steps`` in the JSON answer."""
@@ -417,20 +417,47 @@ class Solution:
         """The last of the steps: the equilibrium at the last load factor."""
         return self.steps[-1]
 
-    def plot(self, **how: Any) -> Figure:
-        """The deformed structure over the undeformed one, see :func:`~sfetcas.pictures.plotting.picture`."""
+    def plot(
+        self,
+        quantity: str | None = None,
+        *,
+        quantities: Sequence[str] | None = None,
+        steps: Sequence[int] | None = None,
+        colour: str | None = None,
+    ) -> Figure:
+        """The deformed structure over the undeformed one, or curves of quantities over the load factor.
+
+        Parameters
+        ----------
+        quantity, quantities : str or sequence of str, optional
+            Names as ``nodes.tip.position.y``: curves as of :func:`~sfetcas.pictures.curves.curves`.
+        steps : sequence of int, optional
+        colour : str, optional
+            Of the structure, as of :func:`~sfetcas.pictures.plotting.picture`; by default ``moment``.
+
+        Raises
+        ------
+        SceneError
+            There is no such quantity, step or colour, or quantities are given with steps or a colour.
+        """
+        from ..pictures.curves import curves, one_or_several
         from ..pictures.plotting import picture
 
-        return picture(self, **how)
+        names = one_or_several(quantity, quantities)
+        if names is None:
+            return picture(self, steps=steps, colour="moment" if colour is None else colour)
+        if steps is not None or colour is not None:
+            raise SceneError("found quantities with steps or colour, accepted: one of them, as curves show all steps")
+        return curves(self, names)
 
-    def animate(self, file: str | os.PathLike[str] | None = None, **how: Any) -> Animation | File:
+    def animate(self, file: str | os.PathLike[str] | None = None, *, colour: str = "none") -> Animation | File:
         """A moving picture of several steps, see :func:`~sfetcas.pictures.animation.animation`.
 
         The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
         """
         from ..pictures.animation import animated
 
-        return animated(self, file, **how)
+        return animated(self, file, colour=colour)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
@@ -268,20 +268,20 @@ class Path:
         """Positions of a node along the path or a branch, (points, 3) m."""
         return np.array([self.fields(point).position(node) for point in self.branches[branch].points])
 
-    def plot(self, *args: Any, **how: Any) -> Figure:
+    def plot(self, quantity: str | None = None, *, quantities: Sequence[str] | None = None) -> Figure:
         """The course of the path beside shapes along it, see :func:`~sfetcas.pictures.charts.chart`."""
         from ..pictures.charts import chart
 
-        return chart(self, *args, **how)
+        return chart(self, quantity, quantities=quantities)
 
-    def animate(self, file: str | os.PathLike[str] | None = None, **how: Any) -> Animation | File:
-        """A moving picture of the shapes along the path, see :func:`~sfetcas.pictures.animation.animation`.
+    def animate(self, file: str | os.PathLike[str] | None = None, *, colour: str = "none") -> Animation | File:
+        """A moving picture of the shapes along the path, then along its branches, see ``animation.animation``.
 
         The path of the ``file`` where one is given, ``.gif`` or ``.mp4``; else what notebooks show.
         """
         from ..pictures.animation import animated
 
-        return animated(self, file, **how)
+        return animated(self, file, colour=colour)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON answer as nested dictionaries."""

@@ -86,7 +86,7 @@ def save_animation(
 
 
 def animated(
-    answer: Solution | Path | Trajectory | Modes, file: str | os.PathLike[str] | None = None, **how: Any
+    answer: Solution | Path | Trajectory | Modes, file: str | os.PathLike[str] | None = None, *, colour: str = NONE
 ) -> Animation | File:
     """Write :func:`animation` to a file, whose path is returned; without a file what notebooks show.
 
@@ -96,13 +96,13 @@ def animated(
         As :func:`save_animation`.
     """
     if file is None:
-        return animation(answer, **how)
-    save_animation(answer, file, **how)
+        return animation(answer, colour=colour)
+    save_animation(answer, file, colour=colour)
     return File(file)
 
 
 def animation(answer: Solution | Path | Trajectory | Modes, *, colour: str = NONE) -> Animation:
-    """A moving picture of a motion, of modes, of steps or of the points of a path (without its branches).
+    """A moving picture of a motion, of modes, of steps or of the points of a path and then of its branches.
 
     At most 200 frames, evenly taken.  A motion has 10 to 25 frames a second and goes in real time where these are
     enough to see it; else the picture says how much slower or faster it goes.  Modes go through one period each.
@@ -130,12 +130,22 @@ def animation(answer: Solution | Path | Trajectory | Modes, *, colour: str = NON
         steps: list[Configuration] = list(instants)
         texts = [f"{text}{pace}" for text in _times(instants)]
     else:
-        every = [answer.configuration(p) for p in answer.points] if isinstance(answer, Path) else list(answer.steps)
+        every = _along_path(answer) if isinstance(answer, Path) else [("", step) for step in answer.steps]
         numbers = np.unique(np.linspace(0, len(every) - 1, min(MOST_FRAMES, len(every))).round().astype(int))
-        steps, rate = [every[i] for i in numbers], round(float(np.clip(len(numbers) / LASTS, 2.0, FASTEST)))
-        texts = [f"factor {in_short(step.factor)}" for step in steps]
+        rate = round(float(np.clip(len(numbers) / LASTS, 2.0, FASTEST)))
+        steps = [every[i][1] for i in numbers]
+        texts = [f"{every[i][0]}factor {in_short(every[i][1].factor)}" for i in numbers]
     gravity = 1.0 if isinstance(answer, Trajectory) else 0.0
     return Animation(_Film(steps, texts, rate, answer.scene.title, gravity=gravity, colour=colour))
+
+
+def _along_path(path: Path) -> list[tuple[str, Configuration]]:
+    """States at all points of a path and its branches, and what to say of where they are."""
+    return [
+        (f"branch {number}, " if number else "", path.configuration(point))
+        for number, branch in enumerate(path.branches)
+        for point in branch.points
+    ]
 
 
 class Film(abc.ABC):

@@ -21,19 +21,28 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..description.answers import AnswerName
-from ..errors import SceneError
 from ..mathematics.arrays import TINY, Array
 from ..mechanics.displacements import Displacements
 from ..paths.path import Branch, Path
 from ..paths.paths import buckling_mode
-from .curves import FREQUENCIES, Curve, clipped, leave, quantities_named, said, shown_components, table_of
+from .curves import (
+    FREQUENCIES,
+    Curve,
+    clipped,
+    leave,
+    one_or_several,
+    quantities_named,
+    said,
+    shown_components,
+    table_of,
+)
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
 from .modeshapes import REACH, TWISTING
 from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
 from .showing import Picture, new_figure
-from .sketch import REST, Course, Sketch, course_of, unit_for, view_of
+from .sketch import REST, Course, Sketch, course_of, unit_for, view_of, with_prefix
 
 __all__ = ["chart", "save_chart"]
 
@@ -89,11 +98,7 @@ def chart(path: Path, quantity: str | None = None, *, quantities: Sequence[str] 
     SceneError
         There is no such quantity, or both are given.
     """
-    if quantity is not None:
-        if quantities is not None:
-            raise SceneError("found quantity and quantities, accepted: one of them")
-        quantities = [quantity]
-    return _chart(path, quantities, shown=True)
+    return _chart(path, one_or_several(quantity, quantities), shown=True)
 
 
 def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Picture:
@@ -243,8 +248,11 @@ def _draw_course(axes: Axes, path: Path, quantity: _Quantity, shapes: Sequence[_
     """Draw a quantity of all branches, and dots where the shapes are."""
     limits = clipped(quantity.every) if quantity.upright else None
     seen = quantity.every if limits is None else np.clip(quantity.every, *limits)
-    still = np.array([NARROW * _size(path)])
-    unit, letters = unit_for(still if _still(path, quantity) else seen, quantity.unit)
+    unit, letters = unit_for(seen, quantity.unit)
+    size = _size(path)
+    if quantity.unit == "m" and (_still(path, quantity) or float(np.abs(seen).max()) > NARROW * size):
+        # The unit of the axes beside it, on which the shapes are drawn.
+        unit, letters = with_prefix(size, "m", 0.2)
     ends = list[Curve]()
     for number, branch in enumerate(path.branches):
         colour = _colour(number)

@@ -35,6 +35,7 @@ __all__ = [
     "curves",
     "draw_panel",
     "leave",
+    "one_or_several",
     "quantities_named",
     "said",
     "save_curves",
@@ -117,6 +118,19 @@ def _drawn(solution: Solution, quantities: Sequence[str], *, shown: bool) -> Pic
 
 
 # Quantities by name
+
+
+def one_or_several(quantity: str | None, quantities: Sequence[str] | None) -> Sequence[str] | None:
+    """Names of quantities, given as one or as several of them; None where neither is.
+
+    Raises
+    ------
+    SceneError
+        Both are given.
+    """
+    if quantity is not None and quantities is not None:
+        raise SceneError("found quantity and quantities, accepted: one of them")
+    return quantities if quantity is None else [quantity]
 
 
 def quantities_named(scene: Scene, quantities: Sequence[str]) -> list[AnswerName]:

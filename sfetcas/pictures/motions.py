@@ -274,7 +274,7 @@ def _legend(sketch: Sketch, *, undeformed: bool) -> Iterator[Line2D]:
     if undeformed:
         yield Line2D([], [], color=REST, linewidth=1.2, linestyle=DOTTED, label="undeformed")
     if any(mark.name.startswith("way-") for mark in sketch.marks):
-        yield Line2D([], [], color=WAY, linewidth=0.9, label="way of a node")
+        yield Line2D([], [], color=WAY, linewidth=0.9, label="trajectory of a node")
 
 
 def _sketch_ways(sketch: Sketch, motion: Trajectory) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -248,11 +248,11 @@ class ControlledMotion:
             raise SceneError("found no replay, accepted: an answer of solve(replay=True)")
         return self.check.response.trajectory
 
-    def plot(self, **how: Any) -> Figure:
+    def plot(self, *, nodes: Sequence[str] | None = None) -> Figure:
         """Controls with bounds beside positions, see ``controls.control_picture``."""
         from ..pictures.controls import control_picture
 
-        return control_picture(self, **how)
+        return control_picture(self, nodes=nodes)
 
     def _node_positions(self) -> dict[str, Array]:
         """Positions of all nodes at the begin and the ends of the intervals, (intervals + 1, 3) m."""
