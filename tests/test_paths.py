@@ -889,7 +889,7 @@ def test_path_that_comes_near_to_another_one_turns_away_from_it():
 
 def test_path_that_turns_beside_another_curve_says_so():
     """The two halves of this ring have different meshes: to the equations it is not even."""
-    uneven = table("ring_normal_pressure", range=[0, 4], accuracy=1e-3)
+    uneven = table("ring_normal_pressure", range=[0, 9], accuracy=1e-3)
     uneven["members"]["upper"].update(element="SFET4", elements=8)
     uneven["members"]["lower"].update(element="SFET4", elements=13)
     path = solve(Scene.from_dict(uneven))

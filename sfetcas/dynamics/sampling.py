@@ -166,7 +166,7 @@ def _bytes(taken: Taken) -> int:
 def _within(steps: Sequence[Taken], stages: int, t: float, *, whole: bool = False) -> Sample:
     """The sample at a time within smoothly connected steps.
 
-    Which polynomial is taken is decided at that time, or at the end of the step for the ``whole`` step: then samples are
+    Which polynomial is taken is decided at that time, or at the end for the ``whole`` step: then samples are
     continuous within it.
     """
     ends = [taken.after.t for taken in steps]
