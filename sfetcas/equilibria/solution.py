@@ -430,7 +430,7 @@ class Solution:
         Parameters
         ----------
         quantity, quantities : str or sequence of str, optional
-            Names as ``nodes.tip.position.y``: curves as of :func:`~sfetcas.pictures.curves.curves`.
+            Names as ``nodes.tip.position.y``: curves as of ``curves.curves``.
         steps : sequence of int, optional
         colour : str, optional
             Of the structure, as of :func:`~sfetcas.pictures.plotting.picture`; by default ``moment``.
