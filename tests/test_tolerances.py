@@ -165,7 +165,7 @@ CASES = {
     "BALANCED": (rolled_up, 1e-3),
     "CLOSED": (lambda: told(three_parallel_cranks(1e-11, (1.0, 0.0, 0.0))), 1e-6),
     "REACHED": (started_below, None),
-    "LEVEL": (column, 1e-6),
+    "LEVEL": (column, 1e6),
     "REAL": (damped, 1e6),
     "SAME_STATE": (several, 1e6),
 }
