@@ -899,3 +899,34 @@ def test_path_that_turns_beside_another_curve_says_so():
     even = solve(Scene.from_dict(table("ring_normal_pressure", range=[0, 4], accuracy=1e-3)))
     assert even.bifurcations
     assert not any("comes close to another curve" in note for note in even.notes)
+
+
+@pytest.mark.parametrize("ratio", [1e6, 1e9])
+def test_bifurcations_are_kept_where_stiff_members_leave_few_digits_of_eigenvalues(ratio):
+    """Two columns under a girder that bends no more: they sway at pi^2 EI/L^2, and buckle alone at four times that."""
+    frame = {
+        "sections": {"soft": {"EI3": 1.0}, "stiff": {"EI3": ratio}},
+        "nodes": {
+            "A": {"position": [0, 0], "support": "clamped"},
+            "B": {"position": [0, 1]},
+            "C": {"position": [1, 1]},
+            "D": {"position": [1, 0], "support": "clamped"},
+        },
+        "members": {
+            "left": {"nodes": ["A", "B"], "section": "soft"},
+            "girder": {"nodes": ["B", "C"], "section": "stiff"},
+            "right": {"nodes": ["D", "C"], "section": "soft"},
+        },
+        "loads": {
+            "one": {"type": "force", "node": "B", "value": [0, -1]},
+            "other": {"type": "force", "node": "C", "value": [0, -1]},
+        },
+        "analysis": {"type": "path", "range": [0, 60]},
+    }
+    path = solve(Scene.from_dict(frame))
+    assert path.notes == ()
+    # Of 1e9 an eigenvalue is known to 1e-5 of its change along the path; the mesh leaves less.
+    sways, *alone = (entry.factor for entry in path.bifurcations)
+    assert sways == pytest.approx(np.pi**2, rel=1e-4)
+    np.testing.assert_allclose(alone, 4.0 * np.pi**2, rtol=1e-4)
+    assert alone

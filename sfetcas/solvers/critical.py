@@ -50,8 +50,20 @@ LARGEST_PRIMAL_FACTOR = 1e6
 TRUSTED = 0.02
 """Largest correction of an interpolated point, rad; with a larger one the point is searched along the arc instead."""
 
-TORN = 1e-3
-"""Farther from the points beside it a bifurcation point is not on their curve, rad; rounding moves it by 1e-5."""
+TORN = 1e-4
+"""Farther than this from the points beside it, rad, and than twice the way between these, nothing is on their curve.
+
+Rounding moves bifurcation points by 1e-5; where a curve only comes near to another one it is 5e-4 and more.
+"""
+
+SETTLED = 1e-3
+"""A bifurcation point is moved by less, rad, where rounding along its mode is taken out."""
+
+LEAP = 1e-3
+"""Share of an eigenvalue at the two points that is left of it at one of them where it vanishes there.
+
+Rounding leaves 1e-4 where stiffnesses differ by 1e9; where the points belong to different curves it is 0.1 and more.
+"""
 
 ALONG = 0.8
 """Cosine of the angle by which a curve turns at most beside a bifurcation point, as from one point to the next.
@@ -119,10 +131,7 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event] | None:
         standing = sought(curve, a, b, value, BLUR)
         if standing is None:
             continue
-        if abs(value(standing)) > BLURRED * BLUR:
-            # Somewhere between there are no points, or the eigenvalue leaps over zero.
-            return None
-        standing = _settled(curve, a, b, standing)
+        standing = _settled(curve, a, b, standing, value)
         if standing is None:
             return None
         twin = next((e for e in found if abs(e.standing.arc - standing.arc) <= ONE_EVENT * (b.arc - a.arc)), None)
@@ -135,31 +144,47 @@ def _bifurcations(curve: Curve, a: Standing, b: Standing) -> list[Event] | None:
     return sorted(met, key=lambda event: event.standing.arc)
 
 
-def _settled(curve: Curve, a: Standing, b: Standing, found: Standing) -> Standing | None:
+def _settled(
+    curve: Curve, a: Standing, b: Standing, found: Standing, value: Callable[[Standing], float]
+) -> Standing | None:
     """A bifurcation point without the rounding errors along its critical mode, where the matrix is singular.
 
     State and tangent are interpolated from a point on either side, where the matrix is regular; Newton's method then
     removes the error of the interpolation without changing the value along the mode.  None where the curve does not
-    lead from one side to the other, as where it only comes near to another one.
+    lead from one side to the other, as where it only comes near to another one: comparisons are of what is far from
+    rounding, also of eigenvalues of which stiff members leave few digits.
     """
     at, place = curve.between(a, b), found.arc - a.arc
     reach = min(ASIDE * (b.arc - a.arc), 0.5 * place, 0.5 * (b.arc - found.arc))
     if reach == 0.0:
-        return replace(found, tangent=_mean(curve, a, b))
+        # One of the two itself, met by chance, or as there is nothing between them.
+        one, two = value(a), value(b)
+        leaps = one * two < 0.0 and abs(value(found)) > LEAP * max(abs(one), abs(two))
+        return None if leaps else replace(found, tangent=_mean(curve, a, b))
     left, right = at(place - reach), at(place + reach)
-    if left is None or right is None:
-        return None
-    aside = max(curve.prepared.distance(side.state, found.state) for side in (left, right))
-    turned = min(curve.inner(side.tangent, a.tangent) for side in (left, right))
-    if turned < ALONG or aside > TORN + 3.0 * curve.prepared.distance(left.state, right.state):
+    if left is None or right is None or not _connected(curve, a, (left, found, right), value):
         return None
     tangent = _mean(curve, left, right)
     # Positions between the two points are measured along the tangent of a, as in the search for the point.
     left, right = (replace(s, tangent=_per_way(s.tangent, curve.inner(s.tangent, a.tangent))) for s in (left, right))
     state, factor = curve.predicted(left, reach, curve.bend(left, right))
     settled = curve.corrected(state, factor, a.tangent, found.arc, primal_factor=LARGEST_PRIMAL_FACTOR)
-    close = settled is not None and curve.prepared.distance(settled.state, found.state) < TORN
+    close = settled is not None and curve.prepared.distance(settled.state, found.state) < SETTLED
     return replace(settled if settled is not None and close else found, tangent=tangent)
+
+
+def _connected(
+    curve: Curve, a: Standing, three: tuple[Standing, Standing, Standing], value: Callable[[Standing], float]
+) -> bool:
+    """Whether three neighbouring points beyond one of a curve are on it, too, and an eigenvalue vanishes there."""
+    left, found, right = three
+    values = [value(standing) for standing in three]
+    apart = curve.prepared.distance(left.state, right.state)
+    return (
+        min(values) <= 0.0 <= max(values)
+        and min(curve.inner(side.tangent, a.tangent) for side in (left, right)) >= ALONG
+        and max(curve.prepared.distance(side.state, found.state) for side in (left, right)) <= TORN + 2.0 * apart
+    )
 
 
 def _per_way(tangent: Tangent, way: float) -> Tangent:
