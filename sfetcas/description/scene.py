@@ -237,6 +237,11 @@ class Scene(Record):
         spring = self.springs[name]
         return self.nodes[spring.node].joint_axis if spring.axis is None else spring.axis
 
+    @cached_property
+    def stretches(self) -> bool:
+        """Whether any member stretches or shears."""
+        return any(member.stretches(self.sections) for member in self.members.values())
+
     @property
     def resolved_dimension(self) -> Literal["plane", "space"]:
         """How the scene is modelled: plane or space."""

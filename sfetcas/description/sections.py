@@ -173,6 +173,12 @@ def _poisson(value: float) -> float:
     return value
 
 
+def _share(value: float) -> float:
+    if not 0.0 < value <= 1.0:
+        raise ValueError(f"found {value:g}, accepted: a number above 0 and up to 1")
+    return value
+
+
 Above = Annotated[Varying, AfterValidator(_above_zero)]
 Inertia = Annotated[Varying, AfterValidator(_not_negative)]
 
@@ -222,7 +228,7 @@ _OUTLINES: dict[str, tuple[tuple[str, ...], Outline]] = {
     "circle": (("radius",), _circle),
     "tube": (("outer", "inner"), _tube),
 }
-_NUMBERS = ("EI2", "EI3", "GJ", "rhoA", "rhoI")
+_NUMBERS = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "rhoA", "rhoI")
 _MATERIAL = ("E", "nu", "G", "rho")
 _DIMENSIONS = ("width", "height", "radius", "outer", "inner")
 
@@ -241,18 +247,30 @@ class CrossSection(Record):
         Bending stiffness about b3.  The axis b3 is z where the member lies in x-y.
     GJ : N m²
         Torsional stiffness about the tangent b1.  Needed in space.
+    EA : N
+        Stiffness against stretch.  Default: it does not stretch.
+    GA2 : N
+        Stiffness against shear along b2.  Default: no shear.
+    GA3 : N
+        Stiffness against shear along b3.  Default: no shear.
     rhoA : kg/m
         Mass per length.  Needed with gravity, rotating axes, modes and motions.
     rhoI : (3,), kg m
         Rotary inertia per length about b1, b2, b3, for modes and motions.  Default: zero.
     damping : s
-        Retardation time of Kelvin and Voigt in bending and twist: a moment is the stiffness times (the strain +
-        ``damping`` times its rate).
+        Retardation time of Kelvin and Voigt: a moment, and a force where it stretches or shears, is the stiffness
+        times (the strain + ``damping`` times its rate).
     drag : N s/m²
         Force per length against the velocity, per unit of the velocity.
     shape : text
         Instead of these numbers: ``rectangle`` (``width``, ``height``), ``circle`` (``radius``) or ``tube``
         (``outer``, ``inner``).
+    stretch : true or false
+        Whether a shape stretches: ``EA`` from E and the area.  Default: false.
+    shear : true or false
+        Whether a shape shears: ``GA2`` and ``GA3`` from G, the area and ``shear_factor``.  Default: false.
+    shear_factor : 1
+        Share of the area of a shape that resists shear.  Default: that of Cowper 1966 for the shape.
     E : N/m²
         Young's modulus of a shape, which needs it.
     nu : 1
@@ -282,11 +300,17 @@ class CrossSection(Record):
     EI2: Above | None = None
     EI3: Above | None = None
     GJ: Above | None = None
+    EA: Above | None = None
+    GA2: Above | None = None
+    GA3: Above | None = None
     rhoA: Above | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     damping: NotNegative = 0.0
     drag: NotNegative = 0.0
     shape: Literal["rectangle", "circle", "tube"] | None = None
+    stretch: bool = False
+    shear: bool = False
+    shear_factor: Annotated[Number, AfterValidator(_share)] | None = None
     E: Above | None = None
     nu: Annotated[Number, AfterValidator(_poisson)] | None = None
     G: Above | None = None
@@ -307,7 +331,7 @@ class CrossSection(Record):
                     f"{', '.join(_NUMBERS)} or a shape with {', '.join(_MATERIAL)} and its dimensions"
                 )
             self._check_shape(self.shape)
-        elif outlined := self._given(_MATERIAL + _DIMENSIONS):
+        elif outlined := self._given((*_MATERIAL, *_DIMENSIONS, "shear_factor")) or self._switched():
             raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
         elif not numbers:
             raise SceneError(f"found nothing in it, accepted: {', '.join(_NUMBERS)} or a shape")
@@ -316,8 +340,15 @@ class CrossSection(Record):
     def _given(self, names: Iterable[str]) -> list[str]:
         return [name for name in names if getattr(self, name) is not None]
 
+    def _switched(self) -> list[str]:
+        return [name for name in ("stretch", "shear") if getattr(self, name)]
+
     def _check_shape(self, shape: str) -> None:
         needed = _OUTLINES[shape][0]
+        if self.shear and self.nu is None and self.G is None:
+            raise SceneError("the key 'G' is missing, shear = true needs it or nu")
+        if self.shear_factor is not None and not self.shear:
+            raise SceneError("found 'shear_factor' without shear = true, accepted: both or neither")
         for name in self._given(_DIMENSIONS):
             if name not in needed:
                 raise SceneError(f"found {name!r} for a {shape}, accepted: {' and '.join(needed)}")
@@ -347,7 +378,7 @@ class CrossSection(Record):
 
     def _varying(self) -> list[Quantity]:
         """What may vary along the member."""
-        names = ("EI2", "EI3", "GJ", "rhoA", "E", "G", "rho", *_DIMENSIONS)
+        names = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "rhoA", "E", "G", "rho", *_DIMENSIONS)
         return [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
 
     def missing(self, names: Iterable[str]) -> list[str]:
@@ -376,8 +407,54 @@ class CrossSection(Record):
             return np.stack([self._value(name, x) for name in ("GJ", "EI2", "EI3")], axis=1)
         _, about_2, about_3, torsion = self._outline(x)
         young = self._value("E", x)
-        shear = self._value("G", x) if self.nu is None else young / (2.0 * (1.0 + self.nu))
-        return np.stack([shear * torsion, young * about_2, young * about_3], axis=1)
+        return np.stack([self._shear_modulus(x) * torsion, young * about_2, young * about_3], axis=1)
+
+    def _shear_modulus(self, x: ArrayLike) -> Floats:
+        return self._value("G", x) if self.nu is None else self._value("E", x) / (2.0 * (1.0 + self.nu))
+
+    @property
+    def stretches(self) -> bool:
+        """Whether it stretches or shears."""
+        return bool(self._given(("EA", "GA2", "GA3")) or self._switched())
+
+    def compliance(self, x: ArrayLike) -> Floats:
+        """Strains by section forces along the member.
+
+        Parameters
+        ----------
+        x : (n,)
+            Fractions of the length.
+
+        Returns
+        -------
+        (n, 3) - 1/EA, 1/GA2, 1/GA3 in 1/N (along b1, b2, b3), zero where it neither stretches nor shears
+        """
+        if self.shape is None:
+            values = [getattr(self, name) for name in ("EA", "GA2", "GA3")]
+            return np.stack([evaluate(0.0, x) if v is None else 1.0 / evaluate(v, x) for v in values], axis=1)
+        area, nothing = self._outline(x)[0], evaluate(0.0, x)
+        along = 1.0 / (self._value("E", x) * area) if self.stretch else nothing
+        across = nothing
+        if self.shear:
+            modulus = self._shear_modulus(x)
+            factor = self._cowper(self._value("E", x) / (2.0 * modulus) - 1.0, x)
+            across = 1.0 / (modulus * area * factor)
+        return np.stack([along, across, across], axis=1)
+
+    def _cowper(self, nu: Floats, x: ArrayLike) -> Floats:
+        """Share of the area that resists shear, (n,).
+
+        Source: Cowper 1966 (doi 10.1115/1.3625046).
+        """
+        if self.shear_factor is not None:
+            return np.full(nu.shape, self.shear_factor)
+        if self.shape == "rectangle":
+            return 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
+        hole = 0.0 if self.inner is None else self._value("inner", x) / self._value("outer", x)
+        square = (1.0 + np.square(hole)) ** 2
+        return np.asarray(
+            6.0 * (1.0 + nu) * square / ((7.0 + 6.0 * nu) * square + (20.0 + 12.0 * nu) * np.square(hole))
+        )
 
     def fibres(self, x: ArrayLike) -> Floats:
         """Young's modulus (N/m2) and distances (m) of the outermost fibre from axes b2 and b3, (n, 3), at x (n,)."""

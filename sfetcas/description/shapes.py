@@ -199,6 +199,10 @@ class CenterLine:
         """Whether the whole line lies in a plane z = const, with b2 in it or across it."""
         return self.bending_axis != 0
 
+    def strained_axes(self, space: bool) -> list[int]:
+        """Numbers of the section axes along which it may be strained: all, or in the plane b1 and the one across."""
+        return [0, 1, 2] if space else [0, 2 if self.bending_axis == 2 else 1]
+
     def positions(self, x: ArrayLike) -> Floats:
         """Places (n, 3) in m, fixed axes, at the fractions x (n,)."""
         return numbers(self.start + self.length * self._curve.positions(_row(x)))

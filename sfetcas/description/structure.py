@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, model_validator
 from ..errors import SceneError
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
 from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn, whole
-from .sections import Polynomial, Quantity, Table, quantity
+from .sections import CrossSection, Polynomial, Quantity, Table, quantity
 from .shapes import Shape, Straight
 
 __all__ = ["SLIDING", "Member", "Node", "released", "unit"]
@@ -229,6 +229,10 @@ class Member(Record):
     stiffness: Stiffness | None = None
     mass: Mass | None = None
     spin: Spin | None = None
+
+    def stretches(self, sections: Mapping[str, CrossSection]) -> bool:
+        """Whether it is flexible and its section stretches or shears."""
+        return self.type == "flexible" and sections[str(self.section)].stretches
 
     def node_at(self, x: float) -> str | None:
         """The node at an end of a flexible or rigid member, at the fraction 0 or 1 of its length; None within it."""

@@ -16,7 +16,7 @@ from ..equilibria.solution import Equilibrium
 from ..errors import SceneError
 from ..mathematics.arrays import Array, first_of_largest
 from ..mechanics.equations import Equations, State
-from ..mechanics.fields import rotations_along
+from ..mechanics.fields import rotations_along, strained_like
 from ..mechanics.model import Model
 from .stages import StageEquations
 
@@ -130,6 +130,7 @@ def posed(model: Model, source: Equilibrium) -> State:
         weights=model.positions.Y.value * u[model.positions.Y.row],
         minlength=len(model.positions.unknowns),
     )
+    strained_like(model, y, origin, source.state.y)
     unwrapped = model.unwrapping.angles(q, _unwrapped(model, source))
     return State(q, y, state.lam, unwrapped)
 

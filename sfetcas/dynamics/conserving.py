@@ -29,7 +29,7 @@ from ..errors import SceneError
 from ..mathematics.arrays import Array
 from ..mathematics.constants import picked, times
 from ..mathematics.interpolation import differentiation
-from ..mathematics.quaternion import product, turned
+from ..mathematics.quaternion import product
 from ..mechanics.elements import Element
 from ..mechanics.terms import Side, Term, name_of
 from .methods import Begin, Method
@@ -63,6 +63,15 @@ class Conserving(Method):
         if model.rotating_frame is not None:
             message = "found with the integrator 'conserving', accepted: radau-3, radau-2, generalised-alpha"
             raise SceneError(message, ("rotating",))
+        for member in model.scene.members.values():
+            section = str(member.section)
+            if member.stretches(model.scene.sections) and model.scene.sections[section].compliance(0.5)[0, 1:].any():
+                message = (
+                    "found with the integrator 'conserving', which cannot follow shear without inertia of its own, "
+                    "accepted: radau-3, radau-2, generalised-alpha, or a section without shear"
+                )
+                key = "shear" if model.scene.sections[section].shear else "GA2"
+                raise SceneError(message, ("sections", section, key))
         n = system.layout
         q, y, lam = ca.MX.sym("q", n.components, n.rotations), ca.MX.sym("y", n.y), ca.MX.sym("lam", n.lam)
         begin = Begin(
@@ -204,15 +213,28 @@ def _relative(a0: ca.SX, a1: ca.SX, b0: ca.SX, b1: ca.SX) -> ca.SX:
     return 0.5 * (_onward(a0, b0, of_a, of_b) + _onward(a1, b1, -of_a, -of_b))
 
 
-def _vectors(element: Element, q: ca.SX, tangent: ca.SX) -> list[ca.SX]:
-    """Turned tangents of an element at rotations."""
-    if element.space:
-        return [ca.vertcat(*turned(ca.vertsplit(q[:, k]), ca.vertsplit(tangent[:, k]))) for k in range(q.shape[1])]
-    c, s = ca.cos(q), ca.sin(q)
-    return [
-        ca.vertcat(c[k] * tangent[0, k] - s[k] * tangent[1, k], s[k] * tangent[0, k] + c[k] * tangent[1, k])
-        for k in range(q.shape[1])
-    ]
+def _vectors(element: Element, q: ca.SX, u: ca.SX, data: ca.SX) -> list[ca.SX]:
+    """Turned and strained tangents of an element at rotations and strains."""
+    _, tangent, compliance = element.split(data)
+    found = []
+    for k in range(q.shape[1]):
+        strained = element.strained(tangent[:, k], compliance[:, k], u[:, k]) if element.strains else tangent[:, k]
+        found.append(ca.vertcat(*element.forth(ca.vertsplit(q[:, k]), ca.vertsplit(strained))))
+    return found
+
+
+def _strained(element: Element, before: ca.SX, after: ca.SX, compliance: ca.SX) -> ca.SX:
+    """Derivative (axes, axes) of the turned tangent of a point by its strains, exact between two states.
+
+    With the change of the turned tangent by the rotation taken at the mean of the two it is ``(1 + w x / 2) R_0 S``,
+    where ``w`` is the Rodrigues vector of the rotation between: angular momentum and energy are both kept.
+    """
+    gained, found = _gained(before, after), []
+    for column in ca.horzsplit(ca.reshape(compliance, element.axes, element.axes)):
+        v = ca.vertcat(*element.forth(ca.vertsplit(before), ca.vertsplit(column)))
+        across = ca.cross(gained, v) if element.space else gained * ca.vertcat(-v[1], v[0])
+        found.append(v + 0.5 * across)
+    return ca.horzcat(*found)
 
 
 def _crossed(a: ca.SX, b: ca.SX) -> ca.SX:
@@ -230,8 +252,9 @@ def _element(element: Element) -> ca.Function:
     n, axes, turns = element.order + 1, element.axes, element.turns
     _, _, _, data_size, load_size = element.sizes
     q0, q1 = ca.SX.sym("q0", element.components, n), ca.SX.sym("q1", element.components, n)
+    u0, u1 = ca.SX.sym("u0", axes, element.sizes[1]), ca.SX.sym("u1", axes, element.sizes[1])
     data, load, lam = ca.SX.sym("data", data_size), ca.SX.sym("load", load_size), ca.SX.sym("lam", axes)
-    stiffness, tangent = element.split(data)
+    stiffness, tangent, compliance = element.split(data)
     pull = ca.reshape(load, axes, n) + ca.repmat(lam, 1, n)
     slopes = differentiation(element.nodes)
     moments = [ca.SX.zeros(turns) for _ in range(n)]
@@ -243,21 +266,21 @@ def _element(element: Element) -> ca.Function:
                 share = slopes[k, j] * (ca.mtimes(gain[1:, :].T, effort) if element.space else gain * effort)
                 moments[j] += share
                 moments[k] -= share
-    mean = [0.5 * (a + b) for a, b in zip(_vectors(element, q0, tangent), _vectors(element, q1, tangent), strict=True)]
+    before, after = _vectors(element, q0, u0, data), _vectors(element, q1, u1, data)
+    mean = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
     work = ca.vertcat(*[_crossed(mean[k], pull[:, k]) for k in range(n)])
-    basis = _basis(q1)
-    near = ca.mtimes(ca.jacobian(_at_mean(element, q0, q1, stiffness) + work, ca.vec(q1)), basis)
-    mean_rotation_jacobian = ca.jacobian(work, lam).T
-    gained = sum(
-        (now - rest for now, rest in zip(_vectors(element, q1, tangent), ca.horzsplit(tangent), strict=True)),
-        ca.SX.zeros(axes),
-    )
-    rotation_jacobian = ca.mtimes(ca.jacobian(gained, ca.vec(q1)), basis)
-    results = [
-        ca.densify(part)
-        for part in (ca.vertcat(*moments) + work, near, gained, mean_rotation_jacobian, rotation_jacobian)
+    strains = [
+        0.5 * (u0[:, k] + u1[:, k]) + ca.mtimes(_strained(element, q0[:, k], q1[:, k], compliance[:, k]).T, pull[:, k])
+        for k in range(element.sizes[1])
     ]
-    u0, u1, end = ca.SX.sym("u0", axes, 0), ca.SX.sym("u1", axes, 0), ca.SX.sym("load_end", load_size)
+    end, basis = ca.vertcat(ca.vec(q1), ca.vec(u1)), ca.diagcat(_basis(q1), ca.SX.eye(u1.numel()))
+    near = ca.mtimes(ca.jacobian(ca.vertcat(_at_mean(element, q0, q1, stiffness) + work, *strains), end), basis)
+    mean_rotation_jacobian = ca.jacobian(ca.vertcat(work, *strains), lam).T
+    gained = ca.sum2(ca.horzcat(*after) - tangent)
+    rotation_jacobian = ca.mtimes(ca.jacobian(gained, end), basis)
+    gradient = ca.vertcat(ca.vertcat(*moments) + work, *strains)
+    results = [ca.densify(part) for part in (gradient, near, gained, mean_rotation_jacobian, rotation_jacobian)]
+    end = ca.SX.sym("load_end", load_size)
     return ca.Function(f"between_{name_of(element)}", [q0, u0, q1, u1, data, load, end, lam], results)
 
 

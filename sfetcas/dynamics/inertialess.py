@@ -33,6 +33,9 @@ def check_inertia(equations: Equations, matrix: Array) -> None:
     SceneError
         Names sections, nodes or members without inertia, or constraints that depend on each other.
     """
+    if equations.model.scene.stretches:
+        message = "found 'idas', but strains of members that stretch or shear have no inertia of their own"
+        raise SceneError(f"{message}, accepted: radau-3, radau-2, generalised-alpha", ("analysis", "integrator"))
     null = _null(matrix)
     if null is None:
         return

@@ -19,13 +19,14 @@ import casadi as ca
 import numpy as np
 
 from .. import tolerances
+from ..mathematics import quaternion
 from ..mathematics.arrays import TINY, Array, Index
 from ..mathematics.constants import sparse
 from ..mathematics.linear import SparseMap, SparseSolver, places_of
 from ..mathematics.quaternion import cross_matrix
 from ..mathematics.spectra import largest
 from ..mechanics.batches import GroupBatch
-from ..mechanics.equations import turned_tangents
+from ..mechanics.equations import turned_points, turned_tangents
 from ..mechanics.masses import masses_of
 from ..mechanics.terms import rotation_gradient
 from ..solvers.prepared import Solved
@@ -166,7 +167,7 @@ class SmallMotion:
         """Quantities by unknowns."""
         system, model, axes = self._system, self.model, self.model.element.axes
         q = self.state.q
-        turned = turned_tangents(model, q).reshape(-1, axes)
+        turned = turned_tangents(model, self.state).reshape(-1, axes)
         # The derivative of a turned vector by a rotation vector is the cross product with it.
         rotation_jacobian = -cross_matrix(turned) if model.space else (turned[:, ::-1] * [-1.0, 1.0])[:, :, None]
         turns = model.element.turns
@@ -175,6 +176,8 @@ class SmallMotion:
         cells = model.rotations.turns.ravel()[:, None] * turns + np.arange(turns)
         column = np.broadcast_to(cells[:, None, :], rotation_jacobian.shape)
         tangents = sparse(row, column, rotation_jacobian, (len(turned) * axes, system.full))
+        if model.element.strains:
+            tangents += self._strained(system)
         # Displacements of the places stand after the rotations in full coordinates.
         width = axes * system.places
         onto = sparse(np.arange(width), system.of_places + np.arange(width), np.ones(width), (width, system.full))
@@ -190,6 +193,20 @@ class SmallMotion:
             used = c >= 0
             parts.append(sparse(r[used], c[used], slopes[used], (n * rows, system.full)))
         return ca.mtimes(ca.vertcat(*parts), system.gather.T)[:, : self.unknowns]
+
+    def _strained(self, system: StageEquations) -> ca.DM:
+        """Turned tangents of all points by full coordinates, as far as strains change them."""
+        model, axes = self.model, self.model.element.axes
+        columns = model.beams.compliance.reshape(*model.segments.strains.shape, axes, axes)
+        q = turned_points(model, self.state.q)[:, :, None].repeat(axes, axis=2)
+        values = quaternion.turned_by(q, columns).reshape(-1, axes, axes)
+        strains = model.segments.strains.ravel()
+        row = np.broadcast_to((np.arange(len(strains)) * axes)[:, None, None] + np.arange(axes), values.shape)
+        column = np.broadcast_to(
+            (system.of_places + axes * strains[:, None] + np.arange(axes))[..., None], values.shape
+        )
+        used = np.broadcast_to((strains >= 0)[:, None, None], values.shape)
+        return sparse(row[used], column[used], values[used], (len(strains) * axes, system.full))
 
     @functools.cached_property
     def _nodal(self) -> Array:

@@ -108,7 +108,9 @@ class System(Expressions):
             here.append(first)
         (self.mass, self.drag), (self.place_mass, self.place_drag) = found, here
         self.massive = np.unique(self.inner_nodes[:, 0])
-        width = self.turns * self.points
+        # What moves the points of an element: rotations, then strains.
+        self._moving = (self.turns, axes) if self.model.element.strains else (self.turns,)
+        width = sum(self._moving) * self.points
         self.massive_columns = (self.massive[:, None] * width + np.arange(width)).ravel().tolist()
         arms = self._up_to
         shares = [
@@ -116,8 +118,11 @@ class System(Expressions):
         ]
         self.inner = [share.reshape(-1, self.points).T for share in shares]
         firsts = [part[self.massive] @ arms for part in (masses.inner, masses.inner_drag)]
-        # One for each component of the spins: by axes, turns of a point, points, elements.
-        self.firsts = [np.repeat(first.ravel(), self.turns * axes) for first in firsts]
+        # One for each component of what moves: by axes, components of a point, points, elements.
+        self.firsts = [
+            np.concatenate([np.repeat(first, width * axes, axis=1) for width in self._moving], axis=1).ravel()
+            for first in firsts
+        ]
         sizes = [group.kind.sizes[2] * len(group.data) for group in masses.observables]
         bounds = np.cumsum([self.linear, *sizes]).tolist()
         self.ranges = list(zip(bounds, bounds[1:], strict=False))
@@ -156,10 +161,13 @@ class System(Expressions):
         grounded = (
             any((group.places < 0).any() for group in self.model.connections) or self.model.rotating_frame is not None
         )
-        if grounded or positions.Y.shape[0] != len(positions.Y.value):
+        # Strains are displacements by their numbers alone.
+        moving = ~np.isin(positions.Y.row // axes, self.model.segments.strains)
+        free = self.places - len(self.model.segments.strained)
+        if grounded or moving.sum() != axes * free:
             return None
         y = np.zeros((self.layout.y, axes))
-        y[positions.Y.column, positions.Y.row % axes] = positions.Y.value
+        y[positions.Y.column[moving], positions.Y.row[moving] % axes] = positions.Y.value[moving]
         if any(np.abs(positions.W @ column).max(initial=0.0) > 0.0 for column in y.T):
             return None
         q, flat = ca.DM.ones(self.layout.components, self.layout.rotations), np.zeros(self.layout.unwrapped)
@@ -204,14 +212,14 @@ class System(Expressions):
         """
         shares = b * ca.DM(self.inner[0]) + c * ca.DM(self.inner[1])
         first = b * ca.DM(self.firsts[0]) + c * ca.DM(self.firsts[1])
-        blocks = self.many(arms_product(self.axes, self.turns, self.points), len(self.massive))
+        blocks = self.many(arms_product(self.axes, self._moving, self.points), len(self.massive))
         return [ca.vec(blocks(mine, its, shares)), ca.vec(mine) * first, ca.vec(its) * first]
 
     def quantities(self, q: ca.MX, places: ca.MX, given: Given, unwrapped: ca.MX) -> ca.MX:
         """All quantities X (quantities,) from rotations and displacements of the places."""
         parts = [times(self.by_place, places)]
         if self.elements:
-            parts[0] += times(self.by_tangent, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
+            parts[0] += times(self.by_tangent, ca.vec(self.tangents(q, places, given)) - ca.vec(given.tangent))
         for group in self.masses.observables:
             n = len(group.data)
             sides = *self.sides(group, q, places), self.seen_data(group, unwrapped)

@@ -213,8 +213,9 @@ class Configuration:
         dict of ndarray
             ``position`` (n, 3) m, ``force`` (n, 3) N, ``moment`` (n, 3) N m, ``curvature`` (n, 3) 1/m as of
             :meth:`.Fields.along`; ``quaternion`` (n, 4) of the rotation since the undeformed scene; in the plane also
-            ``angle`` (n,) rad; of a flexible member whose section has a shape the largest ``bending_strain`` (n,) and
-            ``bending_stress`` (n,) N/m2 of its fibres.
+            ``angle`` (n,) rad; of a member that stretches or shears the ``strain`` (n, 3) along the section's axes; of
+            a flexible member whose section has a shape the largest ``bending_strain`` (n,) and ``bending_stress`` (n,)
+            N/m2 of its fibres.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from ..mathematics.arrays import Array
 from .elements import Element
 from .mesh import Mesh
 
-__all__ = ["Beams", "Scales", "beams_of", "load_size", "scales_of"]
+__all__ = ["ELEMENT_DATA", "Beams", "Scales", "beams_of", "load_size", "scales_of"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,9 @@ class Beams:
         Tangent of the unloaded centre line times weight times length.
     weight : ndarray (elements, points)
         Weight of the integration point times length of the element.
+    compliance : ndarray (elements, points, axes * axes)
+        Changes of the tangent by the scaled strains of a point, fixed axes of the undeformed scene, column by column:
+        along the member, then across it; zero where it is stiff.  Of length zero where nothing stretches.
     first : dict
         Number of the first element of each member.
     """
@@ -53,7 +56,17 @@ class Beams:
     stiffness: Array
     tangent: Array
     weight: Array
+    compliance: Array
     first: dict[str, int]
+
+    def flat(self, *names: str) -> Array:
+        """Data of all elements by their names, one after the other, (elements, data)."""
+        parts = (getattr(self, name) for name in names)
+        return np.hstack([part.reshape(len(part), int(np.prod(part.shape[1:]))) for part in parts])
+
+
+ELEMENT_DATA = ("stiffness", "tangent", "compliance")
+"""Data of the elements, in the order in which their functions take them."""
 
 
 def scales_of(scene: Scene) -> Scales:
@@ -91,7 +104,8 @@ def load_size(scene: Scene, length: float) -> float:
 
 def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beams:
     """Data of the elements of all members; small members have no elements."""
-    stiffness, tangent, weight = [], [], []
+    stiffness, tangent, weight, compliance = [], [], [], []
+    size = element.axes**2 if element.strains else 0
     first: dict[str, int] = {}
     count = 0
     for name, member in scene.members.items():
@@ -111,13 +125,27 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         stiffness.append(_in_fixed_axes(values, frames, element, line.bending_axis).reshape(*x.shape, -1) * per_length)
         tangent.append(frames[:, : element.axes, 0].reshape(*x.shape, -1) * w[..., None])
         weight.append(w)
+        compliance.append(np.zeros((*x.shape, size)))
+        if element.strains and member.stretches(scene.sections):
+            found = scene.sections[str(member.section)].compliance(x.ravel()) * scales.force
+            strained = line.strained_axes(element.space)
+            roots = np.sqrt(w.reshape(-1, 1) * found[:, strained])
+            columns = frames[:, : element.axes, strained] * roots[:, None, :]
+            compliance[-1] = columns.transpose(0, 2, 1).reshape(*x.shape, -1)
         first[name] = count
         count += len(w)
     n = element.order + 1
     stiffness.append(np.zeros((0, n, element.stiffnesses)))
     tangent.append(np.zeros((0, n, element.axes)))
     weight.append(np.zeros((0, n)))
-    return Beams(np.concatenate(stiffness), np.concatenate(tangent), np.concatenate(weight), first)
+    compliance.append(np.zeros((0, n, size)))
+    return Beams(
+        stiffness=np.concatenate(stiffness),
+        tangent=np.concatenate(tangent),
+        weight=np.concatenate(weight),
+        compliance=np.concatenate(compliance),
+        first=first,
+    )
 
 
 def _in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:

@@ -15,10 +15,16 @@ scene), the tangent (unit tangent of the unloaded centre line times weight times
 internal force) that loads cause: the energy is the strain energy plus ``sum pull.(R(q) - I) tangent``.  The row of an
 element is the change of its chord, ``sum (R(q) - I) tangent``, whose multiplier is the constant part of the pull.
 
+Where members stretch or shear, the scaled strains ``eta`` of each point are unknowns, too: with the section forces'
+compliance ``C_n^-1`` (axial, shear) in its axes ``R_0``, the tangent of a point becomes ``R(q) (t_0 + S eta)`` with
+``S = R_0 (length weight C_n^-1)^1/2``, and the energy gains ``1/2 eta.eta``.  Their stiffness is the identity, whatever
+the section's, so that members that hardly stretch are as well conditioned as those that do not.
+
 Two ways to integrate: *at the nodes* (Lobatto), where ``q`` is exactly unit and everything is polynomial, and
 *Gauss*, with the interpolated quaternion divided by its norm.  Both are of order 2p at the element ends.
 
-Source: Barraco and Munteanu, Part 1, sections 3 and 4 (SFET2, SFET3); the higher orders are ours.
+Source: Barraco and Munteanu, Part 1, sections 3 and 4 (SFET2, SFET3); the higher orders are ours.  Strains: Reissner
+1972, Simo 1985.
 """
 
 from __future__ import annotations
@@ -49,10 +55,13 @@ class Element(Term):
         Polynomial order p of the interpolation; the element has p + 1 nodes.
     gauss : bool
         Integration at p + 1 Gauss points of the normalised interpolation instead of at the nodes.
+    strains : bool
+        Whether the scaled strains of the points are sides: as places, one for each point.
     """
 
     order: int
     gauss: bool = False
+    strains: bool = False
 
     @property
     def name(self) -> str:
@@ -61,9 +70,14 @@ class Element(Term):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """A rotation at each node; data: stiffnesses and tangents of all integration points; load: their pulls."""
+        """A rotation at each node, strains of each point; data: stiffnesses, tangents, compliances; load: pulls."""
         n = self.order + 1
-        return n, 0, self.axes, n * (self.stiffnesses + self.axes), n * self.axes
+        return n, n if self.strains else 0, self.axes, n * sum(self._widths), n * self.axes
+
+    @property
+    def _widths(self) -> tuple[int, int, int]:
+        """Numbers of stiffness, tangent and compliance at a point."""
+        return self.stiffnesses, self.axes, self.axes**2 if self.strains else 0
 
     @property
     def stiffnesses(self) -> int:
@@ -98,27 +112,54 @@ class Element(Term):
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Strain energy, plus the potential of the loads by their pulls."""
-        stiffness, tangent = self.split(data)
-        pull = ca.reshape(load, self.axes, self.order + 1)
+        stiffness, tangent, _ = self.split(data)
+        pull, now = ca.reshape(load, self.axes, self.order + 1), self.tangents(q, u, data)
         here, slope = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))
         energy = ca.SX(0)
         for k in range(self.order + 1):
             energy += self._strain_energy(here[:, k], slope[:, k], stiffness[:, k])
-            energy += ca.dot(pull[:, k], self._tangent(here[:, k], tangent[:, k]) - tangent[:, k])
+            energy += ca.dot(pull[:, k], now[k] - tangent[:, k])
+        for strain in u:
+            energy += 0.5 * ca.sumsqr(ca.vertcat(*strain))
         return energy
 
     def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
         """Change of the chord, the vector from the first to the last node, since the undeformed scene."""
-        tangent = self.split(data)[1]
-        here = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
-        gained = [self._tangent(here[:, k], tangent[:, k]) - tangent[:, k] for k in range(self.order + 1)]
-        return ca.vertsplit(sum(gained[1:], gained[0]))
+        gained = ca.horzcat(*self.tangents(q, u, data)) - self.split(data)[1]
+        return ca.vertsplit(ca.sum2(gained))
 
-    def split(self, data: Any) -> tuple[Any, Any]:
-        """Stiffnesses and tangents of the points from the data, a column for each point."""
+    def tangents(self, q: list[Side], u: list[Side], data: ca.SX) -> list[ca.SX]:
+        """Turned and strained tangents of the points, for data of which the last are those of :attr:`line_data`."""
+        tangent, compliance = self.line(data[-self.line_data :])
+        here = self._at_points(ca.horzcat(*[ca.vertcat(*side) for side in q]))[0]
+        strains = [ca.vertcat(*side) for side in u]
+        found = []
+        for k in range(self.order + 1):
+            strained = self.strained(tangent[:, k], compliance[:, k], strains[k]) if strains else tangent[:, k]
+            found.append(self._tangent(here[:, k], strained))
+        return found
+
+    def strained(self, tangent: ca.SX, compliance: ca.SX, strain: ca.SX) -> ca.SX:
+        """Tangent of one point with its scaled strain, before it is turned."""
+        return tangent + ca.mtimes(ca.reshape(compliance, self.axes, self.axes), strain)
+
+    @property
+    def line_data(self) -> int:
+        """How many of the data, the last ones, say how the centre line lies and yields: tangents and compliances."""
+        return (self.order + 1) * sum(self._widths[1:])
+
+    def line(self, data: Any) -> tuple[Any, Any]:
+        """Tangents and compliances of the points from these data, a column for each point."""
+        return self.split(ca.vertcat(ca.SX((self.order + 1) * self.stiffnesses, 1), data))[1:]
+
+    def split(self, data: Any) -> tuple[Any, Any, Any]:
+        """Stiffnesses, tangents and compliances of the points from the data, a column for each point."""
         n = self.order + 1
-        stiffness, tangent = ca.vertsplit(data, [0, n * self.stiffnesses, data.shape[0]])
-        return ca.reshape(stiffness, self.stiffnesses, n), ca.reshape(tangent, self.axes, n)
+        parts = ca.vertsplit(data, np.cumsum([0, *(n * width for width in self._widths)]).tolist())
+        stiffness, tangent, compliance = (
+            ca.reshape(part, width, n) for part, width in zip(parts, self._widths, strict=True)
+        )
+        return stiffness, tangent, compliance
 
     def _at_points(self, q: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Rotation and its derivative by xi at the integration points."""
@@ -157,12 +198,16 @@ class Element(Term):
 
     @functools.cached_property
     def turned(self) -> ca.Function:
-        """``(q, tangent) ->`` rotated tangents of the points, (axes, p + 1)."""
-        n = self.order + 1
-        q, tangent = ca.SX.sym("q", self.components, n), ca.SX.sym("tangent", self.axes, n)
-        here = self._at_points(q)[0]
-        found = ca.horzcat(*[self._tangent(here[:, k], tangent[:, k]) for k in range(n)])
-        return ca.Function(f"turned_{name_of(self)}", [q, tangent], [ca.densify(found)])
+        """``(q, u, data) ->`` turned and strained tangents of the points, (axes, p + 1)."""
+        turns, places, _, data, _ = self.sizes
+        arguments = [
+            ca.SX.sym("q", self.components, turns),
+            ca.SX.sym("u", self.axes, places),
+            ca.SX.sym("data", data),
+        ]
+        q, u = ([ca.vertsplit(side) for side in ca.horzsplit(part)] for part in arguments[:2])
+        found = ca.horzcat(*self.tangents(q, u if places else [], arguments[2]))
+        return ca.Function(f"turned_{name_of(self)}", arguments, [ca.densify(found)])
 
     # -- derivatives ----------------------------------------------------------------------------------
     # In space derivatives of the whole element are long: those of one point, mapped over the points and put together
@@ -172,21 +217,20 @@ class Element(Term):
         """As :meth:`.Term.rotation_gradient`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().rotation_gradient()
-        symbols, q, stiffness, tangent, load, pull = self._large_symbols()
-        strain, tangents, gradient, hessian, change = self._point.map(self.order + 1)(
-            *self._at(q), stiffness, tangent, pull
-        )
-        by_q, basis, gained = self._on_nodes(gradient), self._basis(q), tangents - tangent
-        matrix = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
+        symbols, q, point, load = self._large_symbols()
+        strain, tangents, gradient, hessian, *change = self._point.map(self.order + 1)(*point)
+        by_q, basis, gained = self._on_nodes(gradient), self._basis(q), tangents - self._tangent_of(point)
+        matrix = ca.mtimes(basis.T, ca.mtimes(self._between_sides(hessian), basis))
         # What keeps quaternions on the unit sphere.
-        matrix -= 0.25 * ca.diag(ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1)))
+        radial = ca.vec(ca.repmat(ca.sum1(q * by_q), 3, 1))
+        matrix -= 0.25 * ca.diag(ca.vertcat(radial, ca.MX.zeros(basis.shape[1] - radial.shape[0], 1)))
         results = {
             "energy": ca.sum2(strain) + ca.dot(load, gained),
             "stored": ca.sum2(strain),
             "rows": ca.sum2(gained),
-            "gradient": ca.densify(ca.mtimes(basis.T, ca.vec(by_q))),
+            "gradient": ca.densify(ca.mtimes(basis.T, self._on_sides(gradient))),
             "stiffness": ca.densify(matrix),
-            "rotation_jacobian": ca.densify(ca.mtimes(self._by_nodes(change), basis)),
+            "rotation_jacobian": ca.densify(ca.mtimes(self._by_sides(change), basis)),
         }
         return self._function("rotation_gradient", symbols, results)
 
@@ -194,29 +238,30 @@ class Element(Term):
         """As :meth:`.Term.rotation_forces`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().rotation_forces()
-        symbols, q, stiffness, tangent, _, pull = self._large_symbols()
-        tangents, gradient, _ = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, pull)
-        moments = ca.mtimes(self._basis(q).T, ca.vec(self._on_nodes(gradient)))
-        return self._function("forces", symbols, {"rows": ca.sum2(tangents - tangent), "gradient": ca.densify(moments)})
+        symbols, q, point, _ = self._large_symbols()
+        tangents, gradient, *_ = self._of_point("gradient").map(self.order + 1)(*point)
+        moments = ca.mtimes(self._basis(q).T, self._on_sides(gradient))
+        results = {"rows": ca.sum2(tangents - self._tangent_of(point)), "gradient": ca.densify(moments)}
+        return self._function("forces", symbols, results)
 
     def slopes(self) -> ca.Function:
         """As :meth:`.Term.slopes`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().slopes()
-        symbols, q, stiffness, tangent, load, _ = self._large_symbols()
-        _, gradient, change = self._of_point("gradient").map(self.order + 1)(*self._at(q), stiffness, tangent, load)
-        results = {"gradient": ca.densify(ca.vec(self._on_nodes(gradient))), "jacobian": self._by_nodes(change)}
+        symbols, _, point, load = self._large_symbols()
+        _, gradient, *change = self._of_point("gradient").map(self.order + 1)(*point[:-1], load)
+        results = {"gradient": ca.densify(self._on_sides(gradient)), "jacobian": self._by_sides(change)}
         return self._function("slopes", symbols[:4], results)
 
     def curvatures(self) -> ca.Function:
         """As :meth:`.Term.curvatures`; in space assembled from the derivatives of single points."""
         if not self.space:
             return super().curvatures()
-        symbols, q, stiffness, tangent, load, _ = self._large_symbols()
+        symbols, _, point, load = self._large_symbols()
         weight = ca.MX.sym("weight")
         pull = weight * load + ca.repmat(symbols[4], 1, self.order + 1)
-        hessian = self._of_point("hessian").map(self.order + 1)(*self._at(q), weight * stiffness, tangent, pull)
-        return self._function("curvatures", [*symbols, weight], {"hessian": self._between_nodes(hessian)})
+        hessian = self._of_point("hessian").map(self.order + 1)(*point[:-1], pull, weight)
+        return self._function("curvatures", [*symbols, weight], {"hessian": self._between_sides(hessian)})
 
     @functools.cached_property
     def convex(self) -> ca.Function:
@@ -226,40 +271,57 @@ class Element(Term):
         Of the strain energy it has the Gauss-Newton part, which in the plane is exact.  Of the internal force it has
         the geometric stiffness of its axial part about both normals, with the sign of tension also in compression.
         """
-        symbols, q, stiffness, tangent, _, pull = self._large_symbols()
+        symbols, q, point, _ = self._large_symbols()
+        stiffness, tangent, pull = point[-3 - self.strains], self._tangent_of(point), point[-1]
         if self.space:
-            return self._function("convex", symbols, {"convex": self._convex_in_space(q, stiffness, tangent, pull)})
-        parts = [ca.SX.sym(name, *part.shape) for name, part in zip("qctp", (q, stiffness, tangent, pull), strict=True)]
+            own = self._convex_in_space(q, stiffness, tangent, pull)
+        else:
+            own = self._convex_in_plane()(q, stiffness, tangent, pull)
+        strains = ca.MX.eye(symbols[1].numel())
+        return self._function("convex", symbols, {"convex": ca.densify(ca.diagcat(own, strains))})
+
+    def _convex_in_plane(self) -> ca.Function:
+        n = self.order + 1
+        shapes = {"q": (self.components, n), "c": (1, n), "t": (self.axes, n), "p": (self.axes, n)}
+        parts = [ca.SX.sym(name, *shape) for name, shape in shapes.items()]
         here, slope = self._at_points(parts[0])
-        total = ca.SX(self.order + 1, self.order + 1)
-        for k in range(self.order + 1):
+        total = ca.SX(n, n)
+        for k in range(n):
             by_turns = ca.jacobian(slope[:, k], parts[0])
             along = ca.fabs(ca.dot(self._tangent(here[:, k], parts[2][:, k]), parts[3][:, k]))
             row = ca.DM(interpolation.evaluation(self.nodes, self.points[k : k + 1]))
             total += parts[1][0, k] * ca.mtimes(by_turns.T, by_turns) + along * ca.mtimes(row.T, row)
-        inner = ca.Function(f"convex_parts_{name_of(self)}", parts, [ca.densify(total)])
-        return self._function("convex", symbols, {"convex": inner(q, stiffness, tangent, pull)})
+        return ca.Function(f"convex_parts_{name_of(self)}", parts, [ca.densify(total)])
 
     def _convex_in_space(self, q: ca.MX, stiffness: ca.MX, tangent: ca.MX, pull: ca.MX) -> ca.MX:
         n = self.order + 1
         hessian, across = self._convex_point.map(n)(*self._at(q), stiffness, tangent, pull)
-        basis = self._basis(q)
+        basis = self._basis(q)[: 4 * n, : 3 * n]
         pairs = ca.sparsify(ca.kron(self._shape, ca.DM.ones(1, n)) * ca.kron(ca.DM.ones(1, n), self._shape))
         summed = ca.densify(ca.mtimes(ca.reshape(across, 9, n), pairs))
         order = np.arange(9 * n * n).reshape(n, n, 3, 3).transpose(0, 2, 1, 3).ravel()
         total = ca.mtimes(basis.T, ca.mtimes(self._between_nodes(hessian), basis))
         return ca.densify(total + ca.reshape(summed.nz[order.tolist()], 3 * n, 3 * n))
 
-    def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, ca.MX, ca.MX, ca.MX, ca.MX]:
+    def _large_symbols(self) -> tuple[list[ca.MX], ca.MX, list[ca.MX], ca.MX]:
         """Arguments q, u, data, load, lam of functions put together of others.
 
-        And rotations, stiffnesses, tangents, pulls of loads and whole pulls, a column a node or point.
+        And rotations, the arguments of the functions of a point with the whole pull, a column a node or point, and the
+        pulls of loads.
         """
         turns, places, rows, data, load = self.sizes
         shapes = ((self.components, turns), (self.axes, places), (data, 1), (load, 1), (rows, 1))
         symbols = [ca.MX.sym(name, *shape) for name, shape in zip(ARGUMENTS, shapes, strict=True)]
         given = ca.reshape(symbols[3], self.axes, turns)
-        return symbols, symbols[0], *self.split(symbols[2]), given, given + ca.repmat(symbols[4], 1, turns)
+        stiffness, tangent, compliance = self.split(symbols[2])
+        strains, compliances = ([symbols[1]], [compliance]) if self.strains else ([], [])
+        at = self._at(symbols[0]) if self.space else ()
+        point = [*at, *strains, stiffness, tangent, *compliances, given + ca.repmat(symbols[4], 1, turns)]
+        return symbols, symbols[0], point, given
+
+    def _tangent_of(self, point: list[ca.MX]) -> ca.MX:
+        """Tangents of the undeformed centre line among the arguments of the functions of a point."""
+        return point[-2 - self.strains]
 
     def _function(self, name: str, arguments: list[ca.MX], results: dict[str, ca.MX]) -> ca.Function:
         names = [*ARGUMENTS, "weight"][: len(arguments)]
@@ -281,12 +343,43 @@ class Element(Term):
 
     def _on_nodes(self, gradient: ca.MX) -> ca.MX:
         """Derivatives by the nodes (4, nodes) from those by rotations and slopes at the points (8, points)."""
-        return ca.mtimes(gradient[:4, :], self._shape) + ca.mtimes(gradient[4:, :], self._derivative)
+        return ca.mtimes(gradient[:4, :], self._shape) + ca.mtimes(gradient[4:8, :], self._derivative)
 
-    def _by_nodes(self, change: ca.MX) -> ca.MX:
-        """Derivative (3, 4 nodes) of the chord from those (3, 4 points) of the tangents by the rotations there."""
+    def _on_sides(self, gradient: ca.MX) -> ca.MX:
+        """Derivatives by the components of the nodes, then by the strains, from those at the points."""
+        return ca.vertcat(ca.vec(self._on_nodes(gradient)), ca.vec(gradient[8:, :]))
+
+    def _by_sides(self, change: list[ca.MX]) -> ca.MX:
+        """Derivative of the chord by the components of the nodes (3, 4 nodes), then by the strains (3, 3 points).
+
+        From those of the tangents (3, 4 points) by the rotations there, and (3, 3 points) by the strains.
+        """
         n = self.order + 1
-        return ca.densify(ca.reshape(ca.mtimes(ca.reshape(change, 12, n), self._shape), 3, 4 * n))
+        by_nodes = ca.reshape(ca.mtimes(ca.reshape(change[0], 12, n), self._shape), 3, 4 * n)
+        return ca.densify(ca.horzcat(by_nodes, *change[1:]))
+
+    def _between_sides(self, hessian: ca.MX) -> ca.MX:
+        """Second derivatives by the components of the nodes, then by the strains, from those of the points."""
+        n, size = self.order + 1, 11
+        if not self.strains:
+            return self._between_nodes(hessian)
+        entries = np.arange(size**2 * n).reshape(n, size, size)
+        picked = [
+            ca.reshape(hessian.nz[entries[:, columns, rows].ravel().tolist()], -1, n)
+            for columns, rows in ((slice(0, 8), slice(0, 8)), (slice(8, 11), slice(0, 4)), (slice(8, 11), slice(4, 8)))
+        ]
+        nodes = self._between_nodes(ca.reshape(picked[0], 8, 8 * n))
+        # Of a node and the strains of a point: entries (4, 3), those of all nodes beside each other for each point.
+        across = []
+        for k in range(n):
+            sides = zip((self._shape[k, :], self._derivative[k, :]), picked[1:], strict=True)
+            across.append(sum((ca.kron(side.T, ca.reshape(part[:, k], 4, 3)) for side, part in sides), ca.MX(0)))
+        cross = ca.horzcat(*across)
+        return ca.densify(ca.vertcat(ca.horzcat(nodes, cross), ca.horzcat(cross.T, self._between_strains(hessian))))
+
+    def _between_strains(self, hessian: ca.MX) -> ca.MX:
+        """Second derivatives by the strains of the points, block by block."""
+        return ca.diagcat(*[part[8:, 8:] for part in ca.horzsplit(hessian, 11)])
 
     def _between_nodes(self, hessian: ca.MX) -> ca.MX:
         """The same of second derivatives: (4 nodes, 4 nodes) from (8, 8 points)."""
@@ -312,44 +405,57 @@ class Element(Term):
             "basis", [one], [ca.densify(0.5 * ca.horzcat(*[ca.vertcat(*column) for column in columns]))]
         )
         blocks = block.map(self.order + 1)(q)
-        return ca.diagcat(*ca.horzsplit(blocks, 3))
+        return ca.diagcat(*ca.horzsplit(blocks, 3), ca.MX.eye(self.axes * self.sizes[1]))
 
     def _of_point(self, what: str) -> ca.Function:
-        """(rotation, slope, stiffness, tangent, pull) of a point -> Hessian (8, 8) of its energy.
+        """Arguments of a point (see :meth:`_point_symbols`) -> gradient, or Hessian with the energy times a weight.
 
-        Or turned tangent, gradient (8,), and the derivative of the turned tangent by the rotation (3, 4).
+        That is: turned tangent, gradient (8,) or (11,), and the derivatives of the turned tangent by the rotation
+        (3, 4) and the strain (3, 3); or the Hessian alone.
         """
-        here, slope, *data = self._point_symbols()
-        now = self._tangent(here, data[1])
-        energy = self._strain_energy(here, slope, data[0]) + ca.dot(data[2], now)
-        hessian, gradient = ca.hessian(energy, ca.vertcat(here, slope))
-        results = [now, gradient, ca.jacobian(now, here)] if what == "gradient" else [hessian]
+        symbols, weight = self._point_symbols(), ca.SX.sym("weight")
+        strain, now, changed = self._point_energy(symbols)
         name = f"point_{what}_{name_of(self)}"
-        return ca.Function(name, [here, slope, *data], [ca.densify(one) for one in results], {"cse": True})
+        if what == "gradient":
+            gradient = ca.gradient(strain + ca.dot(symbols[-1], now), ca.vertcat(*changed))
+            results = [now, gradient, *(ca.jacobian(now, part) for part in (changed[0], *changed[2:]))]
+            return ca.Function(name, symbols, [ca.densify(one) for one in results], {"cse": True})
+        hessian = ca.hessian(weight * strain + ca.dot(symbols[-1], now), ca.vertcat(*changed))[0]
+        return ca.Function(name, [*symbols, weight], [ca.densify(hessian)], {"cse": True})
 
     @functools.cached_property
     def _point(self) -> ca.Function:
-        """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :meth:`rotation_gradient`.
+        """Arguments of one point (see :meth:`_point_symbols`) -> its share of :meth:`rotation_gradient`.
 
-        Strain energy, turned tangent, gradient (8,) and Hessian (8, 8) by rotation and slope, and the derivative
-        of the turned tangent by the rotation (3, 4).
+        Strain energy, turned tangent, gradient and Hessian by rotation, slope and strain, and the derivatives of the
+        turned tangent by the rotation (3, 4) and the strain (3, 3).
         """
-        here, slope, *data = self._point_symbols()
-        strain = self._strain_energy(here, slope, data[0])
-        now = self._tangent(here, data[1])
-        hessian, gradient = ca.hessian(strain + ca.dot(data[2], now), ca.vertcat(here, slope))
-        results = [strain, now, gradient, hessian, ca.jacobian(now, here)]
-        symbols = [here, slope, *data]
+        symbols = self._point_symbols()
+        strain, now, changed = self._point_energy(symbols)
+        hessian, gradient = ca.hessian(strain + ca.dot(symbols[-1], now), ca.vertcat(*changed))
+        results = [strain, now, gradient, hessian, *(ca.jacobian(now, part) for part in (changed[0], *changed[2:]))]
         return ca.Function(f"point_{name_of(self)}", symbols, [ca.densify(one) for one in results], {"cse": True})
 
+    def _point_energy(self, symbols: list[ca.SX]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+        """Strain energy and turned tangent of one point in space, and what they depend on."""
+        if not self.strains:
+            here, slope, stiffness, tangent, _ = symbols
+            return self._strain_energy(here, slope, stiffness), self._tangent(here, tangent), [here, slope]
+        here, slope, strain, stiffness, tangent, compliance, _ = symbols
+        stored = self._strain_energy(here, slope, stiffness) + 0.5 * ca.sumsqr(strain)
+        return stored, self._tangent(here, self.strained(tangent, compliance, strain)), [here, slope, strain]
+
     def _point_symbols(self) -> list[ca.SX]:
-        names = {"here": 4, "slope": 4, "stiffness": 6, "tangent": 3, "pull": 3}
-        return [ca.SX.sym(name, size) for name, size in names.items()]
+        """Rotation, slope, strain, stiffness, tangent, compliance and pull of one point, as far as it has them."""
+        names = {"here": 4, "slope": 4, "strain": 3, "stiffness": 6, "tangent": 3, "compliance": 9, "pull": 3}
+        chosen = {name: size for name, size in names.items() if self.strains or name not in ("strain", "compliance")}
+        return [ca.SX.sym(name, size) for name, size in chosen.items()]
 
     @functools.cached_property
     def _convex_point(self) -> ca.Function:
         """(rotation, slope, stiffness, tangent, pull) of one point -> its share of :attr:`convex`."""
-        here, slope, stiffness, tangent, pull = self._point_symbols()
+        sizes = {"here": 4, "slope": 4, "stiffness": 6, "tangent": 3, "pull": 3}
+        here, slope, stiffness, tangent, pull = (ca.SX.sym(name, size) for name, size in sizes.items())
         strain = self._curvature(here, slope)
         by_both = ca.jacobian(strain, ca.vertcat(here, slope))
         now = self._tangent(here, tangent)
@@ -367,6 +473,6 @@ ELEMENTS = tuple(f"SFET{n}" for n in range(2, 10))
 
 
 @functools.cache
-def element_by_name(name: str, space: bool, gauss: bool = False) -> Element:
+def element_by_name(name: str, space: bool, gauss: bool = False, strains: bool = False) -> Element:
     """The element type of a name; each is made once a process, so that its functions are, too."""
-    return Element(space, ELEMENTS.index(name) + 1, gauss)
+    return Element(space, ELEMENTS.index(name) + 1, gauss, strains)

@@ -29,7 +29,7 @@ from .rotations import RotationFreedom
 from .tables import Tables
 from .terms import Group, rotation_gradient
 
-__all__ = ["UNLOADED", "Equations", "Point", "State", "turned_tangents"]
+__all__ = ["UNLOADED", "Equations", "Point", "State", "scaled_strains", "turned_points", "turned_tangents"]
 
 UNLOADED = 1e-6
 """Share of the largest forces of a model below which forces at a node are rounding: 1e-16 of them is 1e-10 of this."""
@@ -365,7 +365,7 @@ class Equations:
 
     def places(self, state: State, loading: Loading) -> Array:
         """Displacements of all places at a state, (places * axes,), dimensionless."""
-        gained = (turned_tangents(self.model, state.q) - self.model.beams.tangent).sum(axis=1)
+        gained = (turned_tangents(self.model, state) - self.model.beams.tangent).sum(axis=1)
         return self.displacements(state, loading, gained)[0]
 
     def shares(self, state: State, loading: Loading) -> list[Array]:
@@ -419,10 +419,10 @@ class Equations:
         loading, rotating_frame = self.effective(state, loading), self.model.rotating_frame
         if rotating_frame is None:
             return loading
-        q, places = state.q, self.places(state, loading)
+        places = self.places(state, loading)
         u = places.reshape(len(self.model.segments.places), -1)
         matrix = loading.loads[rotating_frame.pairs][0].reshape(u.shape[1], -1)
-        found = loading.plus(rotating_frame.positional(self.model, u, turned_tangents(self.model, q), matrix))
+        found = loading.plus(rotating_frame.positional(self.model, u, turned_tangents(self.model, state), matrix))
         moment, couple, jump, force = (
             np.zeros_like(part) for part in (found.moment, found.couple, found.jump, found.force)
         )
@@ -495,14 +495,35 @@ class Equations:
         return State(q, y, state.lam + step[self.unknowns :], unwrapped)
 
 
-def turned_tangents(model: Model, q: Array) -> Array:
-    """Rotated tangents times weight and length at the integration points, (elements, points, axes), dimensionless."""
+def turned_tangents(model: Model, state: State) -> Array:
+    """Turned and strained tangents times weight and length at the integration points, (elements, points, axes),
+    dimensionless.
+    """
+    q = turned_points(model, state.q)
+    return quaternion.turned_by(q, model.beams.tangent + _gained_tangents(model, state.y))
+
+
+def turned_points(model: Model, q: Array) -> Array:
+    """Rotations (elements, points, components) at the integration points."""
     element, q = model.element, q[model.rotations.turns]
     if element.gauss:
         q = np.einsum("kj,ejc->ekc", interpolation.evaluation(element.nodes, element.points), q)
-    return quaternion.turned_by(
-        q / np.linalg.norm(q, axis=-1, keepdims=True) if model.space else q, model.beams.tangent
-    )
+    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True) if model.space else q)
+
+
+def _gained_tangents(model: Model, y: Array) -> Array | float:
+    """What strains add to the tangents before they are turned, (elements, points, axes), dimensionless."""
+    element, strains = model.element, model.segments.strains
+    if not element.strains:
+        return 0.0
+    matrices = model.beams.compliance.reshape(*strains.shape, element.axes, element.axes)
+    return np.asarray(np.einsum("ekca,ekc->eka", matrices, scaled_strains(model, y)))
+
+
+def scaled_strains(model: Model, y: Array) -> Array:
+    """Scaled strains (elements, points, axes) among the displacement unknowns; zero where a member has none."""
+    retained = np.vstack([model.positions.retained, np.full((1, model.element.axes), -1)])
+    return np.asarray(np.append(y, 0.0)[retained[model.segments.strains]])
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,8 @@ class Given:
 
     Attributes
     ----------
-    stiffness, tangent : (stiffnesses, points) and (axes, points) of all elements
+    stiffness, tangent, compliance : (stiffnesses, points), (axes, points) and (axes * axes or 0, points)
+        Of all elements.
     pull : (points * axes,)
         Minus the internal force that loads cause, including forces on places whose displacement follows from segments.
     force, shift : (places * axes,)
@@ -71,6 +72,7 @@ class Given:
 
     stiffness: ca.MX
     tangent: ca.MX
+    compliance: ca.MX
     pull: ca.MX
     force: ca.MX
     shift: ca.MX
@@ -136,11 +138,15 @@ class SymbolicTerms:
 
     # -- where things are -----------------------------------------------------------------------------
 
-    def tangents(self, q: ca.MX, given: Given) -> ca.MX:
-        """Rotated tangents of all points, (axes, elements * points)."""
+    def tangents(self, q: ca.MX, places: ca.MX, given: Given) -> ca.MX:
+        """Turned and strained tangents of all points, (axes, elements * points).
+
+        ``places`` are the displacements of retained places, (places * axes,).
+        """
         element, turns = self.model.element, self.model.rotations.turns
-        if element.gauss:
-            return self.many(element.turned, self.elements)(q[:, turns.ravel().tolist()], given.tangent)
+        if element.gauss or element.strains:
+            sides = self.sides(self.model.terms[0], q, places)
+            return self.many(element.turned, self.elements)(*sides, self.data(0, given, ca.MX()))
         at_points = q[:, turns.ravel().tolist()]
         return self.many(turned_vector(self.model.space), turns.size)(at_points, given.tangent)
 
@@ -149,7 +155,7 @@ class SymbolicTerms:
         moved = self.retained_places(y, given)
         if not self.reaching.nnz():
             return moved
-        return moved + times(self.reaching, ca.vec(self.tangents(q, given)) - ca.vec(given.tangent))
+        return moved + times(self.reaching, ca.vec(self.tangents(q, moved, given)) - ca.vec(given.tangent))
 
     def retained_places(self, y: ca.MX, given: Given) -> ca.MX:
         """Displacements of retained places (unknown or prescribed), (places * axes,); undefined for others."""
@@ -209,7 +215,7 @@ class SymbolicTerms:
     def data(self, number: int, given: Given, unwrapped: ca.MX) -> ca.MX:
         """Data of a group of terms; the last row of those that count turns is the value near which they do."""
         if number == 0:
-            parts = (given.stiffness, given.tangent)
+            parts = (given.stiffness, given.tangent, given.compliance)
             return ca.vertcat(*(ca.reshape(part, part.shape[0] * self.points, self.elements) for part in parts))
         part = self.model.unwrapping.parts[number]
         data = ca.MX(given.data[number - 1])
@@ -357,6 +363,7 @@ def data_of(model: Model) -> dict[str, Any]:
     return {
         "stiffness": ca.DM(beams.stiffness.reshape(-1, element.stiffnesses).T),
         "tangent": ca.DM(beams.tangent.reshape(-1, element.axes).T),
+        "compliance": ca.DM(beams.compliance.reshape(beams.weight.size, beams.compliance.shape[-1]).T),
         "data": tuple(ca.DM(group.data.T) for group in model.connections),
     }
 

@@ -19,14 +19,14 @@ from ..mathematics.keeping import kept
 from .balance import Balance, SpringState
 from .balance import three as _three
 from .batches import GroupBatch
-from .equations import Equations, State, turned_tangents
+from .equations import Equations, State, scaled_strains, turned_points, turned_tangents
 from .loading import Loading
 from .mesh import Touch
 from .singles import fibre_strain
 from .stations import Stations
 from .terms import energies_of
 
-__all__ = ["Fields", "rotations_along", "transferred"]
+__all__ = ["Fields", "rotations_along", "strained_like", "transferred"]
 
 LARGE = 1.0
 """Displacement over size, or rotation in rad, of a small member at which its results are refused as meaningless."""
@@ -54,7 +54,7 @@ class Fields:
         self._equations = equations
         self.q = state.q
         model = self.model
-        self.turned = turned_tangents(model, state.q)
+        self.turned = turned_tangents(model, state)
         gained = (self.turned - model.beams.tangent).sum(axis=1)
         nodal, _ = equations.displacements(state, loading, gained)
         self._nodal = nodal.reshape(len(model.segments.places), -1)
@@ -137,7 +137,8 @@ class Fields:
         dict
             ``position`` (n, 3) m; ``rotation`` since the undeformed scene, a quaternion (n, 4) or in the plane an angle
             (n, 1); section ``force`` (n, 3) N and ``moment`` (n, 3) N m, fixed axes, that the part beyond the place
-            exerts on the part before it; ``curvature`` (n, 3) 1/m about the section's axes b1 (twist), b2, b3.
+            exerts on the part before it; ``curvature`` (n, 3) 1/m about the section's axes b1 (twist), b2, b3;
+            ``strain`` (n, 3) of a member that stretches or shears, along these axes.
             ``dimensionless``: of a flexible or rigid member, force and moment without units and no curvature.
         """
         model, x = self.model, np.asarray(x, dtype=float)
@@ -157,6 +158,9 @@ class Fields:
         with np.errstate(invalid="ignore"):
             strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
+        if record.stretches(model.scene.sections):
+            compliance = model.scene.sections[str(record.section)].compliance(x)
+            result["strain"] = compliance * np.einsum("nij,ni->nj", frames, result["force"])
         return result
 
     def bending(self, member: str, x: Array, curvature: Array) -> tuple[Array, Array]:
@@ -339,6 +343,12 @@ class Fields:
         about = np.zeros((*turns.shape, 3))
         about[..., 3 - spin.shape[1] :] = spin[turns]
         gained = np.cross(about, _three(self.turned[part]))[..., :axes]
+        if model.element.strains:
+            strains = model.segments.strains[part]
+            rates = np.where((strains >= 0)[..., None], known[strains], 0.0)
+            matrices = model.beams.compliance[part].reshape(*strains.shape, axes, axes)
+            stretched = np.einsum("ekca,ekc->eka", matrices, rates)
+            gained += quaternion.turned_by(turned_points(model, self.q)[part], stretched)
         parts, segments, cuts = model.segments.parts, model.segments, model.mesh.cuts[member]
         mine = [one for one in parts if one.member == member]
         ends = np.array([mine[0].elements.start, *(one.elements.stop for one in mine)]) - part.start
@@ -571,6 +581,27 @@ def rotations_along(model: Any, q: Array, member: str, x: Array) -> Array:
     return values / np.linalg.norm(values, axis=-1, keepdims=True) if model.space else values
 
 
+def strained_like(target: Any, y: Array, source: Any, values: Array) -> None:
+    """Set the strains among the displacement unknowns ``y`` of one model to those of another, in place.
+
+    ``values`` are the displacement unknowns of the other model, of the same members on another mesh.
+    """
+    if not (target.element.strains and source.element.strains):
+        return
+    for name, member in target.scene.members.items():
+        if not member.stretches(target.scene.sections):
+            continue
+        part, cuts = target.elements_of(name), target.mesh.cuts[name]
+        x = cuts[:-1, None] + np.diff(cuts)[:, None] * target.element.points
+        at, own = Stations(source.element, source.mesh.cuts[name], x.ravel()), source.elements_of(name)
+        # Scaled strains grow with the root of the length that a point stands for.
+        there = scaled_strains(source, values)[own] / np.sqrt(source.beams.weight[own])[..., None]
+        found = np.einsum("nk,nka->na", at.at_points, there[at.elements]).reshape(*x.shape, -1)
+        found *= np.sqrt(target.beams.weight[part])[..., None]
+        retained = target.positions.retained[target.segments.strains[part]]
+        y[retained[retained >= 0]] = found[retained >= 0]
+
+
 def transferred(source: Any, state: State, target: Any) -> State:
     """A state of one model interpolated onto another mesh of the same scene.
 
@@ -585,6 +616,7 @@ def transferred(source: Any, state: State, target: Any) -> State:
         if number is not None and source.rotations.node_turn[name] is not None:
             q[number] = state.q[source.rotations.node_turn[name]]
     y = _by_name(source.positions.unknowns, state.y, target.positions.unknowns)
+    strained_like(target, y, source, state.y)
     lam = _by_name(source.row_names, state.lam, target.row_names)
     return State(q, y, lam, state.unwrapped)
 

@@ -20,7 +20,7 @@ import numpy as np
 from ..description.loads import Load
 from ..description.scene import Scene
 from ..errors import SceneError
-from ..mathematics import interpolation, quaternion
+from ..mathematics import quaternion
 from ..mathematics.arrays import Array, numbers, scattered
 from .elements import Element
 from .joints import Turning
@@ -81,19 +81,19 @@ class Follower(Term):
 class FollowingSpread(Term):
     """Forces at the nodes of an element that turn with them.
 
-    Data: tangents of the nodes, load: forces there, both of the undeformed scene.
+    Data: tangents and compliances of the nodes, load: forces there, of the undeformed scene.
 
     Attributes
     ----------
-    nodes : int
-        Nodes of the element, which integrates at them.
+    element : Element
+        The element, which integrates at its nodes.
     """
 
     is_load: ClassVar[bool] = True
     follows: ClassVar[bool] = True
     along_element: ClassVar[bool] = True
 
-    nodes: int
+    element: Element
 
     @property
     def has_potential(self) -> bool:
@@ -102,38 +102,43 @@ class FollowingSpread(Term):
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """The rotations of the element, and the place at its start."""
-        return self.nodes, 1, 0, self.nodes * self.axes, self.nodes * self.axes
+        """The rotations of the element, the place at its start, and its strains."""
+        turns, strains, _, _, loads = self.element.sizes
+        return turns, 1 + strains, 0, self.element.line_data, loads
 
     def forces(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
-        """Moments on the nodes by the forces beyond each, and minus the sum of the forces on the place."""
-        tangents, forces, carried = self._now(q, data, load)
+        """Moments on the nodes by the forces beyond each, minus the sum of the forces on the place, and on strains."""
+        tangents, forces, carried = self._now(q, u, data, load)
         moments = []
         for tangent, force in zip(tangents, carried, strict=True):
             levers = ca.cross(tangent, force) if self.space else tangent[0] * force[1] - tangent[1] * force[0]
             moments += [-m for m in ca.vertsplit(levers)]
         total = sum(forces[1:], forces[0])
-        return [*moments, *[-f for f in ca.vertsplit(total)]]
+        straining = []
+        for k in range(len(u) - 1):
+            by_strain = ca.jacobian(tangents[k], ca.vertcat(*u[1 + k]))
+            straining += [-f for f in ca.vertsplit(ca.mtimes(by_strain.T, carried[k]))]
+        return [*moments, *[-f for f in ca.vertsplit(total)], *straining]
 
     def work(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """Minus the rotated forces times the displacements of the nodes."""
-        tangents, forces, carried = self._now(q, data, load)
+        tangents, forces, carried = self._now(q, u, data, load)
         total = -ca.dot(sum(forces[1:], forces[0]), ca.vertcat(*u[0]))
-        for k, (tangent, force) in enumerate(zip(tangents, carried, strict=True)):
-            total -= ca.dot(force, tangent - data[self.axes * k : self.axes * (k + 1)])
+        for tangent, rest, force in zip(tangents, ca.horzsplit(self.element.line(data)[0]), carried, strict=True):
+            total -= ca.dot(force, tangent - rest)
         return total
 
-    def _now(self, q: list[Side], data: ca.SX, load: ca.SX) -> tuple[list[ca.SX], list[ca.SX], list[ca.SX]]:
+    def _now(
+        self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX
+    ) -> tuple[list[ca.SX], list[ca.SX], list[ca.SX]]:
         """Turned tangents and forces, and the share of the forces beyond each node that its tangent carries."""
-        (nodes, weights), n = interpolation.lobatto(self.nodes), self.axes
-        beyond = interpolation.integration(nodes, nodes) / weights
-        tangents, forces = (
-            [ca.vertcat(*self.forth(side, ca.vertsplit(part[n * k : n * k + n]))) for k, side in enumerate(q)]
-            for part in (data, load)
-        )
+        element, n = self.element, self.axes
+        beyond = element.to_points / element.weights
+        tangents = element.tangents(q, u[1:], data)
+        forces = [ca.vertcat(*self.forth(side, ca.vertsplit(load[n * k : n * k + n]))) for k, side in enumerate(q)]
         carried = [
             sum((float(beyond[j, k]) * force for j, force in enumerate(forces)), ca.SX.zeros(n))
-            for k in range(self.nodes)
+            for k in range(len(forces))
         ]
         return tangents, forces, carried
 
@@ -268,13 +273,14 @@ def loads_in(parts: Parts) -> Iterator[One]:
             yield One(AxisMoment(space), *where, axis, (GROUND, number))
         else:
             yield One(Moment(space), *where, nothing, (number,))
+    line = parts.beams.flat("tangent", "compliance")
     for e in followed_elements(scene, parts.segments):
         if parts.element.gauss:
             raise SceneError("distributed followers need integration at the nodes, found Gauss integration")
-        kind = FollowingSpread(space, parts.element.order + 1)
+        kind = FollowingSpread(space, parts.element)
         start = parts.segments.place(parts.segments.parts[parts.segments.owner[e]].start)
-        turns = tuple(rotations.turns[e].tolist())
-        yield One(kind, f"element {e}", "", parts.beams.tangent[e].ravel(), turns, (start,))
+        sides = tuple(rotations.turns[e].tolist()), (start, *parts.segments.strains[e].tolist())
+        yield One(kind, f"element {e}", "", line[e], *sides)
 
 
 def followed_elements(scene: Scene, segments: Segments) -> list[int]:

@@ -22,7 +22,7 @@ from ..mathematics.interpolation import differentiation, pieces
 from ..mathematics.linear import SparseMap
 from .body_masses import BodyMass, body_mass, euler_weights
 from .body_points import BodyPoints, points_of
-from .observed import Axes, SpringTravel, Strains
+from .observed import Axes, SpringTravel, Strains, Stretches
 from .terms import Term
 
 __all__ = ["Masses", "Observables", "masses_of"]
@@ -150,7 +150,13 @@ class _Weigher:
         of_drag = mass / time
         row, column, value = (np.array(part) for part in zip(*self.entries, strict=True))
         size = (len(self.drag), len(self.drag))
-        groups = [*self._axes(mass * length**2), *self._bodies(mass), *self._strains(time), *self._springs(time)]
+        groups = [
+            *self._axes(mass * length**2),
+            *self._bodies(mass),
+            *self._strains(time),
+            *self._stretches(time),
+            *self._springs(time),
+        ]
         return Masses(
             time=time,
             mass=mass,
@@ -287,6 +293,24 @@ class _Weigher:
         turns, data, damping = (np.concatenate(part) for part in zip(*groups, strict=True))
         places = np.zeros((len(turns), 0), dtype=np.intp)
         return [Observables(Strains(self.space, n), turns, places, data, np.zeros(damping.shape), damping)]
+
+    def _stretches(self, time: float) -> list[Observables]:
+        """Kelvin-Voigt damping of stretch and shear: their energy is half the square of the scaled strains."""
+        model, places, damping = self.model, [np.zeros(0, np.intp)], [np.zeros(0)]
+        for name in model.members:
+            member = self.scene.members[name]
+            if not member.stretches(self.scene.sections):
+                continue
+            delay = self.scene.sections[str(member.section)].damping
+            if delay:
+                places.append(model.segments.strains[model.elements_of(name)].ravel())
+                damping.append(np.full(len(places[-1]), delay / time))
+        sides, weights = np.concatenate(places)[:, None], np.concatenate(damping)
+        if not len(weights):
+            return []
+        each = np.repeat(weights[:, None], model.element.axes, axis=1)
+        nothing, data = np.zeros((len(weights), 0), np.intp), np.zeros((len(weights), 0))
+        return [Observables(Stretches(self.space), nothing, sides, data, np.zeros(each.shape), each)]
 
     def _springs(self, time: float) -> list[Observables]:
         """Dampers beside springs."""

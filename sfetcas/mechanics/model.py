@@ -20,7 +20,7 @@ from ..description.showing import named, shown
 from ..errors import SceneError
 from ..mathematics import quaternion
 from ..mathematics.arrays import Array, Index
-from .beams import Beams, Scales, beams_of, scales_of
+from .beams import ELEMENT_DATA, Beams, Scales, beams_of, scales_of
 from .connections import connections_in, touches_in
 from .elements import Element, element_by_name
 from .load_terms import loads_in
@@ -127,11 +127,9 @@ class Model:
     @functools.cached_property
     def terms(self) -> tuple[Group, ...]:
         """All terms of the Lagrangian, grouped by kind: the elements, then the connections."""
-        n, beams = len(self.rotations.turns), self.beams
-        parts = (part.reshape(n, int(np.prod(part.shape[1:]))) for part in (beams.stiffness, beams.tangent))
-        data = np.hstack(list(parts))
-        nothing, unnamed = np.zeros((n, 0), np.intp), ("",) * n
-        elements = Group(self.element, self.rotations.turns, nothing, data, (), unnamed, unnamed)
+        data = self.beams.flat(*ELEMENT_DATA)
+        unnamed = ("",) * len(data)
+        elements = Group(self.element, self.rotations.turns, self.segments.strains, data, (), unnamed, unnamed)
         return (elements, *self.connections)
 
     @functools.cached_property
@@ -288,7 +286,8 @@ def assemble(
     check_scene(scene, "assemble({}, ...)")
     if scene.rotating is not None:
         mesh, assembly = replace(mesh, places=True), "nodal"
-    element = element_by_name(f"SFET{mesh.order + 1}", scene.resolved_dimension == "space", mesh.gauss)
+    space = scene.resolved_dimension == "space"
+    element = element_by_name(f"SFET{mesh.order + 1}", space, mesh.gauss, scene.stretches)
     scales = scales or scales_of(scene)
     beams, segments = beams_of(scene, mesh, element, scales), cut_members(scene, mesh)
     if like is not None and like.element is element and like.assembly == assembly and segments.alike(like.segments):
@@ -332,11 +331,17 @@ def _blocks(model: Model) -> tuple[Block, ...]:
         blocks.append(Block("norms", free + about, "a quaternion of a free rotation is unit; held ones need no row"))
     else:
         blocks.append(Block("angles", free, f"1 for each of {counted(free, 'free rotation')}: {model.reason}"))
-    if model.positions.unknowns:
+    strains = sum(map(len, model.segments.strained.values()))
+    if strains:
+        blocks.append(
+            Block("strains", strains, "stretch and shear at the integration points of members that have them")
+        )
+    if len(model.positions.unknowns) > strains:
         why = "nodal assembly" if model.assembly == "nodal" else "nothing but guides hold the structure"
         if model.assembly != "nodal" and model.segments.retained:
             why = "springs, small members, slides or followers act upon places"
-        blocks.append(Block("displacements", len(model.positions.unknowns), f"{why}: positions are unknowns"))
+        count = len(model.positions.unknowns) - strains
+        blocks.append(Block("displacements", count, f"{why}: positions are unknowns"))
     if model.positions.rows:
         why = "one for each member" if model.assembly == "nodal" else "one for each loop and further held direction"
         blocks.append(Block("closings", len(model.positions.rows), f"{why}; the multipliers are forces"))

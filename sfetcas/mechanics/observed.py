@@ -23,7 +23,7 @@ import casadi as ca
 
 from .terms import Discrete, Side, Term
 
-__all__ = ["Axes", "SpringTravel", "Strains"]
+__all__ = ["Axes", "SpringTravel", "Strains", "Stretches"]
 
 
 @final
@@ -88,6 +88,21 @@ class Strains(Term):
             axes = data[n * n + 9 * k : n * n + 9 * k + 9]
             found += [ca.dot(axes[3 * i : 3 * i + 3], spin) for i in range(3)]
         return found
+
+
+@final
+@dataclass(frozen=True)
+class Stretches(Term):
+    """The scaled strains of a point, whose rates Kelvin-Voigt damping resists."""
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int, int]:
+        """A place; a row for each component."""
+        return 0, 1, self.axes, 0, 0
+
+    def residual(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> list[ca.SX]:
+        """The strains themselves."""
+        return u[0]
 
 
 @final

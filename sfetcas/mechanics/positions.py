@@ -65,6 +65,9 @@ def _slides(scene: Scene, name: str) -> bool:
     return node.slides and not any(drives(node, displacement) for displacement in moved)
 
 
+STRAINS = ("along", "across", "across b3")
+"""Names of the components of a strain."""
+
 Source = tuple[str, int]
 """What a displacement depends on: the chord (E), unknowns (Y) or prescribed displacement (B) of a number."""
 
@@ -177,6 +180,12 @@ class _Placing:
     def _keep(self, name: str) -> None:
         """A place by its components; on a guide with the equations that keep it there."""
         first = len(self.labels)
+        if name in self.segments.strained:
+            chosen = list(self.segments.strained[name])
+            self.retained[self.number[name], chosen] = first + np.arange(len(chosen))
+            self.labels += [f"{name}, {STRAINS[i]}" for i in chosen]
+            self.places[name] = _Place({("Y", first): self.eye[:, chosen]})
+            return
         self.retained[self.number[name]] = first + np.arange(self.axes)
         self.labels += [f"{name}.{c}" for c in "xyz"[: self.axes]]
         self.places[name] = _Place({("Y", first): self.eye})

@@ -22,7 +22,8 @@ __all__ = ["is_pressure"]
 
 def is_pressure(scene: Scene) -> bool:
     """Whether all follower loads of a scene are such pressure."""
-    if scene.resolved_dimension == "space":
+    # Followers are forces per length of the undeformed member, which is not that of the curve where it stretches.
+    if scene.resolved_dimension == "space" or scene.stretches:
         return False
     left: dict[tuple[str | None, str], float] = {}
     size = 0.0

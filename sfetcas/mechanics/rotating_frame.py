@@ -18,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from ..mathematics.arrays import Array, Index
+from .elements import Element
 from .load_terms import carried
 from .loading import Loading
 from .masses import Masses, masses_of
@@ -55,32 +56,30 @@ class CentrifugalPair(Term):
 class CentrifugalInner(Term):
     """Centrifugal potential of the inner nodes of an element, whose positions follow from the place at its start.
 
-    Data: for each node its undeformed position, mass and integration weights, then the tangents of all nodes; load: P.
+    Data: for each node its undeformed position, mass and integration weights, then tangents and compliances of all
+    nodes; load: P.
 
     Attributes
     ----------
-    nodes : int
-        Nodes of the element.
+    element : Element
     """
 
     is_load: ClassVar[bool] = True
 
-    nodes: int
+    element: Element
 
     @property
     def sizes(self) -> tuple[int, int, int, int, int]:
-        """All rotations of the element and its start."""
-        n, axes = self.nodes, self.axes
-        return n, 1, 0, (n - 2) * (axes + 1 + n) + n * axes, axes**2
+        """All rotations of the element, its start, and its strains."""
+        axes, (n, strains, *_) = self.axes, self.element.sizes
+        return n, 1 + strains, 0, (n - 2) * (axes + 1 + n) + self.element.line_data, axes**2
 
     def energy(self, q: list[Side], u: list[Side], data: ca.SX, load: ca.SX) -> ca.SX:
         """The sum over the inner nodes."""
-        n, axes = self.nodes, self.axes
+        n, axes = self.element.order + 1, self.axes
         width = axes + 1 + n
-        tangents = [ca.vertsplit(data[(n - 2) * width + axes * j :][:axes]) for j in range(n)]
-        changes = ca.horzcat(
-            *[ca.vertcat(*self.forth(side, t)) - ca.vertcat(*t) for side, t in zip(q, tangents, strict=True)]
-        )
+        line = data[(n - 2) * width :]
+        changes = ca.horzcat(*self.element.tangents(q, u[1:], line)) - self.element.line(line)[0]
         total, p = ca.SX(0), _matrix(load, axes)
         for k in range(n - 2):
             own = data[k * width : (k + 1) * width]
@@ -237,9 +236,9 @@ def _groups(model: Any, masses: Masses, rest: Array, inner_rest: Array) -> tuple
         own = np.concatenate([inner_rest[heavy], masses.inner[heavy, :, None], arms], axis=2)[:, 1:-1]
         segments = model.segments
         start = np.array([segments.place(part.start) for part in segments.parts], dtype=np.intp)[segments.owner]
-        data = joined(own, model.beams.tangent[heavy])
-        turns = model.rotations.turns[heavy]
-        found.append(_group(CentrifugalInner(space, n), turns, start[heavy][:, None], data, "element"))
+        data = joined(own, model.beams.flat("tangent", "compliance")[heavy])
+        turns, places = model.rotations.turns[heavy], np.hstack([start[heavy][:, None], segments.strains[heavy]])
+        found.append(_group(CentrifugalInner(space, element), turns, places, data, "element"))
     bodies = []
     for group in masses.observables:
         vectors = group.kind.vectors

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..description.scene import Scene
 from ..description.structure import SLIDING
+from ..mathematics import interpolation
 from ..mathematics.arrays import Array, Index
 from .mesh import Mesh
 from .rotations import end_joints
@@ -48,6 +49,11 @@ class Segments:
         Number of the segment of each element.
     ends : mapping of (str, int) to str
         Place of the first (0) and the second end (1) of each member.
+    strains : ndarray (elements, points)
+        Numbers of the places that hold the scaled strains of the points of elements in place of a displacement, -1 in
+        members that do not stretch; no points where none does.
+    strained : mapping of str to tuple of int
+        Components that are unknown at each of these places.
     """
 
     places: tuple[str, ...]
@@ -55,10 +61,13 @@ class Segments:
     parts: tuple[Segment, ...]
     owner: Index
     ends: Mapping[tuple[str, int], str]
+    strains: Index
+    strained: Mapping[str, tuple[int, ...]]
 
     def alike(self, other: Segments) -> bool:
         """Whether other segments of the same scene join the same places by as many elements."""
-        return (self.places, self.retained, self.parts) == (other.places, other.retained, other.parts)
+        mine, its = ((one.places, one.retained, one.parts, one.strained) for one in (self, other))
+        return mine == its
 
     @property
     def first(self) -> Index:
@@ -155,4 +164,28 @@ def cut_members(scene: Scene, mesh: Mesh) -> Segments:
     retained |= set(_sprung(scene)) | {load.node for load in scene.loads.values() if load.follows and load.node}
     sizes = [part.elements.stop - part.elements.start for part in parts]
     owner = np.repeat(np.arange(len(parts)), sizes)
-    return Segments(tuple(places), frozenset(retained), tuple(parts), owner, ends)
+    strains, strained = _strained(scene, mesh, len(places), len(owner))
+    return Segments(
+        (*places, *strained), frozenset(retained | set(strained)), tuple(parts), owner, ends, strains, strained
+    )
+
+
+def _strained(scene: Scene, mesh: Mesh, first: int, elements: int) -> tuple[Index, dict[str, tuple[int, ...]]]:
+    """:attr:`Segments.strains` and :attr:`Segments.strained`; places are numbered from ``first``."""
+    strained: dict[str, tuple[int, ...]] = {}
+    if not scene.stretches:
+        return np.zeros((elements, 0), np.intp), strained
+    strains, begin = np.full((elements, mesh.order + 1), -1), 0
+    points = (interpolation.gauss if mesh.gauss else interpolation.lobatto)(mesh.order + 1)[0]
+    space = scene.resolved_dimension == "space"
+    for name in mesh.cuts:
+        cuts, member = mesh.cuts[name], scene.members[name]
+        if member.stretches(scene.sections):
+            yielding = scene.sections[str(member.section)].compliance(np.array([0.5]))[0] > 0.0
+            components = tuple(np.flatnonzero(yielding[scene.center_lines[name].strained_axes(space)]).tolist())
+            for e in range(len(cuts) - 1):
+                for k, point in enumerate(points):
+                    strains[begin + e, k] = first + len(strained)
+                    strained[f"strain of {name}, element {e + 1}, at {point:.6g} of it"] = components
+        begin += len(cuts) - 1
+    return strains, strained

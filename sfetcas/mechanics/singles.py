@@ -9,6 +9,7 @@ import functools
 from typing import TypeVar
 
 import casadi as ca
+import numpy as np
 
 from ..mathematics.quaternion import product, turned
 
@@ -132,9 +133,14 @@ def weighted_product(rows: int, width: int) -> ca.Function:
 
 
 @functools.cache
-def arms_product(axes: int, turns: int, points: int) -> ca.Function:
-    """``(A, B, W) ->`` blocks ``W_jl A_j^T B_l`` for A, B with a block of ``turns`` columns for each point."""
-    a, b = ca.SX.sym("a", axes, turns * points), ca.SX.sym("b", axes, turns * points)
+def arms_product(axes: int, widths: tuple[int, ...], points: int) -> ca.Function:
+    """``(A, B, W) ->`` blocks ``W_jl A_j^T B_l`` for A, B with blocks of columns for each point.
+
+    Of each of the ``widths`` there is a block for every point, then come those of the next one.
+    """
+    columns = np.concatenate([np.repeat(np.arange(points), width) for width in widths]).tolist()
+    a, b = ca.SX.sym("a", axes, len(columns)), ca.SX.sym("b", axes, len(columns))
     w = ca.SX.sym("w", points, points)
-    whole = ca.mtimes(a.T, b) * ca.kron(w, ca.SX.ones(turns, turns))
-    return ca.Function(f"inner_{axes}_{turns}_{points}", [a, b, w], [ca.densify(whole)])
+    whole = ca.mtimes(a.T, b) * w[columns, columns]
+    name = "_".join(str(size) for size in (axes, *widths, points))
+    return ca.Function(f"inner_{name}", [a, b, w], [ca.densify(whole)])

@@ -108,10 +108,10 @@ class Stationarity:
     def moments(self, nodes: Index) -> ca.MX:
         """Moments (turns, n) that elements, and follower loads along them, take from given nodes of elements."""
         expressions = self._expressions
-        own = ca.vec(self.shares[0][1])
+        width = expressions.turns * expressions.points
+        own = ca.vec(self.shares[0][1][:width, :])
         for group, (_, values) in zip(expressions.model.terms, self.shares, strict=True):
             if group.kind.along_element:
-                width = self.shares[0][0].shape[1]
                 cells = (elements_of(group)[:, None] * width + np.arange(width)).ravel()
                 onto = sparse(cells, np.arange(len(cells)), np.ones(len(cells)), (own.shape[0], len(cells)))
                 own += times(onto, ca.vec(values[:width, :]))

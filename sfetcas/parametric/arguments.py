@@ -21,6 +21,7 @@ from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import picked
+from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
 from ..mechanics.mesh import Mesh, breaks_of
@@ -348,6 +349,10 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
     if path[0] == "sections":
         if re.match(r"EI|GJ", key):
             return "N m2"
+        if re.match(r"EA|GA", key):
+            return "N"
+        if key == "shear_factor":
+            return "1"
         return UNITS.get(key, "m")
     return UNITS.get(key, "as in the scene")
 
@@ -478,7 +483,7 @@ class Arguments:
 
     def _every(self) -> dict[str, bool]:
         count = range(len(self.model.connections))
-        names = ["stiffness", "tangent", *LOADS, *(f"data_{i}" for i in count), *(f"loads_{i}" for i in count)]
+        names = [*ELEMENT_DATA, *LOADS, *(f"data_{i}" for i in count), *(f"loads_{i}" for i in count)]
         return dict.fromkeys(names, True)
 
     def _data(self, model: Model, everything: Program) -> Active:

@@ -303,7 +303,7 @@ class _Outputs:
         self._rest = ca.reshape(nodes, 3, count)
         self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.every, members, strict=False)}
         if expressions.elements:
-            self._tangents = expressions.tangents(self._q, program.given)
+            self._tangents = expressions.tangents(self._q, places, program.given)
 
     def value(self, name: AnswerName) -> ca.MX:
         """A result as a matrix of its rows and columns."""

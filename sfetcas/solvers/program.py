@@ -19,6 +19,7 @@ from ..mathematics.active import applied
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import sparse, times
 from ..mathematics.linear import pattern
+from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import UNLOADED, State
 from ..mechanics.expressions import LOADS, Expressions, Given, moved_by
 from ..mechanics.loading import Loading
@@ -76,7 +77,7 @@ class Program:
     @staticmethod
     def _parts(given: Given) -> dict[str, ca.MX]:
         """All parts of data and loads by name; data and loads of the i-th group are ``data_i`` and ``loads_i``."""
-        parts: dict[str, ca.MX] = {"stiffness": given.stiffness, "tangent": given.tangent}
+        parts: dict[str, ca.MX] = {name: getattr(given, name) for name in ELEMENT_DATA}
         parts |= {f"data_{i}": part for i, part in enumerate(given.data)}
         parts |= {name: getattr(given, name) for name in LOADS}
         return parts | {f"loads_{i}": part for i, part in enumerate(given.loads)}
@@ -428,10 +429,10 @@ class Program:
 
 def data_of(model: Model) -> dict[str, Array]:
     """The data of a model by name, each as a vector, dimensionless; those of the i-th group are ``data_i``."""
-    found = {"stiffness": model.beams.stiffness.ravel(), "tangent": model.beams.tangent.ravel()}
+    found = {name: getattr(model.beams, name).ravel() for name in ELEMENT_DATA}
     return found | {f"data_{i}": group.data.ravel() for i, group in enumerate(model.connections)}
 
 
 def is_data(name: str) -> bool:
     """Whether the name of a part of what is given is that of data, not of loads or motions."""
-    return name in ("stiffness", "tangent") or name.startswith("data_")
+    return name in ELEMENT_DATA or name.startswith("data_")

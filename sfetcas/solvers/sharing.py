@@ -93,7 +93,7 @@ def _axial(equations: Equations, state: State, loading: Loading, loose: Array, r
     acting, nothing = equations.effective(state, loading), loading.scaled(0.0)
     kinds = [(model.scene.members[part.member].type == "rigid") == rigid for part in model.segments.parts]
     chosen = np.array(kinds, dtype=bool)[model.segments.owner]
-    along = (turned_tangents(model, state.q) / np.sqrt(model.beams.weight)[..., None])[chosen]
+    along = (turned_tangents(model, state) / np.sqrt(model.beams.weight)[..., None])[chosen]
 
     def force(pulls: Array, spread: Array | float = 0.0) -> Array:
         return np.asarray(((spread + pulls[model.segments.owner[chosen]][:, None, :]) * along).sum(axis=2).ravel())
