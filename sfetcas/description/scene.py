@@ -582,11 +582,26 @@ def _check_contacts(scene: Scene) -> None:
                     f"found the {scene.members[member].type} member {member!r}, accepted: {accepted}",
                     ("contacts", name),
                 )
+            _check_stretching_contact(scene, name, member)
             line = scene.center_lines[member]
             try:
                 check_start(obstacle(contact, space), line.positions, line.tangents, scene.size)
             except SceneError as error:
                 raise SceneError(f"member {member!r} {error}", ("contacts", name)) from None
+
+
+def _check_stretching_contact(scene: Scene, name: str, member: str) -> None:
+    """Refuse contact that is solved for members whose sections stay across their centre line, and keep its length."""
+    record, contact = scene.members[member], scene.contacts[name]
+    if not record.stretches(scene.sections):
+        return
+    if scene.sections[str(record.section)].compliance(0.5)[0, 1:].any():
+        found, accepted = "shears", "members that do not shear: a section without GA2, GA3 and shear"
+    elif contact.radius is not None:
+        found, accepted = "stretches", f"obstacles that are not round, as this {contact.type} is, or no stretch"
+    else:
+        return
+    raise SceneError(f"found the member {member!r}, which {found}, accepted: {accepted}", ("contacts", name))
 
 
 def _check_quantity(scene: Scene, quantity: str, at: float | None, *where: str) -> None:

@@ -237,12 +237,23 @@ class Fields:
         moment[inside] += (pressed - np.einsum("ni,ni->n", moment[inside], axes))[:, None] * axes
         # m' = -t x n, and the axis turns with the member on the obstacle.
         turning = np.einsum("ni,ni->n", moment[inside], (last - first) / spans[:, None])
-        shear = -((after - before) / spans - turning) * length
+        shear = (
+            -((after - before) / spans - turning) * length / (1.0 + self._stretched(touch.member, here, force[inside]))
+        )
         if self._curvature(touch):
             along = self._along_round(touch, here, pressed)
             force[inside] = along[:, None] * tangents + shear[:, None] * across
         else:
             force[inside] += (shear - np.einsum("ni,ni->n", force[inside], across))[:, None] * across
+
+    def _stretched(self, member: str, x: Array, force: Array) -> Array | float:
+        """Strain (n,) along a member that does not shear, by the section force (n, 3), dimensionless."""
+        scene = self.model.scene
+        record = scene.members[member]
+        if not record.stretches(scene.sections):
+            return 0.0
+        compliance = scene.sections[str(record.section)].compliance(x)[:, 0] * self.model.scales.force
+        return np.asarray(compliance * np.einsum("ni,ni->n", force, self.tangents(member, x)))
 
     def _along_round(self, touch: Touch, x: Array, pressed: Array) -> Array:
         """Force along a stretch on a circle: that before it, what acts along it, and what bends round."""

@@ -144,7 +144,7 @@ def stretched(equations: Equations, point: Point, loose: Array | None = None) ->
     return FULLY + named_in(equations, loose) if loose.size else ""
 
 
-FULLY = "fully stretched between held points, where an inextensible member takes any force: "
+FULLY = "fully stretched between held points, where an inextensible member takes any force (EA lets it stretch): "
 
 NEARLY = 1e-3
 """Singular values of nearly redundant rows, share of the largest: members may be about to become straight."""
