@@ -101,6 +101,7 @@ def every_kind():
         "nodes": {"A": {"position": [0, 0], "support": "hinge"}, "B": {"position": [1, 0]}},
         "members": {"m": {"nodes": ["A", "B"], "section": "s"}},
     }
+    stretching = {"s": {**plane["sections"]["s"], "stretch": True}}
     force = {"f": {"type": "force", "node": "B", "value": [0, -1]}}
     stopped = {"k": {"node": "A", "stiffness": 2.0, "stop": [-0.1, 0.1]}}
     pulled = {"k": {"type": "translational", "node": "B", "anchor": [1, 1], "stiffness": 1.0}}
@@ -109,7 +110,7 @@ def every_kind():
     moved = {"m": {"node": "A", "displacement": [0, 0.1], "rotation": 0.2}}
     for table in (
         {**plane, "springs": stopped, "loads": force},
-        {**clamped, "springs": pulled, "motions": moved},
+        {**clamped, "sections": stretching, "springs": pulled, "motions": moved},
         {**clamped, "contacts": floor, "loads": force},
     ):
         yield solve(Scene.from_dict(table)).last
