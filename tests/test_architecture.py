@@ -30,6 +30,7 @@ ORDER = [
     "mathematics.threads",
     "mathematics.quaternion",
     "mathematics.interpolation",
+    "mathematics.piecewise",
     "mathematics.curves",
     "mathematics.nlp",
     "mathematics.source",

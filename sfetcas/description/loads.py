@@ -150,15 +150,15 @@ class History(Record):
     def _check_spline(self) -> None:
         if self.polynomial is not None:
             raise SceneError("found 'spline' with polynomials, accepted: with values", ("interpolation",))
-        if not all(isfinite(c) for terms in self._pieces for c in terms):
+        if not all(isfinite(c) for terms in self.pieces for c in terms):
             message = (
                 "found t or values too far apart for a spline in double precision, accepted: linear, or other units"
             )
             raise SceneError(message, ("interpolation",))
 
     @cached_property
-    def _pieces(self) -> tuple[tuple[float, ...], ...]:
-        """Coefficients of each interval in the fraction of it."""
+    def pieces(self) -> tuple[tuple[float, ...], ...]:
+        """For each interval of ``t`` coefficients c0, c1, ... in its fraction, from 0 to 1, dimensionless."""
         if self.polynomial is not None:
             return self.polynomial
         assert self.value is not None
@@ -192,7 +192,7 @@ class History(Record):
         x = (t - self.t[i]) / (self.t[i + 1] - self.t[i])
         if self.polynomial is None and self.interpolation == "linear":
             return self._value(i) * (1.0 - x) + self._value(i + 1) * x
-        return sum(c * x**k for k, c in enumerate(self._pieces[i]))
+        return sum(c * x**k for k, c in enumerate(self.pieces[i]))
 
     def rate(self, t: float, side: Literal[-1, 1] = 1) -> float:
         """The derivative of the factor at t, zero outside of the history.
@@ -211,7 +211,7 @@ class History(Record):
             return 0.0
         span = self.t[i + 1] - self.t[i]
         x = (t - self.t[i]) / span
-        return sum(k * c * x ** (k - 1) for k, c in enumerate(self._pieces[i]) if k) / span
+        return sum(k * c * x ** (k - 1) for k, c in enumerate(self.pieces[i]) if k) / span
 
     def between(self, begin: float, end: float) -> tuple[float, ...]:
         """The factor as a polynomial between two times in one interval of ``t``, or outside of all.
@@ -226,10 +226,10 @@ class History(Record):
         span = self.t[i + 1] - self.t[i]
         first, slope = (begin - self.t[i]) / span, (end - begin) / span
         found = [0.0]
-        for c in reversed(self._pieces[i]):
+        for c in reversed(self.pieces[i]):
             found = [first * a + slope * b for a, b in zip([*found, 0.0], [0.0, *found], strict=True)]
             found[0] += c
-        return tuple(found[: len(self._pieces[i])])
+        return tuple(found[: len(self.pieces[i])])
 
     def jumps(self) -> Iterator[tuple[float, float, float]]:
         """Where the factor or its rate jumps by more than rounding: t, jump of the factor, jump of the rate in 1/s.
@@ -239,7 +239,7 @@ class History(Record):
         largest, fastest = self.rounding
         last = len(self.t) - 1
         for i, t in enumerate(self.t):
-            step = self._pieces[i][0] - sum(self._pieces[i - 1]) if 0 < i < last else 0.0
+            step = self.pieces[i][0] - sum(self.pieces[i - 1]) if 0 < i < last else 0.0
             kink = self.rate(t, 1) - self.rate(t, -1)
             step, kink = step if abs(step) > largest else 0.0, kink if abs(kink) > fastest else 0.0
             if step or kink:
@@ -248,11 +248,11 @@ class History(Record):
     @cached_property
     def kinks(self) -> tuple[float, ...]:
         """Values of t where the factor or its first or second derivative jumps, by more than six-digit rounding."""
-        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._pieces[i])) for i in range(len(self.t) - 1)), 0.0)
+        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self.pieces[i])) for i in range(len(self.t) - 1)), 0.0)
         found = []
         for i, t in enumerate(self.t):
-            left = (self._pieces[i - 1], self.t[i] - self.t[i - 1]) if i else None
-            right = (self._pieces[i], self.t[i + 1] - t) if i < len(self.t) - 1 else None
+            left = (self.pieces[i - 1], self.t[i] - self.t[i - 1]) if i else None
+            right = (self.pieces[i], self.t[i + 1] - t) if i < len(self.t) - 1 else None
             span = min(piece[1] for piece in (left, right) if piece) if left or right else 1.0
             jumps = [
                 (_derivative(*right, 0.0, k) if right else 0.0) - (_derivative(*left, 1.0, k) if left else 0.0)
@@ -283,7 +283,7 @@ class History(Record):
         """Bounds below which a jump is rounding of the coefficients: of the factor, and of its rate in 1/s."""
         size, rate = abs(self.factor(self.t[0])), 0.0
         for i, (left, right) in enumerate(pairwise(self.t)):
-            terms = self._pieces[i]
+            terms = self.pieces[i]
             size = max(size, sum(map(abs, terms)))
             rate = max(rate, sum(k * abs(c) for k, c in enumerate(terms)) / (right - left))
         return tolerances.WRITTEN * size, tolerances.WRITTEN * rate

@@ -21,6 +21,7 @@ from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import picked
+from ..mathematics.piecewise import piecewise
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
 from ..mechanics.mesh import Mesh, breaks_of
@@ -235,7 +236,10 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
     path = name.split(".")
     if name == FACTOR:
         default = float(scene.analysis.steps[-1])
-        return Argument(name, (default,), "1", "factor of all loads and motions without a history", low, high)
+        meaning = "factor of all loads and motions without a history"
+        if scene.histories and scene.analysis.type != "dynamic":
+            meaning += "; histories that are no arguments are evaluated at it"
+        return Argument(name, (default,), "1", meaning, low, high)
     if path[0] == "histories" and len(path) == 2 and path[1] in scene.histories:
         # Of a motion what it begins with.
         when = 0.0 if scene.analysis.type == "dynamic" else float(scene.analysis.steps[-1])
@@ -532,6 +536,10 @@ class Arguments:
         name = FACTOR if group is None else f"histories.{group}"
         if name in self._names:
             return p[self._names.index(name)]
+        if group is not None and FACTOR in self._names and self._scene.analysis.type != "dynamic":
+            history = self._scene.histories[group]
+            ends = history.factor(history.t[0]), history.factor(history.t[-1])
+            return piecewise(p[self._names.index(FACTOR)], history.t, history.pieces, ends)
         # What is no argument stands as it would by default.
         return argument(self._scene, name).default[0]
 
