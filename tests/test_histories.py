@@ -223,6 +223,9 @@ def test_a_function_that_rests_at_its_ends_drives_a_motion():
         ((lambda t: [t], 0, 1), r"History.of.the function at t = 0: found \[0.0\], accepted: a number"),
         ((math.sin, 1, 1), r"History.of: found 1 to 1, accepted: a start before the end"),
         ((math.sin, 0, math.inf), r"History.of.end: found inf, accepted: a finite number"),
+        ((math.sin, 0, 1e-320), r"History.of: found 0.0 to 1e-320, accepted: ends with numbers between them"),
+        ((math.sin, 1, math.nextafter(1, 2)), r"History.of: found 1.0 to 1.0000000000000002, accepted: ends with"),
+        ((math.sin, -1e308, 1e308), r"History.of: found -1e\+308 to 1e\+308, accepted: ends with numbers"),
         ((VALUE, 0, 1), r"History.of: found \[0.0, 0.4, .*\], accepted: a function of t"),
     ],
 )

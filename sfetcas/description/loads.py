@@ -89,6 +89,9 @@ class History(Record):
         )
         if not start < end:
             raise SceneError(f"found {start:g} to {end:g}, accepted: a start before the end", (name,))
+        if not np.spacing(max(abs(start), abs(end))) < APART * (end - start) < np.inf:
+            accepted = "ends with numbers between them to be told apart in double precision"
+            raise SceneError(f"found {start!r} to {end!r}, accepted: {accepted}", (name,))
         if not FINEST <= tolerance <= 1.0:
             raise SceneError(f"found {tolerance:g}, accepted: from {FINEST:g} to 1", (name, "tolerance"))
         if not callable(function):
@@ -302,6 +305,9 @@ def _given(value: Any, where: tuple[str, ...]) -> float:
 
 FINEST = 1e-12
 """Least tolerance of a history made from a function: rounding of its spline leaves less."""
+
+APART = 1e-6
+"""Share of the interval of a function that still holds numbers of double precision."""
 
 MOST_INTERVALS = 100_000
 """Of a history made from a function."""
