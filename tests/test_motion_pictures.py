@@ -143,7 +143,7 @@ def test_times_outside_the_motion_are_refused(motions):
         with pytest.raises(SceneError, match=r"accepted: times from 0 to 0\.3 s"):
             motions["plane"].between([0.1, time])
     for times in ("a", [[0.0, 0.1]], {}):
-        with pytest.raises(SceneError, match="^found .*, accepted: times from 0 to"):
+        with pytest.raises(SceneError, match=r"^found .*, accepted: times from 0 to"):
             motions["plane"].between(times)
 
 
