@@ -102,7 +102,7 @@ def _key(record: type[Record], entry: typing.Any) -> Key:
     else:
         value = plain(field.get_default(call_default_factory=True))
         default = f"`{json.dumps(value)}`" if value not in (None, {}, []) else words.rstrip(".")
-    return Key(entry.name, entry.type, " ".join(meaning.split()), default)
+    return Key(field.alias or entry.name, entry.type, " ".join(meaning.split()), default)
 
 
 def _markdown(text: str) -> str:

@@ -11,7 +11,7 @@ from math import isfinite, perm
 from typing import Any, Literal, overload
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -335,6 +335,10 @@ class Load(Record):
         Instead of a node: name of the member that it acts on.
     at : 1
         On a member, unless distributed: fraction of its length.
+    from_ : 1
+        Of a distributed load: fraction of the length where it begins.  In Python ``from_``, in files ``from``.
+    to : 1
+        Of a distributed load: fraction of the length where it ends.
     value : (3,), N, N m or N/m, fixed axes of the undeformed scene
         The load.  A moment about z may be one number.
     frame : text
@@ -351,6 +355,8 @@ class Load(Record):
     node: str | None = None
     member: str | None = None
     at: Fraction | None = None
+    from_: Fraction = Field(default=0.0, alias="from")
+    to: Fraction = 1.0
     value: Turn
     frame: Literal["fixed", "follower", "section"] = "fixed"
     profile: Varying | None = None
@@ -366,6 +372,9 @@ class Load(Record):
             raise SceneError(f"found 'section', accepted of a {self.type}: fixed or follower", ("frame",))
         if self.type != "distributed" and self.profile is not None:
             raise SceneError(f"not accepted with a {self.type}; only a distributed load has a profile", ("profile",))
+        for key, value, default in (("from", self.from_, 0.0), ("to", self.to, 1.0)):
+            if self.type != "distributed" and value != default:
+                raise SceneError(f"not accepted with a {self.type}; a distributed load begins and ends", (key,))
         return self
 
     def _check_place(self) -> None:
@@ -386,9 +395,19 @@ class Load(Record):
         if self.member is None:
             raise SceneError("the key 'member' is missing: a distributed load acts along a member")
         if self.at is not None:
-            raise SceneError(
-                f"found {self.at:g}, not accepted: a distributed load acts along all of its member", ("at",)
-            )
+            accepted = "accepted: 'from' and 'to', between which a distributed load acts"
+            raise SceneError(f"found {self.at:g}, {accepted}", ("at",))
+        if not self.to - self.from_ > tolerances.DECIMAL:
+            raise SceneError(f"found {self.from_:g} to {self.to:g}, accepted: an end after the beginning", ("to",))
+
+    @property
+    def part(self) -> tuple[float, float]:
+        """Where a distributed load begins and ends, fractions (2,) of the length of its member."""
+        return self.from_, self.to
+
+    def inside(self, x: Array) -> Array:
+        """Whether fractions x (any shape) of the length of its member are where a distributed load acts."""
+        return (x > self.from_) & (x < self.to)
 
     @property
     def follows(self) -> bool:

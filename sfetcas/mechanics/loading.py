@@ -15,7 +15,7 @@ import numpy as np
 from ..description.scene import Load, Motion, Scene
 from ..description.sections import evaluate
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers, plus, unit
+from ..mathematics.arrays import Array, numbers, plus, unit, values_of
 from ..mathematics.interpolation import pieces
 from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
@@ -229,7 +229,9 @@ class _Writer:
         else:
             x = self.places(str(load.member))
             profile = np.ones(x.shape) if load.profile is None else evaluate(load.profile, x.ravel()).reshape(x.shape)
-            density = profile[..., None] * self._along(load, x)
+            # An element is within its part as a whole or not at all: elements end there.
+            within = load.inside(values_of(x).mean(axis=1))[:, None]
+            density = (profile * within)[..., None] * self._along(load, x)
             self.spread(group, str(load.member), density, follows=load.follows)
 
     def _along(self, load: Load, x: Array) -> Array:
@@ -322,6 +324,7 @@ class _Writer:
         else:
             x, w = quadrature(self.scene, member)
             profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+            profile = profile * load.inside(x)
             lever = lever_along(self.scene, member, profile, x, w)
         self._add_lever(group, member, lever, numbers(load.vector))
 

@@ -24,7 +24,8 @@ def is_pressure(scene: Scene) -> bool:
     """Whether all follower loads of a scene are such pressure."""
     if scene.resolved_dimension == "space":
         return False
-    left: dict[tuple[str | None, str], float] = {}
+    # By history, of what ends at a node, or within a member at a fraction of its length.
+    left: dict[tuple[str | None, str | tuple[str, float]], float] = {}
     size = 0.0
     for load in scene.loads.values():
         if load.frame == "fixed" or load.type == "moment":
@@ -34,12 +35,14 @@ def is_pressure(scene: Scene) -> bool:
             return False
         size = max(size, abs(pressure))
         joints = end_joints(scene, scene.members[str(load.member)])
-        for (node, joint), way in zip(joints, (-1.0, 1.0), strict=True):
+        for (node, joint), at, whole, way in zip(joints, load.part, (0.0, 1.0), (-1.0, 1.0), strict=True):
             if joint == "slot" or joint == "slider":
                 return False
-            left[load.history, node] = left.get((load.history, node), 0.0) + way * pressure
+            end = node if at == whole else (str(load.member), at)
+            left[load.history, end] = left.get((load.history, end), 0.0) + way * pressure
     return all(
-        abs(p) <= tolerances.DECIMAL * size or scene.nodes[node].support != "free" for (_, node), p in left.items()
+        abs(p) <= tolerances.DECIMAL * size or (isinstance(end, str) and scene.nodes[end].support != "free")
+        for (_, end), p in left.items()
     )
 
 
