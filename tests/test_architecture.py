@@ -49,6 +49,7 @@ ORDER = [
     "description.columns",
     "description.answers",
     "description.matrices",
+    "description.formulas",
     "description.sections",
     "description.shapes",
     "description.changes",

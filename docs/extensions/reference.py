@@ -50,6 +50,10 @@ TABLES = {
         "Varying numbers as polynomials",
         "`{ polynomial = [...] }` instead of a number of a section or a profile",
     ),
+    "Formula": (
+        "Varying numbers by a formula",
+        '`"..."` instead of a number of a section or a profile, and for a curvature of a shape',
+    ),
 }
 """Records that a scene is written with, by their heading and where they stand, in the order of the page."""
 

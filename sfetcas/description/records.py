@@ -32,6 +32,7 @@ __all__ = [
     "enumerated",
     "keys_of",
     "listed",
+    "listed_numbers",
     "name_of",
     "nearest",
     "number",
@@ -213,7 +214,14 @@ def _fraction(value: float) -> float:
     return value
 
 
-def _numbers(value: Any) -> tuple[float, ...]:
+def listed_numbers(value: Any) -> tuple[float, ...]:
+    """One or more finite numbers from a list, a tuple or an array.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
     entries = tuple(number(entry) for entry in listed(value, "a list of numbers"))
     if not entries:
         raise ValueError("found an empty list, accepted: a list of numbers")
@@ -248,7 +256,7 @@ Turn = Annotated[float | tuple[float, float, float], BeforeValidator(turn)]
 Fraction = Annotated[float, BeforeValidator(number), AfterValidator(_fraction)]
 """A fraction of a length, from 0 to 1."""
 
-Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(listed_numbers)]
 """One or more finite numbers."""
 
 Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]

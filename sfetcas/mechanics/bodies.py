@@ -128,7 +128,7 @@ def _edges(scene: Scene, name: str) -> Array:
     member, line = scene.members[name], scene.center_lines[name]
     spread = [load for load in scene.loads.values() if load.member == name and load.type == "distributed"]
     profiles = [load.profile for load in spread if load.profile is not None]
-    kinks, even = [*line.breaks, *(kink for profile in profiles for kink in breaks(profile))], not profiles
+    kinks, even = [*line.breaks, *(kink for profile in profiles for kink in breaks(profile, line.length))], not profiles
     kinks += [end for load in spread for end in load.part]
     if member.section is not None:
         section = scene.sections[member.section]

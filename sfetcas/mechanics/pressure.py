@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import tolerances
+from ..description.formulas import Formula
 from ..description.loads import Load
 from ..description.scene import Scene
 from ..description.sections import Table
@@ -55,6 +56,8 @@ def _pressure(scene: Scene, load: Load) -> float | None:
         profile = load.profile.value if len(set(load.profile.value)) == 1 else None
     elif load.profile is None or isinstance(load.profile, float):
         profile = (1.0 if load.profile is None else load.profile,)
+    elif isinstance(load.profile, Formula):
+        profile = None
     else:
         profile = load.profile.polynomial if not any(load.profile.polynomial[1:]) else None
     line = scene.center_lines[str(load.member)]

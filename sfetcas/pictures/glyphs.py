@@ -394,7 +394,8 @@ def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> 
     """Small arrows onto the member with a line over their ends."""
     assert load.member is not None
     x = np.linspace(*load.part, 49)
-    profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+    length = sketch.scene.center_lines[load.member].length
+    profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x, length)
     peak = float(np.abs(profile).max())
     if peak == 0.0:
         return
