@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .codegen.folder import export as export
     from .codegen.timestep import TimeStep as TimeStep
     from .description.contacts import Contact as Contact
+    from .description.formulas import Formula as Formula
     from .description.scene import Analysis as Analysis
     from .description.scene import Expect as Expect
     from .description.scene import History as History
@@ -135,6 +136,7 @@ _PUBLIC = {
     "description.contacts": "Contact",
     "description.scene": "Analysis Expect History Load Member Motion Node Scene Until",
     "description.scenefile": "dump load",
+    "description.formulas": "Formula",
     "description.sections": "CrossSection Polynomial Table",
     "description.shapes": "Arc Curvature Helix Spline Straight",
     "description.springs": "Spring",

@@ -193,6 +193,13 @@ def test_an_animation_shows_itself_in_a_notebook_and_writes_a_file(tmp_path):
         made(scenes.cantilever()).animate()
     with pytest.raises(SceneError, match="colour: found 'red'"):
         solution.animate(colour="red")
+    missing = tmp_path / "missing" / "out.gif"
+    with pytest.raises(SceneError, match=r"out.gif: found no folder .*missing, accepted: a file in a folder that exi"):
+        solution.animate(missing)
+    with pytest.raises(SceneError, match="found no folder"):
+        solution.animate().save(missing)
+    with pytest.raises(SceneError, match="found no folder"):
+        save_figure(Figure(), missing.with_suffix(".png"))
 
 
 # -- files for ParaView ------------------------------------------------------------------------------

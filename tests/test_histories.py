@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from test_codegen import built, needs_compiler, said
 
-from sfetcas import History, Scene, SceneError, dump, load, parametric, solve
+from sfetcas import History, Scene, SceneError, assemble, dump, export, load, parametric, solve, solve_model
 
 T = [0.0, 0.3, 1.0, 1.2, 2.0]
 VALUE = [0.0, 0.4, 1.0, 0.8, 0.5]
@@ -222,6 +223,9 @@ def test_a_function_that_rests_at_its_ends_drives_a_motion():
         ((lambda t: [t], 0, 1), r"History.of.the function at t = 0: found \[0.0\], accepted: a number"),
         ((math.sin, 1, 1), r"History.of: found 1 to 1, accepted: a start before the end"),
         ((math.sin, 0, math.inf), r"History.of.end: found inf, accepted: a finite number"),
+        ((math.sin, 0, 1e-320), r"History.of: found 0.0 to 1e-320, accepted: ends with numbers between them"),
+        ((math.sin, 1, math.nextafter(1, 2)), r"History.of: found 1.0 to 1.0000000000000002, accepted: ends with"),
+        ((math.sin, -1e308, 1e308), r"History.of: found -1e\+308 to 1e\+308, accepted: ends with numbers"),
         ((VALUE, 0, 1), r"History.of: found \[0.0, 0.4, .*\], accepted: a function of t"),
     ],
 )
@@ -233,3 +237,112 @@ def test_functions_that_cannot_be_followed_are_refused(arguments, message):
 def test_what_the_function_raises_is_its_own():
     with pytest.raises(ZeroDivisionError):
         History.of(lambda t: 1.0 / t, 0.0, 1.0)
+
+
+# -- over the factor as a parameter -----------------------------------------------------------------
+
+COURSES = {
+    "linear": {"t": [0.2, 0.5, 1.0], "value": [0.1, 0.7, 0.4]},
+    "spline": {"t": T, "value": VALUE, "interpolation": "spline"},
+    # It jumps at 0.6.
+    "polynomial": {"t": [0.0, 0.6, 2.0], "polynomial": [[0.1, 0.5, -0.2, 0.3], [0.9, -0.4]]},
+    "one value": {"t": [0.4], "value": [0.6]},
+}
+
+
+def driven(course):
+    """A clamped rod whose one end is turned, beside loads with and without a history and gravity."""
+    return Scene.from_dict(
+        {
+            "gravity": [0, -0.3],
+            "sections": {"strip": {"EI3": 1.0, "rhoA": 1.0}},
+            "nodes": {"A": {"position": [0, 0], "support": "clamped"}, "B": {"position": [1, 0]}},
+            "members": {"beam": {"nodes": ["A", "B"], "section": "strip", "elements": 2}},
+            "loads": {
+                "tip": {"type": "force", "node": "B", "value": [0.2, 2], "history": "on"},
+                "wind": {"type": "distributed", "member": "beam", "frame": "section", "value": [0, 0.5, 0],
+                         "history": "on"},
+                "end": {"type": "moment", "node": "B", "value": 0.3},
+            },
+            "motions": {"turn": {"node": "A", "rotation": 0.4, "history": "on"}},
+            "histories": {"on": COURSES[course]},
+            "analysis": {"steps": [0.9]},
+        }
+    )  # fmt: skip
+
+
+ANSWERS = ["nodes.B.position", "reactions.A.moment", "energy.elastic"]
+
+
+@pytest.mark.parametrize("course", COURSES)
+def test_histories_are_evaluated_at_a_factor_that_is_a_parameter(course):
+    scene = driven(course)
+    made = parametric(scene, ["factor"], ANSWERS)
+    mesh, assembly = made.solver.model.mesh, made.solver.model.assembly
+    # Before, within, at a knot, and after the history.
+    for factor in (0.1, 0.3, 0.6, 0.7, 2.5):
+        answer = made.solve({"factor": factor})
+        wanted = solve_model(assemble(scene, mesh, assembly=assembly), factor)
+        np.testing.assert_allclose(answer["nodes.B.position"], wanted.position("B"), atol=1e-9)
+        assert answer["energy.elastic"] == pytest.approx(wanted.energy["elastic"], abs=1e-9)
+
+
+@pytest.mark.parametrize("course", COURSES)
+def test_derivatives_by_the_factor_go_through_histories(course):
+    made = parametric(driven(course), ["factor", "loads.tip.value"], ANSWERS)
+    h = 1e-4
+    for factor in (0.1, 0.35, 0.7):
+        answer = made.solve({"factor": factor})
+        ends = [made.solve({"factor": factor + side * h}) for side in (-1, 1)]
+        for name in ANSWERS:
+            low, high = (end.answers[name] for end in ends)
+            # Central differences: h^2 of third derivatives of about 10.
+            np.testing.assert_allclose(answer.jacobian[name]["factor"], (high - low) / (2 * h), atol=1e-6)
+            low, high = (end.jacobian[name]["factor"] for end in ends)
+            second = answer.hessian(name)["factor"]["factor"]
+            np.testing.assert_allclose(second, (high - low) / (2 * h), atol=1e-5)
+
+
+def test_a_derivative_at_the_end_of_a_history_is_that_within():
+    scene = driven("linear")
+    within = parametric(scene, ["factor"], ANSWERS).solve({"factor": 1.0 - 1e-9})
+    end = parametric(scene, ["factor"], ANSWERS).solve({"factor": 1.0})
+    for name in ANSWERS:
+        # What changes over 1e-9.
+        np.testing.assert_allclose(end.jacobian[name]["factor"], within.jacobian[name]["factor"], atol=1e-7)
+
+
+def test_a_history_that_is_a_parameter_itself_does_not_follow_the_factor():
+    scene = driven("linear")
+    made = parametric(scene, ["factor", "histories.on"], ANSWERS)
+    on = scene.histories["on"].factor(0.3)
+    both = made.solve({"factor": 0.3, "histories.on": on})
+    one = parametric(scene, ["factor"], ANSWERS).solve({"factor": 0.3})
+    np.testing.assert_allclose(both["nodes.B.position"], one["nodes.B.position"], atol=1e-9)
+    rate = both.jacobian["nodes.B.position"]
+    total = rate["factor"] + scene.histories["on"].rate(0.3) * rate["histories.on"]
+    np.testing.assert_allclose(one.jacobian["nodes.B.position"]["factor"], total, atol=1e-9)
+
+
+@needs_compiler
+@pytest.mark.parametrize("course", ["linear", "spline", "polynomial"])
+def test_histories_in_c_follow_the_factor(course, tmp_path):
+    scene = driven(course)
+    made = export(scene, tmp_path / "c", name="arm", arguments=["factor"], results=ANSWERS, sensitivities=True)
+    factors = (0.1, 0.3, 0.6, 0.7, 2.5)
+    text = '#include "arm.h"\n#include <stdio.h>\nstatic arm_memory m;\n'
+    text += "static double x[ARM_STATE], p[1], r[ARM_RESULTS], d[ARM_RESULTS];\n"
+    text += f"static const double factors[] = {{{', '.join(map(str, factors))}}};\n"
+    text += "int main(void){int i, k; for (k = 0; k < 5; ++k) { p[0] = factors[k];\n"
+    text += "arm_solve(&m, p, x, 0, r, 0); arm_sensitivities(&m, p, x, d);\n"
+    text += 'for (i = 0; i < ARM_RESULTS; ++i) printf("%.17g %.17g ", r[i], d[i]);}\nreturn 0;}\n'
+    (tmp_path / "c" / "every.c").write_text(text)
+    program = built(tmp_path / "c", "arm", source="every.c")
+    found = np.array([float(x) for x in said(program).split()]).reshape(len(factors), -1, 2)
+    for factor, here in zip(factors, found, strict=True):
+        outcome, results = made.solve(np.array([factor]))
+        slopes = made.sensitivities([factor], outcome.state, made.prepare([factor]))
+        np.testing.assert_array_equal(here.T, [results, np.array(slopes).ravel()])
+    # As the static answers of the scene itself, on the same mesh.
+    wanted = [solve_model(assemble(scene, made.model.mesh), factor).position("B") for factor in factors]
+    np.testing.assert_allclose(found[:, :3, 0], wanted, atol=1e-9)

@@ -142,6 +142,9 @@ def test_times_outside_the_motion_are_refused(motions):
     for time in (-0.01, 0.31):
         with pytest.raises(SceneError, match=r"accepted: times from 0 to 0\.3 s"):
             motions["plane"].between([0.1, time])
+    for times in ("a", [[0.0, 0.1]], {}):
+        with pytest.raises(SceneError, match=r"^found .*, accepted: times from 0 to"):
+            motions["plane"].between(times)
 
 
 def test_a_motion_of_idas_is_drawn_through_its_answers():

@@ -126,9 +126,9 @@ def test_many_steps_are_one_entry_of_the_legend():
     assert [text for text in texts(figure) if "factor" in text] == ["39 other factors, 0.02 to 0.98", "bold: factor 1"]
 
 
-@pytest.mark.parametrize("steps", [[], [1], [-2], [0, 3]])
+@pytest.mark.parametrize("steps", [[], [1], [-2], [0, 3], 0, "last", [0.5]])
 def test_steps_that_are_not_there_are_refused(steps):
-    with pytest.raises(SceneError, match="accepted: numbers of steps from 0 to 0"):
+    with pytest.raises(SceneError, match="accepted: a list of numbers of steps from 0 to 0"):
         picture(beam(), steps=steps)
 
 

@@ -9,7 +9,7 @@ import pytest
 import sfetcas
 from sfetcas import Scene, solve
 from sfetcas.description.answers import ANSWERS, answers_table
-from sfetcas.description.records import plain
+from sfetcas.description.records import name_of, plain
 from sfetcas.equilibria.quantities import value_of
 
 pytest.importorskip("numpydoc")
@@ -35,7 +35,7 @@ def test_tables_have_each_key_of_each_record_in_their_order():
     fields = [
         (name, key)
         for name in reference.TABLES
-        for key, field in RECORDS[name].model_fields.items()
+        for key, field in ((field.alias or key, field) for key, field in RECORDS[name].model_fields.items())
         # The type of a shape stands in the key `shape` and in the heading of its table.
         if not (key == "type" and is_type_of_shape(field))
     ]
@@ -44,7 +44,7 @@ def test_tables_have_each_key_of_each_record_in_their_order():
 
 @each
 def test_key_says_what_is_meant_all_that_is_accepted_and_what_it_is_without(record, key):
-    said, field = KEYS[record, key], RECORDS[record].model_fields[key]
+    said, field = KEYS[record, key], RECORDS[record].model_fields[name_of(RECORDS[record], key)]
     assert said.kind
     assert said.meaning
     assert reference.choices(field.annotation) <= set(re.findall(r"``\"?([\w-]+)", said.meaning))

@@ -304,7 +304,7 @@ def test_values(place, value, sentence):
         ),
         (
             {**DISTRIBUTED, "loads/tip/at": 0.5},
-            "loads.tip.at: found 0.5, not accepted: a distributed load acts along",
+            "loads.tip.at: found 0.5, accepted: 'from' and 'to'",
         ),
         ({**DISTRIBUTED, "loads/tip/value": 2.0}, "loads.tip.value: found 2, accepted: [x, y] or [x, y, z]"),
         (

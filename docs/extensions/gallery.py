@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from entries import GALLERY, Entry, made, problems, program_digest
+from pages import write_pages
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.display import status_iterator
@@ -135,19 +136,12 @@ def _generate(app: Sphinx) -> None:
     if wrong:
         raise ExtensionError("problems: " + "; ".join(wrong))
     entries = [entry for entry in found if isinstance(entry, Entry)]
-    for entry, file in zip(entries, files, strict=True):
-        _write(GALLERY / f"{entry.name}.md", _page(entry, file))
-    groups = _pages_of_groups(entries)
-    for name, text in groups.items():
-        _write(GALLERY / f"{name}.md", text)
+    pages = {entry.name: _page(entry, file) for entry, file in zip(entries, files, strict=True)}
+    pages |= _pages_of_groups(entries)
+    write_pages(GALLERY, pages)
     for page in GALLERY.glob("*.md"):
-        if page.stem not in {*groups, *(entry.name for entry in entries)}:
+        if page.stem not in pages:
             page.unlink()
-
-
-def _write(file: Path, text: str) -> None:
-    if not file.exists() or file.read_text(encoding="utf-8") != text:
-        file.write_text(text, encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -13,6 +13,7 @@ from os import environ
 from pathlib import Path
 
 from numpydoc.docscrape import NumpyDocString
+from pages import write_pages
 from sphinx.application import Sphinx
 
 import sfetcas
@@ -48,6 +49,10 @@ TABLES = {
     "Polynomial": (
         "Varying numbers as polynomials",
         "`{ polynomial = [...] }` instead of a number of a section or a profile",
+    ),
+    "Formula": (
+        "Varying numbers by a formula",
+        '`"..."` instead of a number of a section or a profile, and for a curvature of a shape',
     ),
 }
 """Records that a scene is written with, by their heading and where they stand, in the order of the page."""
@@ -101,7 +106,7 @@ def _key(record: type[Record], entry: typing.Any) -> Key:
     else:
         value = plain(field.get_default(call_default_factory=True))
         default = f"`{json.dumps(value)}`" if value not in (None, {}, []) else words.rstrip(".")
-    return Key(entry.name, entry.type, " ".join(meaning.split()), default)
+    return Key(field.alias or entry.name, entry.type, " ".join(meaning.split()), default)
 
 
 def _markdown(text: str) -> str:
@@ -221,24 +226,15 @@ def _set_formulas(app: Sphinx, what: str, name: str, value: object, options: obj
             lines[i:i] = ["::", ""]
 
 
-def _write(folder: Path, pages: dict[str, str]) -> None:
-    """Write pages that differ from those that are there, so that Sphinx reads these alone anew."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in pages.items():
-        file = folder / f"{name}.md"
-        if not file.exists() or file.read_text(encoding="utf-8") != text:
-            file.write_text(text, encoding="utf-8")
-
-
 def _generate(app: Sphinx) -> None:
     reference = Path(app.srcdir) / "reference"
     made = {"scene": scene_tables(), "answers": answers_table()}
-    _write(
+    write_pages(
         reference, {name: filled((reference / f"{name}.md").read_text("utf-8"), text) for name, text in made.items()}
     )
-    _write(reference / "generated", {"commands": command_help()})
-    _write(reference / "api", api_pages())
-    _write(reference / "modules", module_pages())
+    write_pages(reference / "generated", {"commands": command_help()})
+    write_pages(reference / "api", api_pages())
+    write_pages(reference / "modules", module_pages())
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..errors import SceneError
-from .records import Record, say, unknown
+from .records import Record, keys_of, name_of, say, unknown
 from .shapes import end_of
 
 __all__ = ["FACTOR", "Branch", "Making", "branch_of", "carry_ends", "with_entries"]
@@ -104,19 +104,20 @@ def _number(new: Any) -> Any:
 
 def _entry(here: Any, key: str, part: Any, make: Making) -> Any:
     """A new entry of a record, table or list."""
-    field = None
+    field, name = None, key
     if isinstance(here, Record):
-        known: Any = type(here).model_fields
-        field = known.get(key)
+        known: Any = keys_of(type(here))
+        name = name_of(type(here), key)
+        field = type(here).model_fields.get(name)
     elif isinstance(here, Mapping):
         known = here
     else:
         known = [str(i) for i in range(len(here))]
     new = isinstance(here, Mapping) and part is not None and not isinstance(part, Branch)
-    if key not in known and not new:
+    if field is None and key not in known and not new:
         whole = " (a new entry is given as a whole)" if isinstance(here, Mapping) and part is not None else ""
         raise SceneError(unknown(key, known, "such entries") + whole)
-    now = None if new else getattr(here, key) if field else here[key if isinstance(here, Mapping) else int(key)]
+    now = None if new else getattr(here, name) if field else here[key if isinstance(here, Mapping) else int(key)]
     if field is not None and isinstance(part, Branch) and field.discriminator in part:
         # Another type has other keys.
         return dict(part)

@@ -11,7 +11,7 @@ from math import isfinite, perm
 from typing import Any, Literal, overload
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -89,6 +89,9 @@ class History(Record):
         )
         if not start < end:
             raise SceneError(f"found {start:g} to {end:g}, accepted: a start before the end", (name,))
+        if not np.spacing(max(abs(start), abs(end))) < APART * (end - start) < np.inf:
+            accepted = "ends with numbers between them to be told apart in double precision"
+            raise SceneError(f"found {start!r} to {end!r}, accepted: {accepted}", (name,))
         if not FINEST <= tolerance <= 1.0:
             raise SceneError(f"found {tolerance:g}, accepted: from {FINEST:g} to 1", (name, "tolerance"))
         if not callable(function):
@@ -150,15 +153,15 @@ class History(Record):
     def _check_spline(self) -> None:
         if self.polynomial is not None:
             raise SceneError("found 'spline' with polynomials, accepted: with values", ("interpolation",))
-        if not all(isfinite(c) for terms in self._pieces for c in terms):
+        if not all(isfinite(c) for terms in self.pieces for c in terms):
             message = (
                 "found t or values too far apart for a spline in double precision, accepted: linear, or other units"
             )
             raise SceneError(message, ("interpolation",))
 
     @cached_property
-    def _pieces(self) -> tuple[tuple[float, ...], ...]:
-        """Coefficients of each interval in the fraction of it."""
+    def pieces(self) -> tuple[tuple[float, ...], ...]:
+        """For each interval of ``t`` coefficients c0, c1, ... in its fraction, from 0 to 1, dimensionless."""
         if self.polynomial is not None:
             return self.polynomial
         assert self.value is not None
@@ -192,7 +195,7 @@ class History(Record):
         x = (t - self.t[i]) / (self.t[i + 1] - self.t[i])
         if self.polynomial is None and self.interpolation == "linear":
             return self._value(i) * (1.0 - x) + self._value(i + 1) * x
-        return sum(c * x**k for k, c in enumerate(self._pieces[i]))
+        return sum(c * x**k for k, c in enumerate(self.pieces[i]))
 
     def rate(self, t: float, side: Literal[-1, 1] = 1) -> float:
         """The derivative of the factor at t, zero outside of the history.
@@ -211,7 +214,7 @@ class History(Record):
             return 0.0
         span = self.t[i + 1] - self.t[i]
         x = (t - self.t[i]) / span
-        return sum(k * c * x ** (k - 1) for k, c in enumerate(self._pieces[i]) if k) / span
+        return sum(k * c * x ** (k - 1) for k, c in enumerate(self.pieces[i]) if k) / span
 
     def between(self, begin: float, end: float) -> tuple[float, ...]:
         """The factor as a polynomial between two times in one interval of ``t``, or outside of all.
@@ -226,10 +229,10 @@ class History(Record):
         span = self.t[i + 1] - self.t[i]
         first, slope = (begin - self.t[i]) / span, (end - begin) / span
         found = [0.0]
-        for c in reversed(self._pieces[i]):
+        for c in reversed(self.pieces[i]):
             found = [first * a + slope * b for a, b in zip([*found, 0.0], [0.0, *found], strict=True)]
             found[0] += c
-        return tuple(found[: len(self._pieces[i])])
+        return tuple(found[: len(self.pieces[i])])
 
     def jumps(self) -> Iterator[tuple[float, float, float]]:
         """Where the factor or its rate jumps by more than rounding: t, jump of the factor, jump of the rate in 1/s.
@@ -239,7 +242,7 @@ class History(Record):
         largest, fastest = self.rounding
         last = len(self.t) - 1
         for i, t in enumerate(self.t):
-            step = self._pieces[i][0] - sum(self._pieces[i - 1]) if 0 < i < last else 0.0
+            step = self.pieces[i][0] - sum(self.pieces[i - 1]) if 0 < i < last else 0.0
             kink = self.rate(t, 1) - self.rate(t, -1)
             step, kink = step if abs(step) > largest else 0.0, kink if abs(kink) > fastest else 0.0
             if step or kink:
@@ -248,11 +251,11 @@ class History(Record):
     @cached_property
     def kinks(self) -> tuple[float, ...]:
         """Values of t where the factor or its first or second derivative jumps, by more than six-digit rounding."""
-        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self._pieces[i])) for i in range(len(self.t) - 1)), 0.0)
+        size = max(abs(self.factor(self.t[0])), *(sum(map(abs, self.pieces[i])) for i in range(len(self.t) - 1)), 0.0)
         found = []
         for i, t in enumerate(self.t):
-            left = (self._pieces[i - 1], self.t[i] - self.t[i - 1]) if i else None
-            right = (self._pieces[i], self.t[i + 1] - t) if i < len(self.t) - 1 else None
+            left = (self.pieces[i - 1], self.t[i] - self.t[i - 1]) if i else None
+            right = (self.pieces[i], self.t[i + 1] - t) if i < len(self.t) - 1 else None
             span = min(piece[1] for piece in (left, right) if piece) if left or right else 1.0
             jumps = [
                 (_derivative(*right, 0.0, k) if right else 0.0) - (_derivative(*left, 1.0, k) if left else 0.0)
@@ -283,7 +286,7 @@ class History(Record):
         """Bounds below which a jump is rounding of the coefficients: of the factor, and of its rate in 1/s."""
         size, rate = abs(self.factor(self.t[0])), 0.0
         for i, (left, right) in enumerate(pairwise(self.t)):
-            terms = self._pieces[i]
+            terms = self.pieces[i]
             size = max(size, sum(map(abs, terms)))
             rate = max(rate, sum(k * abs(c) for k, c in enumerate(terms)) / (right - left))
         return tolerances.WRITTEN * size, tolerances.WRITTEN * rate
@@ -302,6 +305,9 @@ def _given(value: Any, where: tuple[str, ...]) -> float:
 
 FINEST = 1e-12
 """Least tolerance of a history made from a function: rounding of its spline leaves less."""
+
+APART = 1e-6
+"""Share of the interval of a function that still holds numbers of double precision."""
 
 MOST_INTERVALS = 100_000
 """Of a history made from a function."""
@@ -329,6 +335,10 @@ class Load(Record):
         Instead of a node: name of the member that it acts on.
     at : 1
         On a member, unless distributed: fraction of its length.
+    from_ : 1
+        Of a distributed load: fraction of the length where it begins.  In Python ``from_``, in files ``from``.
+    to : 1
+        Of a distributed load: fraction of the length where it ends.
     value : (3,), N, N m or N/m, fixed axes of the undeformed scene
         The load.  A moment about z may be one number.
     frame : text
@@ -345,6 +355,8 @@ class Load(Record):
     node: str | None = None
     member: str | None = None
     at: Fraction | None = None
+    from_: Fraction = Field(default=0.0, alias="from")
+    to: Fraction = 1.0
     value: Turn
     frame: Literal["fixed", "follower", "section"] = "fixed"
     profile: Varying | None = None
@@ -360,6 +372,9 @@ class Load(Record):
             raise SceneError(f"found 'section', accepted of a {self.type}: fixed or follower", ("frame",))
         if self.type != "distributed" and self.profile is not None:
             raise SceneError(f"not accepted with a {self.type}; only a distributed load has a profile", ("profile",))
+        for key, value, default in (("from", self.from_, 0.0), ("to", self.to, 1.0)):
+            if self.type != "distributed" and value != default:
+                raise SceneError(f"not accepted with a {self.type}; a distributed load begins and ends", (key,))
         return self
 
     def _check_place(self) -> None:
@@ -380,9 +395,19 @@ class Load(Record):
         if self.member is None:
             raise SceneError("the key 'member' is missing: a distributed load acts along a member")
         if self.at is not None:
-            raise SceneError(
-                f"found {self.at:g}, not accepted: a distributed load acts along all of its member", ("at",)
-            )
+            accepted = "accepted: 'from' and 'to', between which a distributed load acts"
+            raise SceneError(f"found {self.at:g}, {accepted}", ("at",))
+        if not self.to - self.from_ > tolerances.DECIMAL:
+            raise SceneError(f"found {self.from_:g} to {self.to:g}, accepted: an end after the beginning", ("to",))
+
+    @property
+    def part(self) -> tuple[float, float]:
+        """Where a distributed load begins and ends, fractions (2,) of the length of its member."""
+        return self.from_, self.to
+
+    def inside(self, x: Array) -> Array:
+        """Whether fractions x (any shape) of the length of its member are where a distributed load acts."""
+        return (x > self.from_) & (x < self.to)
 
     @property
     def follows(self) -> bool:

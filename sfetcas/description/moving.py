@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from ..errors import SceneError
 from .contacts import Contact
+from .formulas import Formula
 from .loads import History, Load, Motion
 from .records import say, unknown
 from .sections import CrossSection, Polynomial, Table
@@ -100,6 +101,8 @@ def _spins(member: Member) -> bool:
             return any(member.spin.polynomial)
         case tuple():
             return any(member.spin)
+        case Formula():
+            return True
     return bool(member.spin)
 
 

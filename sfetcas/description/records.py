@@ -30,7 +30,10 @@ __all__ = [
     "brief",
     "counted",
     "enumerated",
+    "keys_of",
     "listed",
+    "listed_numbers",
+    "name_of",
     "nearest",
     "number",
     "plain",
@@ -211,7 +214,14 @@ def _fraction(value: float) -> float:
     return value
 
 
-def _numbers(value: Any) -> tuple[float, ...]:
+def listed_numbers(value: Any) -> tuple[float, ...]:
+    """One or more finite numbers from a list, a tuple or an array.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
     entries = tuple(number(entry) for entry in listed(value, "a list of numbers"))
     if not entries:
         raise ValueError("found an empty list, accepted: a list of numbers")
@@ -246,7 +256,7 @@ Turn = Annotated[float | tuple[float, float, float], BeforeValidator(turn)]
 Fraction = Annotated[float, BeforeValidator(number), AfterValidator(_fraction)]
 """A fraction of a length, from 0 to 1."""
 
-Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(listed_numbers)]
 """One or more finite numbers."""
 
 Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]
@@ -256,7 +266,7 @@ Named = Annotated[Mapping[str, T], AfterValidator(_read_only)]
 class Record(Described):
     """Frozen data with known keys only; a wrong value raises :class:`~sfetcas.SceneError` at construction."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True, populate_by_name=True)
 
     def __init__(self, *unnamed: NoReturn, **values: Any) -> None:
         if unnamed:
@@ -297,13 +307,24 @@ class Record(Described):
 
     def to_dict(self) -> dict[str, Any]:
         """Tables, lists, texts and numbers; what stands at its default is left out, but for ``type``."""
-        pairs = ((name, getattr(self, name), field) for name, field in type(self).model_fields.items())
+        pairs = ((field.alias or name, getattr(self, name), field) for name, field in type(self).model_fields.items())
         return {n: plain(v) for n, v, field in pairs if n == "type" or not _is_default(v, field)}
 
     def replace(self: R, **changes: Any) -> R:
         """A copy with other values, validated anew; None stands for the default."""
+        changes = {name_of(type(self), key): value for key, value in changes.items()}
         kept = {name: getattr(self, name) for name in self.model_fields_set - changes.keys()}
         return type(self)(**kept, **{name: value for name, value in changes.items() if value is not None})
+
+
+def keys_of(record: type[BaseModel]) -> dict[str, str]:
+    """The keys of a record as files have them, and the names of these in Python: ``from`` is ``from_`` there."""
+    return {field.alias or name: name for name, field in record.model_fields.items()}
+
+
+def name_of(record: type[BaseModel], key: str) -> str:
+    """The name in Python of a key; what is no key as it is."""
+    return keys_of(record).get(key, key)
 
 
 def counted(number: int, one: str, more: str | None = None) -> str:
@@ -356,7 +377,7 @@ def sentence(error: ValidationError, record: type[BaseModel]) -> SceneError:
         case "value_error":
             return SceneError(str(context["error"]), where)
         case "extra_forbidden":
-            return SceneError(f"unknown key {say(where[-1])}; {nearest(where[-1], record.model_fields)}", where[:-1])
+            return SceneError(f"unknown key {say(where[-1])}; {nearest(where[-1], keys_of(record))}", where[:-1])
         case "missing":
             return SceneError(f"the key {where[-1]!r} is missing", where[:-1])
         case "union_tag_not_found":
@@ -371,7 +392,7 @@ def sentence(error: ValidationError, record: type[BaseModel]) -> SceneError:
 
 def _place(loc: tuple[int | str, ...], record: type[BaseModel]) -> tuple[str, ...]:
     """The keys on the way to a finding, without what pydantic adds to them."""
-    field = record.model_fields.get(str(loc[0])) if loc else None
+    field = record.model_fields.get(name_of(record, str(loc[0]))) if loc else None
     tagged = field is not None and field.discriminator is not None
     return tuple(str(part) for part in (loc[:1] + loc[2:] if tagged else loc) if part != "[key]")
 

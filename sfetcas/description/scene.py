@@ -19,6 +19,7 @@ from .answers import answer_name, check_answer
 from .changes import FACTOR, Branch, branch_of, carry_ends, with_entries
 from .contacts import Contact
 from .dimension import out_of_plane
+from .formulas import Formula
 from .loads import History, Load, Motion
 from .matrices import check_inertia, check_rigid_motion
 from .moving import check_beginning, check_driving, check_masses, check_no_contact, check_velocities
@@ -484,6 +485,8 @@ def _check_loads(scene: Scene) -> None:
         if kind == "small" and (condensed or load.type == "moment" or load.frame != "fixed"):
             accepted = "a node there, or a fixed force or distributed load on a small member with a section"
             raise SceneError(f"found the small member {load.member!r}, accepted: {accepted}", ("loads", name, "member"))
+        if isinstance(load.profile, Formula):
+            load.profile.check_finite(scene.center_lines[str(load.member)].length, "loads", name, "profile")
         joint = "rigid" if load.node is None else scene.nodes[load.node].joint
         if joint != "rigid" and load.type == "moment":
             message = f"node {load.node!r} has no rotation of its own for a moment, as its joint is a {joint}"
@@ -547,6 +550,9 @@ def _check_moving(scene: Scene) -> None:
     analysis = scene.analysis
     space = f"the scene is in space ({scene.dimension_reason})" if scene.resolved_dimension == "space" else None
     check_velocities(scene.nodes, scene.members, scene.motions, analysis, space)
+    for name, member in scene.members.items():
+        if isinstance(member.spin, Formula):
+            member.spin.check_finite(scene.center_lines[name].length, "members", name, "spin")
     check_beginning(analysis, scene.nodes, scene.loads)
     if analysis.moves:
         check_no_contact(analysis, scene.contacts, scene.springs)

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, model_validator
 from ..errors import SceneError
 from ..mathematics.arrays import numbers
 from ..mathematics.interpolation import power_series
+from .formulas import SAMPLES, Formula
 from .records import NotNegative, Number, Numbers, Record, number, say
 
 __all__ = ["CrossSection", "Polynomial", "Quantity", "Table", "Varying", "breaks", "evaluate", "quantity"]
@@ -65,39 +66,45 @@ class Polynomial(Record):
 
 
 def quantity(value: Any) -> Any:
-    """A quantity along a member from a number, a table as in a file, or a record.
+    """A quantity along a member from a number, a formula, a table as in a file, or a record.
 
     Raises
     ------
     ValueError
         Anything else.
     """
-    if isinstance(value, (Table, Polynomial)):
+    if isinstance(value, (Table, Polynomial, Formula)):
         return value
+    if isinstance(value, str):
+        return Formula(formula=value)
+    if isinstance(value, Mapping) and "formula" in value:
+        return Formula(**value)
     if isinstance(value, Mapping) and "polynomial" in value:
         return Polynomial(**value)
     if isinstance(value, Mapping) and ("at" in value or "value" in value):
         return Table(**value)
     if isinstance(value, (Mapping, str, Iterable)) and getattr(value, "shape", None) != ():
-        accepted = "a number, {at = [..], value = [..]} or {polynomial = [..]}"
+        accepted = "a number, a formula of x, {at = [..], value = [..]} or {polynomial = [..]}"
         raise ValueError(f"found {say(value)}, accepted: {accepted}")
     return number(value)
 
 
-Quantity = float | Table | Polynomial
+Quantity = float | Table | Polynomial | Formula
 Varying = Annotated[Quantity, BeforeValidator(quantity)]
-"""A quantity along a member: a number, a :class:`Table` or a :class:`Polynomial`."""
+"""A quantity along a member: a number, a :class:`Table`, a :class:`Polynomial` or a :class:`Formula`."""
 
 
-def evaluate(varying: Quantity, x: ArrayLike) -> Floats:
+def evaluate(varying: Quantity, x: ArrayLike, length: float = np.nan) -> Floats:
     """Values of a quantity along a member.
 
     Parameters
     ----------
-    varying : float, Table or Polynomial
+    varying : float, Table, Polynomial or Formula
         The quantity.
     x : (n,)
         Fractions of the length.
+    length : m
+        Of the member; only formulas of ``s`` need it.
 
     Returns
     -------
@@ -108,11 +115,15 @@ def evaluate(varying: Quantity, x: ArrayLike) -> Floats:
         return numbers(np.interp(x, numbers(varying.at), numbers(varying.value)))
     if isinstance(varying, Polynomial):
         return power_series(x, varying.polynomial)
+    if isinstance(varying, Formula):
+        return varying.at(x, length)
     return numbers(np.broadcast_to(numbers(varying), x.shape))
 
 
-def breaks(varying: Quantity) -> tuple[float, ...]:
-    """Fractions strictly between 0 and 1 where the slope of a quantity jumps or may jump."""
+def breaks(varying: Quantity, length: float = np.nan) -> tuple[float, ...]:
+    """Fractions strictly between 0 and 1 where the slope of a quantity jumps or may jump; ``length`` in m."""
+    if isinstance(varying, Formula):
+        return varying.breaks(length)
     return varying.at[1:-1] if isinstance(varying, Table) else ()
 
 
@@ -127,6 +138,8 @@ def _coefficients(varying: Quantity, left: float, right: float) -> Floats:
 
 def _lowest(varying: Quantity, less: Quantity = 0.0) -> tuple[float, float]:
     """Fraction and value of the minimum of varying - less on [0, 1]; rounding below zero counts as zero."""
+    if isinstance(varying, Formula) or isinstance(less, Formula):
+        return _least(varying, less)
     edges = sorted({0.0, *breaks(varying), *breaks(less), 1.0})
     candidates = list(edges)
     for left, right in pairwise(edges):
@@ -141,7 +154,21 @@ def _lowest(varying: Quantity, less: Quantity = 0.0) -> tuple[float, float]:
     return float(candidates[where]), 0.0 if abs(values[where]) <= noise else float(values[where])
 
 
+def _least(varying: Quantity, less: Quantity) -> tuple[float, float]:
+    """As :func:`_lowest` where one is a formula: at many places, then at many between those beside the least."""
+    x = np.unique([*np.linspace(0.0, 1.0, SAMPLES), *breaks(varying), *breaks(less)])
+    for _ in range(4):
+        values = evaluate(varying, x) - evaluate(less, x)
+        at = int(np.argmin(values))
+        where, least = float(x[at]), float(values[at])
+        x = np.linspace(x[max(at - 1, 0)], x[min(at + 1, len(x) - 1)], SAMPLES)
+    return where, least
+
+
 def _bounded(varying: Quantity, accepted: str, zero: bool) -> Quantity:
+    if isinstance(varying, Formula) and varying.uses_length:
+        found = f"found {say(varying.formula)} in a section, which members of different lengths may share"
+        raise ValueError(f"{found}, accepted: a formula of x, the fraction of the length")
     where, lowest = _lowest(varying)
     if lowest > 0.0 or (zero and lowest == 0.0):
         return varying
@@ -237,7 +264,8 @@ _DIMENSIONS = ("width", "height", "radius", "outer", "inner")
 class CrossSection(Record):
     """Stiffness and mass of a member per length, as numbers or as a shape with a material.
 
-    Each quantity but nu, damping and drag may vary along the member (a :class:`Table` or a :class:`Polynomial`).
+    Each quantity but nu, damping and drag may vary along the member (a :class:`Table`, a :class:`Polynomial` or a
+    :class:`Formula`).
 
     Parameters
     ----------
@@ -374,7 +402,7 @@ class CrossSection(Record):
     @property
     def even(self) -> bool:
         """Whether it is constant along the member."""
-        return not any(isinstance(item, (Table, Polynomial)) for item in self._varying())
+        return not any(isinstance(item, (Table, Polynomial, Formula)) for item in self._varying())
 
     def _varying(self) -> list[Quantity]:
         """What may vary along the member."""

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from .. import tolerances
 from ..errors import SceneError
@@ -33,7 +33,9 @@ from ..mathematics.curves import (
 )
 from ..mathematics.interpolation import power_series
 from ..mathematics.quaternion import matrix, rotate
-from .records import Direction, Number, Numbers, Positive, Record, Vector
+from .formulas import Formula
+from .records import Direction, Number, Positive, Record, Vector, listed_numbers
+from .sections import quantity
 
 __all__ = ["Arc", "CenterLine", "Curvature", "Helix", "Shape", "Spline", "Straight", "end_of", "place"]
 
@@ -105,17 +107,26 @@ class Helix(Record):
     center: Vector
 
 
+def _coefficients(value: Any) -> Any:
+    known = isinstance(value, (str, Formula)) or (isinstance(value, Mapping) and "formula" in value)
+    return quantity(value) if known else listed_numbers(value)
+
+
+Coefficients = Annotated[tuple[float, ...] | Formula, BeforeValidator(_coefficients)]
+"""Coefficients of a polynomial in s/L, or a formula."""
+
+
 @final
 class Curvature(Record):
-    """Given curvature about the axes of the section, as polynomials c0, c1, ... in s/L.
+    """Given curvature about the axes of the section, as polynomials c0, c1, ... in s/L or as formulas.
 
     Parameters
     ----------
-    kappa3 : (m,), 1/m
-        Curvature about b3: coefficients in s/L.
-    kappa2 : (m,), 1/m
+    kappa3 : (m,) or formula, 1/m
+        Curvature about b3: coefficients in s/L, or a formula of ``x`` = s/L and ``s``.
+    kappa2 : (m,) or formula, 1/m
         Curvature about b2.
-    twist : (m,), 1/m
+    twist : (m,) or formula, 1/m
         Curvature about the tangent b1.
     length : m
         Length of the member.
@@ -124,9 +135,9 @@ class Curvature(Record):
     """
 
     type: Literal["curvature"] = "curvature"
-    kappa3: Numbers = (0.0,)
-    kappa2: Numbers = (0.0,)
-    twist: Numbers = (0.0,)
+    kappa3: Coefficients = (0.0,)
+    kappa2: Coefficients = (0.0,)
+    twist: Coefficients = (0.0,)
     length: Positive
     start: Direction | None = None
 
@@ -432,16 +443,22 @@ def _helix(shape: Helix, start: Floats, b2: Floats | None) -> tuple[float, Curve
 
 def _given_curvature(shape: Curvature, start: Floats, chord: Floats, b2: Floats | None) -> tuple[float, Curve]:
     if shape.start is None:
-        if any(shape.kappa3) or any(shape.kappa2):
+        if any(isinstance(terms, Formula) or any(terms) for terms in (shape.kappa3, shape.kappa2)):
             needed = "a bent line needs its tangent at the first node"
             raise SceneError(f"the key 'start' is missing, {needed}", ("shape",))
         _chord_length(start, chord)
     first = _frame(_unit(chord if shape.start is None else shape.start), b2)
     given = (shape.twist, shape.kappa2, shape.kappa3)
+    for key, terms in zip(("twist", "kappa2", "kappa3"), given, strict=True):
+        if isinstance(terms, Formula):
+            terms.check_finite(shape.length, "shape", key)
+
+    def series(x: Floats, terms: Any) -> Floats:
+        return terms.at(x, shape.length) if isinstance(terms, Formula) else power_series(x, terms)
 
     def sample(left: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:
         x = left[:, None] + (right - left)[:, None] * POINTS
-        rates = numbers([shape.length * power_series(x, c) for c in given])
+        rates = numbers([shape.length * series(x, c) for c in given])
         return right - left, np.moveaxis(rates, 0, 2), np.ones((*x.shape, 1))
 
     def known(left: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, model_validator
 
 from ..errors import SceneError
+from .formulas import Formula
 from .matrices import Mass, Stiffness, check_mass, check_stiffness
 from .records import Direction, NotNegative, Record, Vector, counted, listed, number, say, turn, whole
 from .sections import CrossSection, Polynomial, Quantity, Table, quantity
@@ -38,11 +39,8 @@ def _ends(value: Any) -> tuple[Any, ...]:
 
 
 def _spin(value: Any) -> Any:
-    if isinstance(value, (Mapping, Table, Polynomial)):
+    if isinstance(value, (str, Mapping, Table, Polynomial, Formula)):
         return quantity(value)
-    if isinstance(value, str):
-        accepted = "a number, [x, y, z], {at = [..], value = [..]} or {polynomial = [..]}"
-        raise ValueError(f"found {say(value)}, accepted: {accepted}")
     return turn(value)
 
 

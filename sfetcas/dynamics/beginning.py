@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import tolerances
 from ..description.scene import Analysis, Load, Motion, Node, Scene
-from ..description.sections import Polynomial, Table, evaluate
+from ..description.sections import evaluate
 from ..description.structure import SLIDING, released
 from ..equilibria import statics, stops
 from ..equilibria.settings import Settings
@@ -256,7 +256,7 @@ def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, 
         # Of a small member the nodes, as many as it has, stand for equal parts.
         x = model.along(name) if slender else np.linspace(0.0, 1.0, len(chain))
         chain, first = np.unique(chain, return_index=True)
-        spins = _spins(member.spin, x[first]) * unit
+        spins = _spins(member.spin, x[first], model.scene.center_lines[name].length) * unit
         for number, spin in zip(chain.tolist(), spins, strict=True):
             rows.append(turning_of[turns * number : turns * (number + 1)])
             values.append(spin[3 - turns :])
@@ -266,9 +266,9 @@ def _given(system: StageEquations, equations: Equations) -> tuple[Array, Array, 
     return np.concatenate(rows), np.concatenate(values), names
 
 
-def _spins(spin: Any, x: Array) -> Array:
-    """Angular velocities (n, 3) along a member."""
+def _spins(spin: Any, x: Array, length: float) -> Array:
+    """Angular velocities (n, 3) along a member of a length in m."""
     if isinstance(spin, tuple):
         return np.tile(np.asarray(spin, dtype=float), (len(x), 1))
-    about = evaluate(spin, x) if isinstance(spin, (Polynomial, Table)) else np.full(len(x), float(spin))
+    about = evaluate(spin, x, length)
     return np.stack([np.zeros(len(x)), np.zeros(len(x)), about], axis=1)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..description.answers import MOTION
-from ..description.records import counted, plain
+from ..description.records import counted, plain, say
 from ..description.showing import error_in_words, notes_in_words, number_in_words, shown
 from ..equilibria.solution import Configuration, heading, heading_in_words
 from ..errors import SceneError, Status
@@ -256,9 +256,15 @@ class Trajectory:
         Raises
         ------
         SceneError
-            A time is outside, or the integrator is ``idas``, which does not tell its steps.
+            A time is no number or outside, or the integrator is ``idas``, which does not tell its steps.
         """
-        wanted, own = np.atleast_1d(np.asarray(times, dtype=float)), self.times
+        own = self.times
+        try:
+            wanted = np.atleast_1d(np.asarray(times, dtype=float))
+        except (TypeError, ValueError):
+            wanted = np.zeros((0, 0))
+        if wanted.ndim != 1:
+            raise SceneError(f"found {say(times)}, accepted: times from {own[0]:g} to {own[-1]:g} s")
         outside = [t for t in wanted if not own[0] <= t <= own[-1]]
         if outside:
             raise SceneError(f"found {outside[0]:g} s, accepted: times from {own[0]:g} to {own[-1]:g} s")

@@ -91,7 +91,7 @@ class _Acting:
             # Whole turns need few elements: moments count as they are given, forces with their factor.
             size = size[::-1] * self._share(load)
         if load.type == "distributed":
-            size = size * self._scene.center_lines[str(load.member)].length
+            size = size * (load.to - load.from_) * self._scene.center_lines[str(load.member)].length
         if load.node is None:
             self._add(str(load.member), size)
         elif load.type == "moment" and _holds(self._scene, load.node):

@@ -18,10 +18,9 @@ import casadi as ca
 import numpy as np
 
 from ..description.loads import Load
-from ..description.scene import Scene
 from ..errors import SceneError
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers, scattered
+from ..mathematics.arrays import Array, numbers, scattered, values_of
 from .elements import Element
 from .joints import Turning
 from .mesh import Mesh
@@ -274,7 +273,7 @@ def loads_in(parts: Parts) -> Iterator[One]:
         else:
             yield One(Moment(space), *where, nothing, (number,))
     line = parts.beams.flat("tangent", "compliance")
-    for e in followed_elements(scene, parts.segments):
+    for e in followed_elements(parts):
         if parts.element.gauss:
             raise SceneError("distributed followers need integration at the nodes, found Gauss integration")
         kind = FollowingSpread(space, parts.element)
@@ -283,10 +282,16 @@ def loads_in(parts: Parts) -> Iterator[One]:
         yield One(kind, f"element {e}", "", line[e], *sides)
 
 
-def followed_elements(scene: Scene, segments: Segments) -> list[int]:
+def followed_elements(parts: Parts) -> list[int]:
     """Numbers of the elements under follower distributed loads; each of them is a segment."""
-    members = {load.member for load in scene.loads.values() if load.type == "distributed" and load.follows}
-    return sorted(part.elements.start for part in segments.parts if part.member in members)
+    found: set[int] = set()
+    for load in parts.scene.loads.values():
+        if load.type == "distributed" and load.follows:
+            member = str(load.member)
+            cuts = parts.mesh.cuts[member]
+            inside = load.inside(values_of(0.5 * (cuts[1:] + cuts[:-1])))
+            found |= set((parts.beams.first[member] + np.flatnonzero(inside)).tolist())
+    return sorted(found)
 
 
 def _rotation(parts: Parts, name: str, load: Load) -> int:

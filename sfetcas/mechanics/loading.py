@@ -15,7 +15,7 @@ import numpy as np
 from ..description.scene import Load, Motion, Scene
 from ..description.sections import evaluate
 from ..mathematics import quaternion
-from ..mathematics.arrays import Array, numbers, plus, unit
+from ..mathematics.arrays import Array, numbers, plus, unit, values_of
 from ..mathematics.interpolation import pieces
 from .beams import Beams, Scales
 from .bodies import Lever, body_of, lever_along, quadrature
@@ -228,9 +228,17 @@ class _Writer:
             self._add_point_force(group, load)
         else:
             x = self.places(str(load.member))
-            profile = np.ones(x.shape) if load.profile is None else evaluate(load.profile, x.ravel()).reshape(x.shape)
-            density = profile[..., None] * self._along(load, x)
+            profile = self._profile(load, x.ravel()).reshape(x.shape)
+            # An element is within its part as a whole or not at all: elements end there.
+            within = load.inside(values_of(x).mean(axis=1))[:, None]
+            density = (profile * within)[..., None] * self._along(load, x)
             self.spread(group, str(load.member), density, follows=load.follows)
+
+    def _profile(self, load: Load, x: Array) -> Array:
+        """Factor of a distributed load at fractions x (n,) of its member."""
+        if load.profile is None:
+            return np.ones(len(x))
+        return evaluate(load.profile, x, self.scene.center_lines[str(load.member)].length)
 
     def _along(self, load: Load, x: Array) -> Array:
         """Value of a distributed load at places of its member, fixed axes of the undeformed scene."""
@@ -321,7 +329,7 @@ class _Writer:
             lever = lever_along(self.scene, member, np.ones(1) / length, numbers([load.at or 0.0]), np.ones(1))
         else:
             x, w = quadrature(self.scene, member)
-            profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+            profile = self._profile(load, x) * load.inside(x)
             lever = lever_along(self.scene, member, profile, x, w)
         self._add_lever(group, member, lever, numbers(load.vector))
 

@@ -155,8 +155,8 @@ def breaks_of(scene: Scene, member: str) -> Array:
         places += scene.sections[section].breaks
     for load in scene.loads.values():
         if load.member == member:
-            places += [] if load.at is None else [load.at]
-            places += [] if load.profile is None else list(kinks(load.profile))
+            places += list(load.part) if load.type == "distributed" else [] if load.at is None else [load.at]
+            places += [] if load.profile is None else list(kinks(load.profile, scene.center_lines[member].length))
     places = sorted(places)
     keep = [a for a, b in zip(places, places[1:], strict=False) if b - a > tolerances.DECIMAL]
     return np.array([*keep, 1.0])

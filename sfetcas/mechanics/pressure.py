@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import tolerances
+from ..description.formulas import Formula
 from ..description.loads import Load
 from ..description.scene import Scene
 from ..description.sections import Table
@@ -25,7 +26,8 @@ def is_pressure(scene: Scene) -> bool:
     # Followers are forces per length of the undeformed member, which is not that of the curve where it stretches.
     if scene.resolved_dimension == "space" or scene.stretches:
         return False
-    left: dict[tuple[str | None, str], float] = {}
+    # By history, of what ends at a node, or within a member at a fraction of its length.
+    left: dict[tuple[str | None, str | tuple[str, float]], float] = {}
     size = 0.0
     for load in scene.loads.values():
         if load.frame == "fixed" or load.type == "moment":
@@ -35,12 +37,14 @@ def is_pressure(scene: Scene) -> bool:
             return False
         size = max(size, abs(pressure))
         joints = end_joints(scene, scene.members[str(load.member)])
-        for (node, joint), way in zip(joints, (-1.0, 1.0), strict=True):
+        for (node, joint), at, whole, way in zip(joints, load.part, (0.0, 1.0), (-1.0, 1.0), strict=True):
             if joint == "slot" or joint == "slider":
                 return False
-            left[load.history, node] = left.get((load.history, node), 0.0) + way * pressure
+            end = node if at == whole else (str(load.member), at)
+            left[load.history, end] = left.get((load.history, end), 0.0) + way * pressure
     return all(
-        abs(p) <= tolerances.DECIMAL * size or scene.nodes[node].support != "free" for (_, node), p in left.items()
+        abs(p) <= tolerances.DECIMAL * size or (isinstance(end, str) and scene.nodes[end].support != "free")
+        for (_, end), p in left.items()
     )
 
 
@@ -53,6 +57,8 @@ def _pressure(scene: Scene, load: Load) -> float | None:
         profile = load.profile.value if len(set(load.profile.value)) == 1 else None
     elif load.profile is None or isinstance(load.profile, float):
         profile = (1.0 if load.profile is None else load.profile,)
+    elif isinstance(load.profile, Formula):
+        profile = None
     else:
         profile = load.profile.polynomial if not any(load.profile.polynomial[1:]) else None
     line = scene.center_lines[str(load.member)]

@@ -111,10 +111,15 @@ def _retained_cuts(scene: Scene, member: str, cuts: Array) -> list[int]:
     """Inner cuts of a member that loads need as places of their own: those that turn with the section."""
     inner = range(1, len(cuts) - 1)
     following = [load for load in scene.loads.values() if load.member == member and load.follows]
-    if any(load.type == "distributed" for load in following):
-        return list(inner)
-    wanted = {int(np.argmin(np.abs(cuts - (load.at or 0.0)))) for load in following}
+    spread = [load.part for load in following if load.type == "distributed"]
+    wanted = {cut for a, b in spread for cut in range(_nearest(cuts, a), _nearest(cuts, b) + 1)}
+    wanted |= {_nearest(cuts, load.at or 0.0) for load in following if load.type != "distributed"}
     return [cut for cut in inner if cut in wanted]
+
+
+def _nearest(cuts: Array, place: float) -> int:
+    """Index of the cut that is nearest to a fraction of the length."""
+    return int(np.argmin(np.abs(cuts - place)))
 
 
 def _sprung(scene: Scene) -> Iterator[str]:

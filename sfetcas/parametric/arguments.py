@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -14,13 +15,14 @@ from numpy.typing import ArrayLike
 from .. import tolerances
 from ..description import records
 from ..description.changes import FACTOR, branch_of, carry_ends, with_entries
-from ..description.records import Record, plain, unknown
+from ..description.records import Record, keys_of, name_of, plain, unknown
 from ..description.scene import History, Scene
 from ..description.showing import made, named
 from ..errors import SceneError
 from ..mathematics.active import Active, gathered
 from ..mathematics.arrays import Array, numbers
 from ..mathematics.constants import picked
+from ..mathematics.piecewise import piecewise
 from ..mechanics.beams import ELEMENT_DATA
 from ..mechanics.equations import Equations
 from ..mechanics.expressions import LOADS, Expressions
@@ -223,7 +225,7 @@ def argument(scene: Scene, name: str, span: tuple[float, float] | None = None) -
     if low is not None and high is not None and not low < high:
         raise SceneError(f"found {low:g} to {high:g}, accepted: a range from low to high", ("arguments", name))
     found = _argument(scene, name, low, high)
-    if re.fullmatch(r"loads\.[^.]+\.at", name):
+    if MOVING.fullmatch(name):
         found = _within(scene, found)
     outside = [x for x in found.default if not found.limits[0] <= x <= found.limits[1]]
     if outside:
@@ -236,7 +238,10 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
     path = name.split(".")
     if name == FACTOR:
         default = float(scene.analysis.steps[-1])
-        return Argument(name, (default,), "1", "factor of all loads and motions without a history", low, high)
+        meaning = "factor of all loads and motions without a history"
+        if scene.histories and scene.analysis.type != "dynamic":
+            meaning += "; histories that are no arguments are evaluated at it"
+        return Argument(name, (default,), "1", meaning, low, high)
     if path[0] == "histories" and len(path) == 2 and path[1] in scene.histories:
         # Of a motion what it begins with.
         when = 0.0 if scene.analysis.type == "dynamic" else float(scene.analysis.steps[-1])
@@ -256,6 +261,10 @@ def _argument(scene: Scene, name: str, low: float | None, high: float | None) ->
         values = tuple(float(value[i]) for i in chosen)
         return Argument(name, values, _unit(scene, path), _meaning(path), low, high, tuple(chosen))
     return Argument(name, (float(value),), _unit(scene, path), _meaning(path), low, high)
+
+
+MOVING = re.compile(r"loads\.([^.]+)\.(at|from|to)")
+"""Names of places of loads along members, with which elements move."""
 
 
 def _within(scene: Scene, place: Argument) -> Argument:
@@ -280,10 +289,14 @@ def _within(scene: Scene, place: Argument) -> Argument:
 
 def _beside(scene: Scene, name: str) -> tuple[float, float, float]:
     """The place of a load along its member, between the kinks, other loads and ends beside it."""
-    load = scene.loads[name.split(".")[1]]
-    others = {key: one for key, one in scene.loads.items() if one is not load}
-    breaks = breaks_of(scene.model_copy(update={"loads": others}), str(load.member))
-    at = float(load.at or 0.0)
+    owner, key = name.split(".")[1:]
+    load, loads = scene.loads[owner], dict(scene.loads)
+    if key == "at":
+        del loads[owner]
+    else:
+        loads[owner] = load.model_copy(update={"from_": 0.0} if key == "from" else {"to": 1.0})
+    breaks = breaks_of(scene.model_copy(update={"loads": loads}), str(load.member))
+    at = float(load.at or 0.0) if key == "at" else load.part[key == "to"]
     after = min(max(int(np.searchsorted(breaks, at + APART)), 1), len(breaks) - 1)
     return float(breaks[after - 1]), at, float(breaks[after])
 
@@ -302,12 +315,15 @@ def _value(scene: Scene, path: Sequence[str], name: str) -> Any:
         elif isinstance(here, (list, tuple)):
             known = [str(k) for k in range(len(here))]
         else:
-            known = list(getattr(type(here), "model_fields", ()))
+            known = list(keys_of(type(here))) if isinstance(here, Record) else []
         if key not in known:
             where = ".".join(path[:i]) or "the scene"
             raise SceneError(f"{name} of {where}: {unknown(key, known, 'such numbers')}", ("arguments",))
         record = here
-        here = here[key] if isinstance(here, Mapping) else here[int(key)] if key.isdigit() else getattr(here, key)
+        if isinstance(here, Record):
+            here = getattr(here, name_of(type(here), key))
+        else:
+            here = here[key] if isinstance(here, Mapping) else here[int(key)]
     if here is None:
         # As EI3 of a section that is given by a shape.
         given = [key for key, value in record if key in record.model_fields_set and isinstance(value, (int, float))]
@@ -394,6 +410,7 @@ class Arguments:
         for name in self._names:
             if self._names.count(name) > 1:
                 raise SceneError(f"found {name} more than once, accepted: each number once", ("arguments",))
+        _check_apart(scene, self.arguments)
         # Factors multiply what the other numbers say.
         self._own = [i for i, name in enumerate(self._names) if not _is_factor(name)]
         self._symbols = ca.SX.sym("numbers", len(self._own))
@@ -537,6 +554,10 @@ class Arguments:
         name = FACTOR if group is None else f"histories.{group}"
         if name in self._names:
             return p[self._names.index(name)]
+        if group is not None and FACTOR in self._names and self._scene.analysis.type != "dynamic":
+            history = self._scene.histories[group]
+            ends = history.factor(history.t[0]), history.factor(history.t[-1])
+            return piecewise(p[self._names.index(FACTOR)], history.t, history.pieces, ends)
         # What is no argument stands as it would by default.
         return argument(self._scene, name).default[0]
 
@@ -554,17 +575,33 @@ def in_words(arguments: Arguments, results: Results) -> list[str]:
 
 def with_cuts(scene: Scene, mesh: Mesh, symbolic: Mapping[str, Any]) -> Mesh:
     """The mesh with symbolic ends of elements that move with the places of loads along their members."""
-    cuts = dict(mesh.cuts)
+    moving: dict[str, dict[str, Any]] = {}
     for name, place in symbolic.items():
-        if not re.fullmatch(r"loads\.[^.]+\.at", name):
-            continue
-        member = str(scene.loads[name.split(".")[1]].member)
-        if member in cuts:
+        found = MOVING.fullmatch(name)
+        member = str(scene.loads[found[1]].member) if found else ""
+        if member in mesh.cuts:
+            moving.setdefault(member, {})[name] = place
+    cuts = dict(mesh.cuts)
+    for member, places in moving.items():
+        breaks = breaks_of(scene, member)
+        there, moved = list(breaks), np.zeros(len(cuts[member]), bool)
+        for name, place in places.items():
             low, at, high = _beside(scene, name)
-            inside = (mesh.cuts[member] >= low) & (mesh.cuts[member] <= high)
-            moved = np.interp(mesh.cuts[member], [low, at, high], numbers([low, place, high]))
-            cuts[member] = np.where(inside, moved, cuts[member])
+            there[int(np.argmin(np.abs(breaks - at)))] = place
+            moved |= (cuts[member] > low) & (cuts[member] < high)
+        cuts[member] = np.where(moved, np.interp(cuts[member], breaks, numbers(there)), cuts[member])
     return replace(mesh, cuts=cuts)
+
+
+def _check_apart(scene: Scene, arguments: Sequence[Argument]) -> None:
+    """Refuse places of loads on one member that might meet."""
+    places = [(one, MOVING.fullmatch(one.name)) for one in arguments]
+    known = [(str(scene.loads[found[1]].member), one.default[0], one) for one, found in places if found]
+    known.sort(key=lambda each: each[:2])
+    for (member, _, one), (other, _, after) in pairwise(known):
+        if member == other and (one.high or 0.0) >= (after.low or 0.0):
+            message = f"found {one.name} and {after.name}, which may meet, accepted: ranges apart from each other"
+            raise SceneError(message, ("arguments",))
 
 
 NEAR = 0.01
@@ -675,4 +712,5 @@ def _plain_scene(scene: Scene) -> Scene:
 
 def _unchecked(record: Record, entries: Mapping[str, Any]) -> Record:
     kept = {name: getattr(record, name) for name in type(record).model_fields}
-    return type(record).model_construct(record.model_fields_set, **{**kept, **entries})
+    new = {name_of(type(record), key): value for key, value in entries.items()}
+    return type(record).model_construct(record.model_fields_set, **{**kept, **new})

@@ -25,11 +25,11 @@ from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
 from ..paths.path import Path
 from .colours import NONE, ColourQuantity, coloured
-from .files import check_ending
+from .files import check_ending, check_folder
 from .glyphs import sketch_supports
 from .modeshapes import PHASES, ModePanels
 from .motions import evenly
-from .sheet import DOTTED, Sheet, add_bar, axes_on, pieces_of, plot_line, title_of
+from .sheet import DOTTED, Sheet, add_bar, axes_on, entitle, pieces_of, plot_line
 from .showing import Picture, new_figure
 from .sketch import REST, Mark, Sketch, course_of, in_short, prefix, view_of
 
@@ -79,9 +79,10 @@ def save_animation(
     Raises
     ------
     SceneError
-        As :func:`check_animation` and :func:`animation`, or ffmpeg fails.
+        As :func:`check_animation` and :func:`animation`, there is no such folder, or ffmpeg fails.
     """
     check_animation(answer.scene, file)
+    check_folder(file)
     animation(answer, colour=colour).save(file)
 
 
@@ -177,8 +178,9 @@ class Animation:
         Raises
         ------
         SceneError
-            Another ending, no ffmpeg, or ffmpeg fails.
+            Another ending, no such folder, no ffmpeg, or ffmpeg fails.
         """
+        check_folder(file)
         film = self._film
         writer: Any = FFMpegWriter if check_ending(file, ENDINGS, "an animation") == ".mp4" else PillowWriter
         log = logging.getLogger("matplotlib.animation")
@@ -267,8 +269,7 @@ class _Film(Film):
         self._course, self._lines = course, [*course.earlier, course.last]
         self._view = view_of(steps[-1].model.space, [course.everything])
         self.figure = new_figure(7.0, 5.0, shown=False)
-        if title_of(title):
-            self.figure.suptitle(title_of(title), fontsize=11, parse_math=False)
+        entitle(self.figure, title)
         self._first = self._sketched(0)
         self._paper = self.figure.add_subplot()
         self._paper.set_title(" ", fontsize=9, loc="left")

@@ -40,7 +40,7 @@ from .files import check_ending, save_figure
 from .glyphs import sketch_supports
 from .looks import dashes_of
 from .modeshapes import REACH, TWISTING
-from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, entitle, legend_above, name_upright, plot_line
 from .showing import Picture, new_figure
 from .sketch import REST, Course, Sketch, course_of, unit_for, view_of, with_prefix
 
@@ -120,9 +120,7 @@ def _chart(path: Path, quantities: Sequence[str] | None, *, shown: bool) -> Pict
             panel.tick_params(labelbottom=False)
             panel.set_xlabel("")
     legend_above(panels[0], list(_legend(path, frequencies=any(quantity.name == FREQUENCY for quantity in found))))
-    title = title_of(path.scene.title)
-    if title:
-        figure.suptitle(title, fontsize=11, parse_math=False)
+    entitle(figure, path.scene.title)
     _draw_shapes(right, path, shapes)
     return figure
 

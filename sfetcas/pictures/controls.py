@@ -20,7 +20,7 @@ from ..errors import SceneError
 from ..trajectories.controlled_motion import ControlledMotion
 from .curves import COMPONENTS
 from .files import check_ending, save_figure
-from .sheet import legend_above, name_upright, title_of
+from .sheet import entitle, legend_above, name_upright
 from .showing import Picture, new_figure
 from .sketch import SUPPORT, prefix, unit_for, with_prefix
 
@@ -89,9 +89,7 @@ def _drawn(motion: ControlledMotion, nodes: Sequence[str] | None, *, shown: bool
             panel.sharex(column[-1])
             panel.tick_params(labelbottom=False)
         column[-1].set_xlabel(f"time, {letter}s")
-    title = title_of(motion.scene.title)
-    if title:
-        figure.suptitle(title, fontsize=11, parse_math=False)
+    entitle(figure, motion.scene.title)
     return figure
 
 

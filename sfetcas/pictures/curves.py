@@ -23,7 +23,7 @@ from ..equilibria.solution import Configuration, Solution
 from ..errors import SceneError
 from ..mathematics.arrays import Array
 from .files import check_ending, save_figure
-from .sheet import legend_above, name_upright, title_of
+from .sheet import entitle, legend_above, name_upright
 from .showing import Picture, new_figure
 from .sketch import rounded, unit_for, with_prefix
 
@@ -111,9 +111,7 @@ def _drawn(solution: Solution, quantities: Sequence[str], *, shown: bool) -> Pic
     for panel, name, table in zip(panels, names, tables, strict=True):
         draw_panel(panel, name, [replace(curve, look=look) for curve in told(name, factors, table)])
     panels[-1].set_xlabel("factor")
-    title = title_of(solution.scene.title)
-    if title:
-        figure.suptitle(title, fontsize=11, parse_math=False)
+    entitle(figure, solution.scene.title)
     return figure
 
 

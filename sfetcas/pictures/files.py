@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..errors import SceneError
 
-__all__ = ["DPI", "ENDINGS", "check_ending", "save_figure"]
+__all__ = ["DPI", "ENDINGS", "check_ending", "check_folder", "save_figure"]
 
 DPI = 150
 ENDINGS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".webp")
@@ -32,14 +32,28 @@ def check_ending(file: str | os.PathLike[str], accepted: tuple[str, ...] = ENDIN
     return ending
 
 
+def check_folder(file: str | os.PathLike[str]) -> None:
+    """Refuse a file in a folder that does not exist.
+
+    Raises
+    ------
+    SceneError
+        There is no such folder.
+    """
+    folder = Path(file).parent
+    if not folder.is_dir():
+        raise SceneError(f"{file}: found no folder {folder}, accepted: a file in a folder that exists")
+
+
 def save_figure(figure: Figure, file: str | os.PathLike[str]) -> None:
     """Write a figure in the format of the ending of the file, without the date.
 
     Raises
     ------
     SceneError
-        The ending is none of :data:`ENDINGS`.
+        The ending is none of :data:`ENDINGS`, or there is no such folder.
     """
+    check_folder(file)
     dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     content, ending = io.BytesIO(), check_ending(file)
     # Libraries that write files by themselves do not all say where a disk is full.

@@ -13,7 +13,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 from ..tradeoff.trading import Row, Trade, again, whole
 from .files import check_ending, save_figure
 from .looks import PALETTE
-from .sheet import drawn_text, title_of
+from .sheet import drawn_text, entitle
 from .showing import new_figure
 
 __all__ = ["front_picture", "save_front"]
@@ -52,9 +52,7 @@ def _drawn(trade: Trade, *, shown: bool) -> Figure:
     papers[0].set_ylabel(f"error of the {trade.kind}, relative", parse_math=False)
     handles, labels = papers[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", fontsize=8, frameon=False)
-    title = title_of(trade.scene.title)
-    if title:
-        figure.suptitle(title, fontsize=11, parse_math=False)
+    entitle(figure, trade.scene.title)
     return figure
 
 

@@ -393,8 +393,9 @@ def _sketch_turn(sketch: Sketch, point: Array, along: Array, vector: Array, lett
 def _sketch_distributed(sketch: Sketch, name: str, load: Load, value: Array) -> None:
     """Small arrows onto the member with a line over their ends."""
     assert load.member is not None
-    x = np.linspace(0.0, 1.0, 49)
-    profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x)
+    x = np.linspace(*load.part, 49)
+    length = sketch.scene.center_lines[load.member].length
+    profile = np.ones(len(x)) if load.profile is None else evaluate(load.profile, x, length)
     peak = float(np.abs(profile).max())
     if peak == 0.0:
         return

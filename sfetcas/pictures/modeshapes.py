@@ -24,7 +24,7 @@ from ..mathematics import quaternion
 from ..mathematics.arrays import TINY, Array
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
-from .sheet import Sheet, title_of
+from .sheet import Sheet, entitle, title_of
 from .showing import new_figure
 from .sketch import REST, SUPPORT, Sketch, View, course_of, in_short, norm, view_of
 
@@ -189,11 +189,11 @@ class ModePanels:
         span = np.maximum(high - low, 0.15 * float((high - low).max()))
         columns, width, height = _grid(count, float(span[1] / span[0]))
         rows = -(-count // columns)
-        title = title_of(self._modes.scene.title + self._others())
+        text = self._modes.scene.title + self._others()
+        title = title_of(text)
         top = 0.35 + 0.2 * title.count("\n") if title else 0.1
         self.figure = new_figure(columns * width, rows * (height + 0.35) + top + 0.45, shown=shown)
-        if title:
-            self.figure.suptitle(title, fontsize=11, parse_math=False)
+        entitle(self.figure, text)
         panels = np.atleast_1d(self.figure.subplots(rows, columns)).ravel()
         middle, half = 0.5 * (low + high), 0.56 * span
         self._lines: list[tuple[LineCollection, LineCollection | None]] = []

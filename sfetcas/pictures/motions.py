@@ -27,7 +27,7 @@ from ..mathematics.arrays import Array
 from .curves import COMPONENTS, draw_panel, quantities_named, table_of, told
 from .files import check_ending, save_figure
 from .glyphs import sketch_supports
-from .sheet import DOTTED, Sheet, axes_on, drawn_text, legend_above, name_upright, plot_line, title_of
+from .sheet import DOTTED, Sheet, axes_on, drawn_text, entitle, legend_above, name_upright, plot_line
 from .showing import Picture, new_figure
 from .sketch import REST, Ink, Sketch, course_of, prefix, unit_for, view_of
 
@@ -108,9 +108,7 @@ def _motion_picture(motion: Trajectory, quantities: Sequence[str] | None, *, sho
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
     _say_times(panels[-1], fine)
-    title = title_of(motion.scene.title)
-    if title:
-        figure.suptitle(title, fontsize=11, parse_math=False)
+    entitle(figure, motion.scene.title)
     draw_strobes(figure, paper, motion, fine)
     return figure
 

@@ -8,6 +8,7 @@ labels put where they hide least (``pictures.sheet``).  How lines tell steps or 
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..description.records import say
+from ..description.records import listed, say
 from ..equilibria.solution import Solution
 from ..errors import SceneError
 from .colours import coloured
@@ -93,10 +94,13 @@ def _drawn(solution: Solution, *, shown: bool, steps: Sequence[int] | None = Non
 def _chosen(solution: Solution, steps: Sequence[int] | None) -> list[int]:
     """Indices of the steps to draw, the bold one last."""
     count = len(solution.steps)
-    numbers = list(range(count)) if steps is None else list(steps)
+    accepted = f"a list of numbers of steps from 0 to {count - 1}, or from the end: -1"
+    try:
+        numbers = list(range(count)) if steps is None else [operator.index(step) for step in listed(steps, accepted)]
+    except (TypeError, ValueError):
+        numbers = []
     if not numbers or any(not -count <= number < count for number in numbers):
-        accepted = f"numbers of steps from 0 to {count - 1}, or from the end: -1"
-        raise SceneError(f"found {say(numbers)}, accepted: {accepted}", ("steps",))
+        raise SceneError(f"found {say(steps)}, accepted: {accepted}", ("steps",))
     if steps is None and solution.scene.analysis.equilibria == "all":
         first = count - number_of(solution, count - 1)
         numbers = [*range(first + 1, count), first]

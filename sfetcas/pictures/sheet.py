@@ -55,6 +55,7 @@ __all__ = [
     "add_bar",
     "axes_on",
     "drawn_text",
+    "entitle",
     "legend_above",
     "name_upright",
     "pieces_of",
@@ -98,9 +99,7 @@ def sheet_of(sketch: Sketch, looks: Sequence[Look], quantity: ColourQuantity | N
     lines, values = _add_lines(axes, sketch, looks)
     if values is not None and quantity is not None:
         add_bar(figure, paper, [(lines, values)], quantity, space=sketch.step.model.space)
-    title = title_of(sketch.scene.title)
-    if title:
-        figure.suptitle(title, fontsize=11, parse_math=False)
+    entitle(figure, sketch.scene.title)
     handles = _legend(sketch, looks)
     if handles:
         figure.legend(
@@ -137,6 +136,13 @@ def title_of(text: str) -> str:
     even = (textwrap.wrap(known, width) for width in range(max(20, len(known) // max(1, lines)), 69))
     fitting = (wrapped for wrapped in even if len(wrapped) <= min(3, lines))
     return "\n".join(next(fitting, textwrap.wrap(known, 68, max_lines=3, placeholder=" ...")))
+
+
+def entitle(figure: Figure, text: str) -> None:
+    """Write the title over a figure as :func:`title_of` breaks it; nothing for an empty one."""
+    title = title_of(text)
+    if title:
+        figure.suptitle(title, fontsize=11, parse_math=False)
 
 
 def legend_above(axes: Axes, handles: Sequence[Any] | None = None, columns: int = 4) -> None:
