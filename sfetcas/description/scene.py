@@ -264,6 +264,7 @@ class Scene(Record):
             self.members,
             self.contacts,
             self.rotating,
+            self.sections,
         )
 
 
