@@ -11,6 +11,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.quaternion import rotate
 from .contacts import Contact
 from .loads import Load, Motion
+from .sections import CrossSection
 from .shapes import CenterLine
 from .springs import Spring
 from .structure import Member, Node
@@ -31,6 +32,7 @@ def out_of_plane(
     members: Mapping[str, Member],
     contacts: Mapping[str, Contact],
     rotating: Triple | None,
+    sections: Mapping[str, CrossSection],
 ) -> Finding | None:
     """Place in the scene and description of the first thing that does not lie in x-y; None where all does."""
     if gravity is not None and _leaves(gravity):
@@ -40,6 +42,7 @@ def out_of_plane(
     findings = (
         _nodes(nodes),
         _members(lines),
+        _sections(members, lines, sections),
         _spins(members),
         _loads(loads, lines),
         _motions(motions),
@@ -78,6 +81,20 @@ def _members(lines: Mapping[str, CenterLine]) -> Iterator[Finding]:
             yield ("members", name, "shape"), "twists"
         else:
             yield ("members", name, "b2"), "is neither along z nor in x-y"
+
+
+def _sections(
+    members: Mapping[str, Member], lines: Mapping[str, CenterLine], sections: Mapping[str, CrossSection]
+) -> Iterator[Finding]:
+    for name, member in members.items():
+        section = None if member.section is None else sections.get(member.section)
+        if section is None or member.type == "rigid" or not lines[name].planar:
+            continue
+        if section.couples(lines[name].bending_axis):
+            yield (
+                ("sections", str(member.section), "coupling"),
+                "couples bending in x-y with twist or bending out of it",
+            )
 
 
 def _spins(members: Mapping[str, Member]) -> Iterator[Finding]:

@@ -270,6 +270,7 @@ class Scene(Record):
             self.members,
             self.contacts,
             self.rotating,
+            self.sections,
         )
 
 

@@ -11,8 +11,9 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
+from .. import tolerances
 from ..errors import SceneError
-from ..mathematics.arrays import numbers
+from ..mathematics.arrays import numbers, values_of
 from ..mathematics.interpolation import power_series
 from .formulas import SAMPLES, Formula
 from .records import NotNegative, Number, Numbers, Record, number, say
@@ -281,6 +282,11 @@ class CrossSection(Record):
         Stiffness against shear along b2.  Default: no shear.
     GA3 : N
         Stiffness against shear along b3.  Default: no shear.
+    coupling : (3,), N m²
+        Entries of the stiffness matrix beside its diagonal ``GJ``, ``EI2``, ``EI3``: of twist with bending about
+        b2, of twist with bending about b3, and of bending about b2 with bending about b3.  The moment about b1 is
+        ``GJ`` times the change of the twist plus the first entry times that of the curvature about b2 plus the
+        second times that about b3, and so on.  Needs all three stiffnesses.  Default: zero.
     rhoA : kg/m
         Mass per length.  Needed with gravity, rotating axes, modes and motions.
     rhoI : (3,), kg m
@@ -321,7 +327,8 @@ class CrossSection(Record):
     Raises
     ------
     SceneError
-        A stiffness or mass not above zero somewhere, numbers mixed with a shape, a shape without E or with
+        A stiffness or mass not above zero somewhere, a coupling so large that the stiffness matrix is not positive
+        definite, numbers mixed with a shape, a shape without E or with
         dimensions of another, or nothing at all.
     """
 
@@ -331,6 +338,7 @@ class CrossSection(Record):
     EA: Above | None = None
     GA2: Above | None = None
     GA3: Above | None = None
+    coupling: Annotated[tuple[Varying, Varying, Varying], BeforeValidator(_three)] | None = None
     rhoA: Above | None = None
     rhoI: Annotated[tuple[Inertia, Inertia, Inertia], BeforeValidator(_three)] | None = None
     damping: NotNegative = 0.0
@@ -363,7 +371,27 @@ class CrossSection(Record):
             raise SceneError(f"found {outlined[0]!r} without a shape, accepted: shape = {' | '.join(_OUTLINES)}")
         elif not numbers:
             raise SceneError(f"found nothing in it, accepted: {', '.join(_NUMBERS)} or a shape")
+        if self.coupling is not None:
+            self._check_coupling()
         return self
+
+    def _check_coupling(self) -> None:
+        missing = self.missing(("GJ", "EI2", "EI3"))
+        if missing:
+            message = f"the key {missing[0]!r} is missing: a section with a coupling needs GJ, EI2 and EI3"
+            raise SceneError(message)
+        edges = np.array([0.0, *self.breaks, 1.0])
+        x = np.unique(edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, SAMPLES))
+        matrices = values_of(self.stiffness_matrix(x))
+        unit = np.sqrt(np.einsum("nii->ni", matrices))
+        lowest = np.linalg.eigvalsh(matrices / unit[:, :, None] / unit[:, None, :])[:, 0]
+        i = int(np.argmin(lowest))
+        if lowest[i] <= tolerances.RANK:
+            found = [float(evaluate(item, x[i])[0]) for item in self.coupling or ()]
+            where = "" if self.even else f" at {x[i]:g} of the length"
+            beside = ", ".join(f"{entry:g}" for entry in matrices[i].diagonal())
+            message = f"found {say(found)}{where} beside GJ, EI2 and EI3 of {beside}"
+            raise SceneError(f"{message}, accepted: a positive definite stiffness matrix", ("coupling",))
 
     def _given(self, names: Iterable[str]) -> list[str]:
         return [name for name in names if getattr(self, name) is not None]
@@ -407,7 +435,12 @@ class CrossSection(Record):
     def _varying(self) -> list[Quantity]:
         """What may vary along the member."""
         names = ("EI2", "EI3", "GJ", "EA", "GA2", "GA3", "rhoA", "E", "G", "rho", *_DIMENSIONS)
-        return [getattr(self, name) for name in self._given(names)] + list(self.rhoI or ())
+        return [getattr(self, name) for name in self._given(names)] + [*(self.coupling or ()), *(self.rhoI or ())]
+
+    def couples(self, axis: int) -> bool:
+        """Whether bending about the axis b2 or b3, given as 2 or 3, is coupled with anything else."""
+        others = {2: (0, 2), 3: (1, 2)}[axis]
+        return self.coupling is not None and any(self.coupling[i] != 0.0 for i in others)
 
     def missing(self, names: Iterable[str]) -> list[str]:
         """Which of the names EI2, EI3, GJ, rhoA (N m2, kg/m) this section does not define, in the order given."""
@@ -483,6 +516,37 @@ class CrossSection(Record):
         return np.asarray(
             6.0 * (1.0 + nu) * square / ((7.0 + 6.0 * nu) * square + (20.0 + 12.0 * nu) * np.square(hole))
         )
+
+    def stiffness_matrix(self, x: ArrayLike) -> Floats:
+        """Stiffness along the member as matrices, with what couples twist and bending.
+
+        Parameters
+        ----------
+        x : (n,)
+            Fractions of the length.
+
+        Returns
+        -------
+        (n, 3, 3) - moments about b1, b2, b3 by changes of the curvatures about them, N m2, zero where not defined
+        """
+        found = np.nan_to_num(self.stiffness(x))[:, :, None] * np.eye(3)
+        return found if self.coupling is None else found + self._coupled(x)
+
+    def _coupled(self, x: ArrayLike) -> Floats:
+        """The entries of the matrices beside their diagonals, (n, 3, 3)."""
+        twist_2, twist_3, both = (evaluate(item, x) for item in self.coupling or ())
+        nothing = np.zeros(len(twist_2))
+        rows = (nothing, twist_2, twist_3, twist_2, nothing, both, twist_3, both, nothing)
+        return np.stack(rows, axis=1).reshape(len(twist_2), 3, 3)
+
+    def compliance_matrix(self, x: ArrayLike) -> Floats:
+        """Inverse (n, 3, 3) of :meth:`stiffness_matrix`, 1/(N m2), at fractions x (n,); zero where not defined."""
+        if self.coupling is None:
+            values = self.stiffness(x)
+            return np.where(np.isnan(values), 0.0, 1.0 / values)[:, :, None] * np.eye(3)
+        a, b, c = (self.stiffness_matrix(x)[:, i] for i in range(3))
+        columns = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+        return columns / np.einsum("ni,ni->n", a, np.cross(b, c))[:, None, None]
 
     def fibres(self, x: ArrayLike) -> Floats:
         """Young's modulus (N/m2) and distances (m) of the outermost fibre from axes b2 and b3, (n, 3), at x (n,)."""

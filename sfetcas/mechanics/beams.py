@@ -118,7 +118,9 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
         values = np.zeros((x.size, 3))
         if member.type == "flexible":
             section = scene.sections[str(member.section)]
-            values = section.stiffness(x.ravel()) / (scales.moment * scales.length)
+            coupled = element.space and section.coupling is not None
+            values = section.stiffness_matrix(x.ravel()) if coupled else section.stiffness(x.ravel())
+            values = values / (scales.moment * scales.length)
         frames = quaternion.matrix(line.quaternions(x.ravel()))
         # Integrals over xi of squares of derivatives by xi: weight over length.
         per_length = (element.weights / length[:, None])[..., None]
@@ -149,8 +151,11 @@ def beams_of(scene: Scene, mesh: Mesh, element: Element, scales: Scales) -> Beam
 
 
 def _in_fixed_axes(values: Array, frames: Array, element: Element, bending_axis: int) -> Array:
-    """Stiffness (n, 3) about b1, b2, b3 in the fixed axes: upper triangles (n, 6), or about z (n, 1)."""
+    """Stiffness (n, 3) or (n, 3, 3) about b1, b2, b3 in the fixed axes: upper triangles (n, 6), or about z (n, 1)."""
     if not element.space:
         return values[:, 1:2] if bending_axis == 2 else values[:, 2:3]
-    full = np.einsum("nij,nj,nkj->nik", frames, values, frames)
+    if values.ndim == 3:
+        full = np.einsum("nij,njl,nkl->nik", frames, values, frames)
+    else:
+        full = np.einsum("nij,nj,nkj->nik", frames, values, frames)
     return full[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]

@@ -161,9 +161,11 @@ def compliance_along(scene: Scene, name: str, x: Array) -> Array:
     It is zero about axes that have no stiffness in the scene.
     """
     member, line = scene.members[name], scene.center_lines[name]
-    values = scene.sections[str(member.section)].stiffness(x)
+    section, frames = scene.sections[str(member.section)], quaternion.matrix(line.quaternions(x))
+    if section.coupling is not None:
+        return np.einsum("nij,njl,nkl->nik", frames, section.compliance_matrix(x), frames)
+    values = section.stiffness(x)
     inverse = np.where(np.isnan(values), 0.0, 1.0 / values)
-    frames = quaternion.matrix(line.quaternions(x))
     return np.einsum("nij,nj,nkj->nik", frames, inverse, frames)
 
 

@@ -154,9 +154,13 @@ class Fields:
         strain = np.einsum("nij,ni->nj", frames, result["moment"])
         if record.type == "rigid":
             return {**result, "curvature": line.curvatures(x)}
-        stiffness = model.scene.sections[str(record.section)].stiffness(x)
-        with np.errstate(invalid="ignore"):
-            strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
+        section = model.scene.sections[str(record.section)]
+        if section.coupling is not None and model.space:
+            strain = np.einsum("nij,nj->ni", section.compliance_matrix(x), strain)
+        else:
+            stiffness = section.stiffness(x)
+            with np.errstate(invalid="ignore"):
+                strain = np.where(np.isnan(stiffness), 0.0, strain / stiffness)
         result["curvature"] = line.curvatures(x) + strain
         if record.stretches(model.scene.sections):
             compliance = model.scene.sections[str(record.section)].compliance(x)
@@ -415,9 +419,9 @@ class Fields:
         spin = 2.0 * quaternion.multiply(quaternion.conjugate(rotation), slope)[:, 1:]
         line, record = model.scene.center_lines[touch.member], model.scene.members[touch.member]
         strain = np.einsum("nij,ni->nj", quaternion.matrix(line.quaternions(middle)), spin)
-        stiffness = model.scene.sections[str(record.section)].stiffness(middle)
+        stiffness = model.scene.sections[str(record.section)].stiffness_matrix(middle)
         frames = self._frames(touch.member, middle, rotation)
-        moments = np.einsum("nij,nj->ni", frames, stiffness * strain) / model.scales.moment
+        moments = np.einsum("nij,njk,nk->ni", frames, stiffness, strain) / model.scales.moment
         axes = np.cross(normal / np.linalg.norm(normal), frames[:, :, 0])
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         return np.einsum("ni,ni->n", moments, axes), axes

@@ -278,14 +278,20 @@ class _Weigher:
                 continue
             cuts, part = model.mesh.cuts[name], model.elements_of(name)
             x = cuts[:-1, None] + np.diff(cuts)[:, None] * element.nodes
-            stiffness = self.scene.sections[str(member.section)].stiffness(x.ravel())
+            section = self.scene.sections[str(member.section)]
+            stiffness = section.stiffness(x.ravel())
             chosen = stiffness if self.space else stiffness[:, 1:2] if line.bending_axis == 2 else stiffness[:, 2:3]
             # Squares of derivatives by xi: weight over length.
             weights = (element.weights / (line.length * np.diff(cuts)[:, None])).ravel()[:, None]
             unit = model.scales.moment * time
-            damping = (delay * weights * chosen / unit).reshape(len(x), -1)
             slopes = np.tile(differentiation(element.nodes).T.ravel(order="F"), (len(x), 1))
-            frames = quaternion.matrix(line.quaternions(x.ravel())).transpose(0, 2, 1).reshape(len(x), -1)
+            axes = quaternion.matrix(line.quaternions(x.ravel()))
+            if self.space and section.coupling is not None:
+                # About the principal axes of the stiffness.
+                chosen, principal = np.linalg.eigh(section.stiffness_matrix(x.ravel()))
+                axes = axes @ principal
+            damping = (delay * weights * chosen / unit).reshape(len(x), -1)
+            frames = axes.transpose(0, 2, 1).reshape(len(x), -1)
             data = np.hstack([slopes, frames]) if self.space else slopes
             groups.append((model.rotations.turns[part], data, damping))
         if not groups:

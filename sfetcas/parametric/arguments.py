@@ -110,7 +110,8 @@ class Argument:
         """Least and largest accepted value: the range; else above zero for sections, from zero for ``stiffness``."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
-        if self.name.startswith("sections.") and ".polynomial" not in self.name:
+        signed = ".polynomial" in self.name or ".coupling" in self.name
+        if self.name.startswith("sections.") and not signed:
             return float(np.nextafter(0.0, 1.0)), np.inf
         return (0.0 if self.name.endswith(".stiffness") else -np.inf), np.inf
 
@@ -363,7 +364,7 @@ def _unit(scene: Scene, path: Sequence[str]) -> str:
         turning = scene.springs[path[1]].type == "rotational"
         return {"stiffness": "N m" if turning else "N/m", "rest": "rad" if turning else "m"}.get(key, "m")
     if path[0] == "sections":
-        if re.match(r"EI|GJ", key):
+        if re.match(r"EI|GJ|coupling", key):
             return "N m2"
         if re.match(r"EA|GA", key):
             return "N"

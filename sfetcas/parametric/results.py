@@ -232,24 +232,24 @@ class Results:
         return np.concatenate([*nodes, *(part.ravel() for part in along), *sections])
 
     def _sections(self, model: Model, member: str) -> Array:
-        """Of a member at its places, (places, 18).
+        """Of a member at its places, (places, 24).
 
-        Stiffness over that of the first model, curvature times size, axes b1, b2, b3, and of a shape E and the reach
-        of its fibres.
+        Compliance matrix times the largest stiffness of the first model, curvature times size, axes b1, b2, b3, and of
+        a shape E and the reach of its fibres.
         """
         scene, x = model.scene, np.array(self.every[member])
         line, section = scene.center_lines[member], scene.sections[str(scene.members[member].section)]
-        stiffness = section.stiffness(x) / self._stiffness(member)
+        soft = section.compliance_matrix(x).reshape(len(x), 9) * self._stiffness(member)[:, None]
         axes = np.moveaxis(quaternion.matrix(line.quaternions(x)), 2, 1).reshape(len(x), 9)
         curved = line.curvatures(x) * self.model.scene.size
         fibres = np.zeros((len(x), 3)) if section.shape is None else section.fibres(x)
-        return np.concatenate([np.nan_to_num(stiffness), curved, axes, fibres], axis=1)
+        return np.concatenate([soft, curved, axes, fibres], axis=1)
 
     def _stiffness(self, member: str) -> Array:
-        """Of the first model at the places of a member, (places, 3); infinite where it is not known."""
+        """Largest stiffness of the first model at the places of a member, (places,), N m2."""
         scene = self.model.scene
         values = scene.sections[str(scene.members[member].section)].stiffness(np.array(self.every[member]))
-        return np.where(np.isnan(values), np.inf, values)
+        return numbers(np.nanmax(values, axis=1))
 
     def bent(self, member: str, moment: ca.MX, axes: Callable[[ca.MX], ca.MX], sections: ca.MX) -> ca.MX:
         """Change of the curvature about the axes of the sections, (3, places), 1/m.
@@ -258,17 +258,13 @@ class Results:
         ----------
         moment : (3, places), N m, fixed axes
         axes : function that rotates vectors (3, places) with the sections
-        sections : (18, places), their data as of :meth:`rest`
+        sections : (24, places), their data as of :meth:`rest`
         """
-        known, found = self._stiffness(member), []
-        for k in range(3):
-            along = ca.sum1(axes(sections[6 + 3 * k : 9 + 3 * k, :]) * moment)
-            finite = np.isfinite(known[:, k])
-            # What is not known is not bent: there is no moment about that axis.
-            inverse = ca.DM(np.where(finite, 1.0 / known[:, k], 0.0)).T
-            relative = sections[k, :] * ca.DM(finite.astype(float)).T + ca.DM((~finite).astype(float)).T
-            found.append(along * inverse / relative)
-        return ca.vertcat(*found)
+        about = [ca.sum1(axes(sections[12 + 3 * k : 15 + 3 * k, :]) * moment) for k in range(3)]
+        inverse = ca.DM(1.0 / self._stiffness(member)).T
+        return ca.vertcat(
+            *(sum((sections[3 * k + j, :] * about[j] for j in range(3)), ca.MX(0)) * inverse for k in range(3))
+        )
 
     def expression(self, program: Program, rest: ca.MX, speeds: ca.MX | None = None, *, short: bool = False) -> ca.MX:
         """All results (size,), one after the other, each row by row, in SI units.
@@ -295,11 +291,11 @@ class _Outputs:
         self._found = found
         count = len(model.nodes)
         along = [len(x) for x in results.every.values()]
-        curved = [18 * len(results.every[name]) for name in results.curved]
+        curved = [24 * len(results.every[name]) for name in results.curved]
         bounds = np.cumsum([0, 3 * count, *(3 * n for n in along), *curved]).tolist()
         nodes, *members = ca.vertsplit(rest, bounds)
         sections = members[len(along) :]
-        self._sections = {n: ca.reshape(x, 18, -1) for n, x in zip(results.curved, sections, strict=True)}
+        self._sections = {n: ca.reshape(x, 24, -1) for n, x in zip(results.curved, sections, strict=True)}
         self._rest = ca.reshape(nodes, 3, count)
         self._along = {n: ca.reshape(x, 3, -1) for n, x in zip(results.every, members, strict=False)}
         if expressions.elements:
@@ -455,10 +451,10 @@ class _Outputs:
         sections, scene = self._sections[member], self._model.scene
         change = self._results.bent(member, moment, turned, sections)
         if key == "curvature":
-            return (sections[3:6, :] / scene.size + change).T
+            return (sections[9:12, :] / scene.size + change).T
         shape = scene.sections[str(scene.members[member].section)].shape
-        strain = self._expressions.many(fibre_strain(shape != "rectangle"), change.shape[1])(change, sections[16:, :])
-        return (strain * sections[15, :] if key == "bending_stress" else strain).T
+        strain = self._expressions.many(fibre_strain(shape != "rectangle"), change.shape[1])(change, sections[22:, :])
+        return (strain * sections[21, :] if key == "bending_stress" else strain).T
 
     def _rotations(self, member: str) -> ca.MX:
         model, at = self._model, self._stations(member)
