@@ -54,6 +54,11 @@ class Stations:
         return self._rows(lambda xi: interpolation.evaluation(self._element.nodes, xi))
 
     @functools.cached_property
+    def at_points(self) -> Array:
+        """Interpolation weights of the integration points, (n, points)."""
+        return self._rows(lambda xi: interpolation.evaluation(self._element.points, xi))
+
+    @functools.cached_property
     def slopes(self) -> Array:
         """Weights of the nodes in the derivative by xi, (n, nodes)."""
         return self._rows(lambda xi: interpolation.differentiation(self._element.nodes, xi))
